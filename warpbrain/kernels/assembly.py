@@ -1,0 +1,111 @@
+"""From elements to the system: ordered sums of element results into nodes and into the blocks of the matrix.
+
+Every sum is a gather, one thread for a result, over a list of contributions in a fixed order: no atomics, so the same
+bits come out of every run on a device.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warpbrain.kernels.precision import Precision
+
+
+@dataclass(frozen=True)
+class AssemblyKernels:
+    """Assembly kernels of one precision.
+
+    Attributes
+    ----------
+    gather_matrix : wp.Kernel
+        One thread for a pair of nodes i <= j: `A_ij = k K_ij + m M_ij`, with the rows and columns of constrained
+        components replaced by those of the identity. Writes both `A_ij` and `A_ji`.
+    gather_forces : wp.Kernel
+        One thread for a node: the sum of the element forces on it.
+    constrained_load : wp.Kernel
+        One thread for a node: subtract `k K d`, of prescribed increments `d`, from the right-hand side.
+    """
+
+    gather_matrix: Any
+    gather_forces: Any
+    constrained_load: Any
+
+
+@cache
+def assembly_kernels(precision: Precision) -> AssemblyKernels:
+    """Make (once) the assembly kernels of a precision."""
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = f"warpbrain_assembly_{precision.name}"
+
+    @wp.kernel(enable_backward=False, module=module)
+    def gather_matrix(
+        pairs: wp.array[wp.vec2i],
+        first: wp.array[int],
+        contributions: wp.array[int],
+        positions: wp.array[wp.vec2i],
+        element_blocks: wp.array[mat33],
+        mass: wp.array[scalar],
+        free: wp.array[vec3],
+        k: scalar,
+        m: scalar,
+        values: wp.array[mat33],
+    ):
+        p = wp.tid()
+        K = mat33()
+        for c in range(first[p], first[p + 1]):
+            K += element_blocks[contributions[c]]
+        i = pairs[p][0]
+        j = pairs[p][1]
+        # components are 1 where free and 0 where constrained
+        A = wp.cw_mul(k * K, wp.outer(free[i], free[j]))
+        if i == j:
+            one = scalar(1.0)
+            inertia = m * mass[i]
+            for c in range(3):
+                A[c, c] += free[i][c] * inertia + (one - free[i][c])
+        values[positions[p][0]] = A
+        if i != j:
+            values[positions[p][1]] = wp.transpose(A)
+
+    @wp.kernel(enable_backward=False, module=module)
+    def gather_forces(
+        first: wp.array[int],
+        corners: wp.array[int],
+        element_forces: wp.array[vec3],
+        forces: wp.array[vec3],
+    ):
+        i = wp.tid()
+        f = vec3()
+        for c in range(first[i], first[i + 1]):
+            f += element_forces[corners[c]]
+        forces[i] = f
+
+    @wp.kernel(enable_backward=False, module=module)
+    def constrained_load(
+        first: wp.array[int],
+        corners: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        element_blocks: wp.array2d[mat33],
+        increment: wp.array[vec3],
+        free: wp.array[vec3],
+        k: scalar,
+        load: wp.array[vec3],
+    ):
+        i = wp.tid()
+        f = vec3()
+        for c in range(first[i], first[i + 1]):
+            e = corners[c] / 4
+            a = corners[c] % 4
+            for b in range(4):
+                low = wp.min(a, b)
+                high = wp.max(a, b)
+                # position of the pair in the ten stored blocks
+                K = element_blocks[e, low * 4 - low * (low + 1) / 2 + high]
+                if a > b:
+                    K = wp.transpose(K)
+                f += K * increment[nodes[e][b]]
+        load[i] = load[i] - wp.cw_mul(free[i], k * f)
+
+    return AssemblyKernels(gather_matrix, gather_forces, constrained_load)

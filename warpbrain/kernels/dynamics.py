@@ -1,0 +1,59 @@
+"""Kernels of implicit backward Euler: the right-hand side and the update of velocity and displacement."""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warpbrain.kernels.precision import Precision
+
+
+@dataclass(frozen=True)
+class DynamicsKernels:
+    """Kernels of a time step in one precision, one thread for a node; see `warpbrain.simulation.dynamics`."""
+
+    right_hand_side: Any
+    update: Any
+
+
+@cache
+def dynamics_kernels(precision: Precision) -> DynamicsKernels:
+    """Make (once) the kernels of a time step in a precision."""
+    scalar, vec3 = precision.scalar, precision.vec3
+    module = f"warpbrain_dynamics_{precision.name}"
+
+    @wp.kernel(enable_backward=False, module=module)
+    def right_hand_side(
+        external: wp.array[vec3],
+        internal: wp.array[vec3],
+        mass: wp.array[scalar],
+        v_start: wp.array[vec3],
+        v: wp.array[vec3],
+        Av: wp.array[vec3],
+        free: wp.array[vec3],
+        h: scalar,
+        along_Mv: scalar,
+        along_Av: scalar,
+        b: wp.array[vec3],
+    ):
+        i = wp.tid()
+        momentum = mass[i] * (v_start[i] + along_Mv * v[i])
+        b[i] = wp.cw_mul(free[i], momentum + h * (external[i] - internal[i]) + along_Av * Av[i])
+
+    @wp.kernel(enable_backward=False, module=module)
+    def update(
+        u_start: wp.array[vec3],
+        dv: wp.array[vec3],
+        v_prescribed: wp.array[vec3],
+        free: wp.array[vec3],
+        h: scalar,
+        v: wp.array[vec3],
+        u: wp.array[vec3],
+    ):
+        i = wp.tid()
+        w = wp.cw_mul(free[i], v[i] + dv[i] - v_prescribed[i]) + v_prescribed[i]
+        v[i] = w
+        u[i] = u_start[i] + h * w
+
+    return DynamicsKernels(right_hand_side, update)

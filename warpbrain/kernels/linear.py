@@ -1,0 +1,297 @@
+"""The one door to linear algebra: preconditioned conjugate gradients on the assembled system.
+
+Nobody else calls `warp.optim.linear`. Two facts about Warp 1.19 are dealt with here and nowhere else:
+
+- on the CPU its CG reduces every tile of a dot product once per absent GPU lane. Naming the one system as a batch of
+  one (`batch_offsets = [0, n]`) takes the code path that does not;
+- its matrix-vector product of 3 x 3 blocks has one thread for a scalar row. Ours has one for a block row (see
+  `docs/benchmarks.md` for what that is worth);
+- its kernels are compiled ahead for arrays of scalars only; vectors of three would compile that module three times
+  over. CG therefore sees scalar views of our arrays.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+import warp.optim.linear as warp_linear
+from warp.sparse import BsrMatrix
+
+from warpbrain.kernels.precision import Precision
+
+#: Names of the preconditioners: inverse diagonal blocks, factorised sparse approximate inverse, none.
+PRECONDITIONERS = ("block-jacobi", "fsai", "none")
+
+
+@dataclass(frozen=True)
+class LinearResult:
+    """How a solve by conjugate gradients ended.
+
+    Attributes
+    ----------
+    iterations : int
+    residual, tolerance : float
+        Norm of the residual `b - A x` (as CG updates it) and the norm that was to be reached.
+    curvature : float
+        Smallest `p . A p / p . p` over the search directions `p`, or NaN if it was not watched. Not positive: the
+        matrix is not positive definite.
+    """
+
+    iterations: int
+    residual: float
+    tolerance: float
+    curvature: float
+
+    @property
+    def converged(self) -> bool:
+        return self.residual <= self.tolerance
+
+    @property
+    def indefinite(self) -> bool:
+        return self.curvature <= 0.0
+
+
+@dataclass(frozen=True)
+class LinearKernels:
+    multiply: Any
+    invert_diagonal: Any
+    apply_diagonal: Any
+    partial_curvature: Any
+    least_curvature: Any
+
+
+#: Rows that one thread sums in the first stage of the curvature's reduction.
+_CHUNK = 64
+
+
+@cache
+def linear_kernels(precision: Precision) -> LinearKernels:
+    """Make (once) the kernels of the linear solver in a precision."""
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = f"warpbrain_linear_{precision.name}"
+    chunk = wp.constant(_CHUNK)
+
+    @wp.kernel(enable_backward=False, module=module)
+    def multiply(
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        values: wp.array[mat33],
+        x: wp.array[vec3],
+        y: wp.array[vec3],
+        z: wp.array[vec3],
+        alpha: scalar,
+        beta: scalar,
+    ):
+        i = wp.tid()
+        s = vec3()
+        for k in range(offsets[i], offsets[i + 1]):
+            s += values[k] * x[columns[k]]
+        s = alpha * s
+        # y may hold anything, NaN included, where beta is zero
+        if beta != scalar(0.0):
+            s += beta * y[i]
+        z[i] = s
+
+    @wp.kernel(enable_backward=False, module=module)
+    def invert_diagonal(diagonal: wp.array[int], values: wp.array[mat33], inverse: wp.array[mat33]):
+        i = wp.tid()
+        inverse[i] = wp.inverse(values[diagonal[i]])
+
+    @wp.kernel(enable_backward=False, module=module)
+    def apply_diagonal(
+        inverse: wp.array[mat33], x: wp.array[vec3], y: wp.array[vec3], z: wp.array[vec3], alpha: scalar, beta: scalar
+    ):
+        i = wp.tid()
+        s = alpha * (inverse[i] * x[i])
+        if beta != scalar(0.0):
+            s += beta * y[i]
+        z[i] = s
+
+    @wp.kernel(enable_backward=False, module=module)
+    def partial_curvature(p: wp.array[vec3], Ap: wp.array[vec3], partial: wp.array2d[scalar]):
+        t = wp.tid()
+        pAp = scalar(0.0)
+        pp = scalar(0.0)
+        for i in range(t * chunk, wp.min((t + 1) * chunk, p.shape[0])):
+            pAp += wp.dot(p[i], Ap[i])
+            pp += wp.dot(p[i], p[i])
+        partial[t, 0] = pAp
+        partial[t, 1] = pp
+
+    @wp.kernel(enable_backward=False, module=module)
+    def least_curvature(partial: wp.array2d[scalar], least: wp.array[scalar]):
+        pAp = scalar(0.0)
+        pp = scalar(0.0)
+        for t in range(partial.shape[0]):
+            pAp += partial[t, 0]
+            pp += partial[t, 1]
+        # after convergence the directions of a batched CG are zero: they say nothing
+        if pp > scalar(0.0):
+            least[0] = wp.min(least[0], pAp / pp)
+
+    return LinearKernels(multiply, invert_diagonal, apply_diagonal, partial_curvature, least_curvature)
+
+
+class ConjugateGradient:
+    """Preconditioned CG for one symmetric matrix whose pattern does not change; nothing is allocated in a solve.
+
+    Parameters
+    ----------
+    matrix : warp.sparse.BsrMatrix
+        Symmetric, 3 x 3 blocks, every diagonal block present.
+    diagonal : wp.array of int, shape (n,)
+        Position of each diagonal block in ``matrix.values``.
+    right_hand_side, solution : wp.array of vec3, shape (n,)
+        `b`, and `x`: the first guess and the result.
+    precision : Precision
+    tolerance : float
+        Relative: CG ends when ``|b - A x| <= tolerance |b|``.
+    max_iterations : int
+    preconditioner : str
+        One of `PRECONDITIONERS`.
+    watch_curvature : bool
+        Track the smallest curvature of the search directions, to tell an indefinite matrix.
+    check_every : int
+        Iterations between looks at the residual from the host; 0 leaves the loop on the device (needed for capture in
+        a CUDA graph, wasteful on the CPU, where it would run all `max_iterations`).
+    """
+
+    def __init__(
+        self,
+        matrix: BsrMatrix,
+        diagonal: wp.array,
+        right_hand_side: wp.array,
+        solution: wp.array,
+        precision: Precision,
+        *,
+        tolerance: float,
+        max_iterations: int,
+        preconditioner: str = "block-jacobi",
+        watch_curvature: bool = False,
+        check_every: int = 1,
+    ) -> None:
+        if preconditioner not in PRECONDITIONERS:
+            raise ValueError(f"preconditioner {preconditioner!r}: expected one of {', '.join(PRECONDITIONERS)}")
+        self._matrix = matrix
+        self._diagonal = diagonal
+        self._precision = precision
+        self._kernels = linear_kernels(precision)
+        self._size = right_hand_side.shape[0]
+        self._device = right_hand_side.device
+        self._kind = preconditioner
+        self._inverse = wp.empty(self._size, dtype=precision.mat33, device=self._device)
+        self._least = wp.zeros(1, dtype=precision.scalar, device=self._device)
+        chunks = (self._size + _CHUNK - 1) // _CHUNK
+        self._partial = wp.zeros((chunks, 2), dtype=precision.scalar, device=self._device)
+        self._watch = watch_curvature
+        self._fsai: Any = None
+        self._views: dict[int, wp.array] = {}
+        batch = wp.array([0, 3 * self._size], dtype=int, device=self._device) if self._device.is_cpu else None
+        shape = (3 * self._size, 3 * self._size)
+        operator = warp_linear.LinearOperator(shape, precision.mat33, self._device, self._multiply, batch_offsets=batch)
+        self._preconditioner: Any = None
+        if preconditioner == "block-jacobi":
+            self._preconditioner = warp_linear.LinearOperator(
+                shape, precision.mat33, self._device, self._apply_diagonal
+            )
+        self._solver = warp_linear.CG(
+            operator,
+            self._scalars(right_hand_side),
+            self._scalars(solution),
+            tol=tolerance,
+            atol=0.0,
+            maxiter=max_iterations,
+            M=self._preconditioner,
+            check_every=check_every,
+            use_cuda_graph=True,
+        )
+
+    def _scalars(self, x: wp.array) -> wp.array:
+        """The scalars of an array of vectors, without a copy."""
+        return wp.array(ptr=x.ptr, shape=(3 * self._size,), dtype=self._precision.scalar, device=self._device)
+
+    def _vectors(self, x: wp.array) -> wp.array:
+        """The vectors of an array of scalars, without a copy; the solver's arrays never move, so views are kept."""
+        view = self._views.get(x.ptr)
+        if view is None:
+            view = wp.array(ptr=x.ptr, shape=(self._size,), dtype=self._precision.vec3, device=self._device)
+            self._views[x.ptr] = view
+        return view
+
+    def _multiply(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
+        A = self._matrix
+        scalar = self._precision.scalar
+        x, y, z = self._vectors(x), self._vectors(y), self._vectors(z)
+        wp.launch(
+            self._kernels.multiply,
+            dim=self._size,
+            inputs=[A.offsets, A.columns, A.values, x, y, z, scalar(alpha), scalar(beta)],
+            device=self._device,
+        )
+        if self._watch and beta == 0.0:
+            wp.launch(
+                self._kernels.partial_curvature,
+                dim=self._partial.shape[0],
+                inputs=[x, z, self._partial],
+                device=self._device,
+            )
+            wp.launch(self._kernels.least_curvature, dim=1, inputs=[self._partial, self._least], device=self._device)
+
+    def _apply_diagonal(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
+        scalar = self._precision.scalar
+        wp.launch(
+            self._kernels.apply_diagonal,
+            dim=self._size,
+            inputs=[
+                self._inverse,
+                self._vectors(x),
+                self._vectors(y),
+                self._vectors(z),
+                scalar(alpha),
+                scalar(beta),
+            ],
+            device=self._device,
+        )
+
+    def multiply(self, x: wp.array, z: wp.array) -> None:
+        """`z = A x`."""
+        A = self._matrix
+        scalar = self._precision.scalar
+        wp.launch(
+            self._kernels.multiply,
+            dim=self._size,
+            inputs=[A.offsets, A.columns, A.values, x, z, z, scalar(1.0), scalar(0.0)],
+            device=self._device,
+        )
+
+    def prepare(self) -> None:
+        """Renew the preconditioner after the values of the matrix changed; its pattern is kept."""
+        if self._kind == "block-jacobi":
+            wp.launch(
+                self._kernels.invert_diagonal,
+                dim=self._size,
+                inputs=[self._diagonal, self._matrix.values, self._inverse],
+                device=self._device,
+            )
+        elif self._kind == "fsai":
+            if self._fsai is None:
+                self._fsai = warp_linear.FSAI(self._matrix, reuse_pattern=True)
+            else:
+                self._fsai.update(self._matrix)
+
+    def solve(self) -> Any:
+        """Run CG from the present content of the solution array; returns what Warp's solver returns."""
+        if self._watch:
+            self._least.fill_(float("inf"))
+        return self._solver(M=self._fsai)
+
+    def result(self, outcome: Any) -> LinearResult:
+        """Read the outcome of `solve` on the host (this waits for the device)."""
+        iterations, residual, tolerance = outcome
+        if isinstance(iterations, wp.array):
+            iterations = int(iterations.numpy()[0])
+            residual = float(residual.numpy().ravel()[0]) ** 0.5
+            tolerance = float(tolerance.numpy().ravel()[0]) ** 0.5
+        curvature = float(self._least.numpy()[0]) if self._watch else float("nan")
+        return LinearResult(int(iterations), float(residual), float(tolerance), curvature)

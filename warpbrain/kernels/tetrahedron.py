@@ -1,0 +1,96 @@
+"""What every element kernel of a linear tetrahedron shares: its kinematics and where its results go.
+
+For node `a` of an element of reference volume `V` with shape-function gradient `g_a`, at the deformation gradient
+`F = I + sum_a u_a (x) g_a`:
+
+    f_a  = V P g_a                 internal force on the node [N]
+    K_ab = V g_a . dP/dF . g_b     tangent block [N/m]
+
+The tangent of a hyperelastic law is symmetric, `K_ba = K_ab^T`: the ten blocks with a <= b are stored, in the order of
+`PAIRS`.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import warp as wp
+
+from warpbrain.kernels.precision import Precision
+
+#: Local node pairs (a, b) of the ten stored blocks, in storage order.
+PAIRS = ((0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3))
+
+
+@dataclass(frozen=True)
+class ElementKernels:
+    """The kernels of one law in one precision, each with one thread for an element of a group.
+
+    Attributes
+    ----------
+    forces : wp.Kernel
+        ``(elements, nodes, inverse_edges, volume, parameters, u) -> element_forces``
+    forces_and_tangents : wp.Kernel
+        The same with ``element_blocks`` as a second output.
+    energy : wp.Kernel
+        ``(elements, nodes, inverse_edges, volume, parameters, u) -> element_energy [J], element_J``
+    stress : wp.Kernel
+        ``(elements, F, parameters) -> energy density [Pa], P [Pa]`` for given deformation gradients.
+    moduli : wp.Kernel
+        ``(elements, F, parameters) -> blocks[e, j, l]`` with ``blocks[e, j, l][i, k] = dP_ij/dF_kl`` [Pa];
+        launched over (elements, 3, 3).
+    """
+
+    forces: Any
+    forces_and_tangents: Any
+    energy: Any
+    stress: Any
+    moduli: Any
+
+
+class DeviceLaw(Protocol):
+    """What the floors above ask of the device code of a material law (see `warpbrain.physics.laws`)."""
+
+    @property
+    def key(self) -> str:
+        """Unique name of the law and its formulation, a valid identifier."""
+
+    def kernels(self, precision: Precision) -> ElementKernels:
+        """Element kernels in a precision, made once."""
+
+
+@wp.func
+def deformation_gradient(u: wp.array[Any], nodes: wp.vec4i, inverse_edges: Any):
+    """`F = I + grad u`; formed from displacements so that small strains keep their digits in single precision."""
+    u0 = u[nodes[0]]
+    edges = wp.matrix_from_cols(u[nodes[1]] - u0, u[nodes[2]] - u0, u[nodes[3]] - u0)
+    return edges * inverse_edges + wp.identity(n=3, dtype=inverse_edges.dtype)
+
+
+@wp.func
+def store_forces(VP: Any, inverse_edges: Any, element_forces: wp.array2d[Any], e: int):
+    """Store `f_a = V P g_a`: the rows of the inverse edge matrix are `g_1` to `g_3`; the four gradients sum to zero."""
+    f1 = VP * inverse_edges[0]
+    f2 = VP * inverse_edges[1]
+    f3 = VP * inverse_edges[2]
+    element_forces[e, 0] = -(f1 + f2 + f3)
+    element_forces[e, 1] = f1
+    element_forces[e, 2] = f2
+    element_forces[e, 3] = f3
+
+
+@wp.func
+def store_blocks(K11: Any, K12: Any, K13: Any, K22: Any, K23: Any, K33: Any, element_blocks: wp.array2d[Any], e: int):
+    """Store the ten blocks from the six of nodes 1 to 3: each row and column of blocks sums to zero."""
+    K01 = -(K11 + wp.transpose(K12) + wp.transpose(K13))
+    K02 = -(K12 + K22 + wp.transpose(K23))
+    K03 = -(K13 + K23 + K33)
+    element_blocks[e, 0] = -(K01 + K02 + K03)
+    element_blocks[e, 1] = K01
+    element_blocks[e, 2] = K02
+    element_blocks[e, 3] = K03
+    element_blocks[e, 4] = K11
+    element_blocks[e, 5] = K12
+    element_blocks[e, 6] = K13
+    element_blocks[e, 7] = K22
+    element_blocks[e, 8] = K23
+    element_blocks[e, 9] = K33

@@ -1,0 +1,1 @@
+"""What can act on tissue: material laws and mechanisms, one file each."""

@@ -1,0 +1,89 @@
+"""Gravity after drainage of cerebrospinal fluid: above the fluid's level tissue loses its buoyancy.
+
+The imaged shape is the reference: it is in equilibrium while submerged. What deforms it is the *change* of load since
+then (diagnosis design, mechanism M1):
+
+    f_a = int N_a [ rho_csf g H(z(X) - level) d + (rho - rho_csf) g (d - d_imaged) ] dV
+
+with `d` the direction of gravity, `z` the height against it above the lowest point of the undeformed mesh, and `H` a
+step smoothed over 3 mm. The second term is there only if the head was turned since imaging.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.load import Load
+
+#: Standard gravity [m/s2] as used by the verification cases of this project.
+STANDARD_GRAVITY = 9.81
+#: Density of cerebrospinal fluid [kg/m3]; about 1.007 g/cm3 at body temperature (Davson and Segal 1996).
+CSF_DENSITY = 1007.0
+#: Width [m] over which the fluid's surface is smoothed, so that the load depends smoothly on its level.
+SURFACE_WIDTH = 0.003
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gravity(Load):
+    """Weight that acts on tissue above the level of the cerebrospinal fluid.
+
+    Parameters
+    ----------
+    direction : tuple of three floats
+        Where 'down' is (any length but zero), axes RAS.
+    density : float
+        Density of the tissue [kg/m3].
+    csf_level : float or None
+        Height of the fluid's surface [m] against `direction`, above the lowest point of the undeformed mesh. None: no
+        fluid at all and a reference free of gravity, so that the full weight acts.
+    imaged_direction : tuple of three floats or None
+        Where 'down' was while the reference was imaged; None: the same as `direction`.
+    """
+
+    direction: tuple[float, float, float]
+    density: float
+    csf_level: float | None = None
+    imaged_direction: tuple[float, float, float] | None = None
+    sentence: ClassVar[str] = "Cerebrospinal fluid drained, and the brain sinks under the weight it no longer carries."
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        unit_vector("gravity_axis", self.direction)
+        if self.imaged_direction is not None:
+            unit_vector("imaged gravity axis", self.imaged_direction)
+        if self.csf_level is not None and not np.isfinite(self.csf_level):
+            raise InputError(f"gravity: csf_level = {self.csf_level}: expected a finite height")
+
+    def height(self, mesh: TetMesh) -> NDArray[np.float64]:
+        """Height of each node [m] above the lowest one, against gravity, shape (n,)."""
+        z = -mesh.points @ unit_vector("gravity_axis", self.direction)
+        return z - z.min()
+
+    def nodal_forces(self, mesh: TetMesh) -> NDArray[np.float64]:
+        down = unit_vector("gravity_axis", self.direction)
+        quarter = np.repeat(mesh.volumes / 4.0, 4)
+        node_volume = np.bincount(mesh.tetrahedra.ravel(), weights=quarter, minlength=len(mesh.points))
+        if self.csf_level is None:
+            return self.density * STANDARD_GRAVITY * node_volume[:, None] * down
+        # nodal quadrature: exact for a constant density, and without an element that is half in the fluid
+        drained = 0.5 * (1.0 + np.tanh(2.0 * (self.height(mesh) - self.csf_level) / SURFACE_WIDTH))
+        force = CSF_DENSITY * STANDARD_GRAVITY * drained[:, None] * down
+        if self.imaged_direction is not None:
+            turned = down - unit_vector("imaged gravity axis", self.imaged_direction)
+            force = force + (self.density - CSF_DENSITY) * STANDARD_GRAVITY * turned
+        return node_volume[:, None] * force
+
+
+def unit_vector(name: str, direction: tuple[float, float, float]) -> NDArray[np.float64]:
+    """`direction` at length one; `InputError` if it has none."""
+    vector = np.asarray(direction, dtype=float)
+    length = float(np.linalg.norm(vector)) if vector.shape == (3,) else 0.0
+    if not (np.isfinite(length) and length > 0.0):
+        raise InputError(f"{name} = {list(np.ravel(vector))}: expected three numbers that are not all zero")
+    return vector / length

@@ -1,0 +1,81 @@
+"""What a material law is: the base class of the files in this folder.
+
+Each law is written for the incompressible case by supplement eq. (2) of the paper and comes in two formulations:
+
+- ``"coupled"`` (default): `Psi = w(l1, l2, l3) - c ln J + lam/2 (ln J)^2`, with `c` such that the rest state is free
+  of stress and `lam = 2 mu0 nu / (1 - 2 nu)`;
+- ``"uncoupled"``: `Psi = w(l1', l2', l3') + K/2 (J - 1)^2` with `l' = J^(-1/3) l` and
+  `K = 2 mu0 (1 + nu) / (3 (1 - 2 nu))`.
+
+At rest both have the shear modulus `mu0` and the Poisson ratio `nu`.
+"""
+
+from __future__ import annotations
+
+import abc
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError
+
+if TYPE_CHECKING:
+    from warpbrain.kernels.tetrahedron import DeviceLaw
+
+FORMULATIONS = ("coupled", "uncoupled")
+
+
+@dataclass(frozen=True)
+class Law(abc.ABC):
+    """A hyperelastic law with its parameters [Pa; exponents without unit]."""
+
+    #: Name in `case.toml` and on the command line.
+    name: ClassVar[str]
+
+    @property
+    @abc.abstractmethod
+    def shear_modulus(self) -> float:
+        """Shear modulus at rest `mu0` [Pa]."""
+
+    @abc.abstractmethod
+    def parameters(self) -> tuple[float, ...]:
+        """Parameters in the order of the device code, without the volumetric one."""
+
+    @abc.abstractmethod
+    def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Incompressible strain energy `w` [Pa] at principal stretches of shape (..., 3)."""
+
+    @classmethod
+    @abc.abstractmethod
+    def device_law(cls, formulation: str) -> DeviceLaw:
+        """Device code of a formulation."""
+
+    @abc.abstractmethod
+    def scaled_to(self, shear_modulus: float) -> Law:
+        """The same law with every modulus scaled so that its shear modulus at rest is `shear_modulus` [Pa]."""
+
+    def volumetric_modulus(self, poisson: float, formulation: str) -> float:
+        """`lam` (coupled) or `K` (uncoupled) [Pa] that gives the Poisson ratio at rest.
+
+        Raises
+        ------
+        InputError
+            If the Poisson ratio is outside (-1, 0.5) or the formulation is unknown.
+        """
+        if not (math.isfinite(poisson) and -1.0 < poisson < 0.5):
+            raise InputError(f"poisson = {poisson:g}: the Poisson ratio must lie in the open interval (-1, 0.5)")
+        if formulation not in FORMULATIONS:
+            raise InputError(f"formulation = {formulation!r}: expected one of {', '.join(FORMULATIONS)}")
+        if formulation == "coupled":
+            return 2.0 * self.shear_modulus * poisson / (1.0 - 2.0 * poisson)
+        return 2.0 * self.shear_modulus * (1.0 + poisson) / (3.0 * (1.0 - 2.0 * poisson))
+
+
+def require_finite(law: str, key: str, *values: float) -> None:
+    """Raise `InputError` if a parameter is NaN or infinite."""
+    for value in values:
+        if not math.isfinite(value):
+            raise InputError(f"{law}: {key} = {value}: expected a finite number")

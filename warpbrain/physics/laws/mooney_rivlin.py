@@ -1,0 +1,122 @@
+"""Mooney-Rivlin law: `w = C1 (I1 - 3) + C2 (I2 - 3)` (supplement eq. (2)), `mu0 = 2 (C1 + C2)`.
+
+    coupled    Psi = C1 (I1 - 3) + C2 (I2 - 3) - (2 C1 + 4 C2) ln J + lam/2 (ln J)^2
+    uncoupled  Psi = C1 (J^(-2/3) I1 - 3) + C2 (J^(-4/3) I2 - 3) + K/2 (J - 1)^2
+
+`I2 = (I1^2 - C : C) / 2`; the supplement's eq. (1) writes `C : C`.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError
+from warpbrain.physics.laws.device import InvariantLaw
+from warpbrain.physics.laws.law import Law, require_finite
+
+
+@wp.func
+def _coupled_energy(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any], e: int):
+    lam = parameters[e, 0]
+    C1 = parameters[e, 1]
+    C2 = parameters[e, 2]
+    three = type(J)(3.0)
+    log_J = wp.log(J)
+    rest = type(J)(2.0) * C1 + type(J)(4.0) * C2
+    return C1 * (I1 - three) + C2 * (I2 - three) - rest * log_J + type(J)(0.5) * lam * log_J * log_J
+
+
+@wp.func
+def _coupled_derivatives(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any], e: int):
+    lam = parameters[e, 0]
+    C1 = parameters[e, 1]
+    C2 = parameters[e, 2]
+    zero = type(J)(0.0)
+    pressure = lam * wp.log(J) - type(J)(2.0) * C1 - type(J)(4.0) * C2
+    return C1, C2, pressure / J, zero, zero, zero, zero, zero, (lam - pressure) / (J * J)
+
+
+@wp.func
+def _uncoupled_energy(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any], e: int):
+    K = parameters[e, 0]
+    C1 = parameters[e, 1]
+    C2 = parameters[e, 2]
+    three = type(J)(3.0)
+    root = wp.cbrt(J)
+    square = root * root
+    dilation = J - type(J)(1.0)
+    return C1 * (I1 / square - three) + C2 * (I2 / (square * square) - three) + type(J)(0.5) * K * dilation * dilation
+
+
+@wp.func
+def _uncoupled_derivatives(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any], e: int):
+    K = parameters[e, 0]
+    zero = type(J)(0.0)
+    root = wp.cbrt(J)
+    square = root * root
+    d1 = parameters[e, 1] / square
+    d2 = parameters[e, 2] / (square * square)
+    d1J = type(J)(-2.0) / type(J)(3.0) * d1 / J
+    d2J = type(J)(-4.0) / type(J)(3.0) * d2 / J
+    dJ = d1J * I1 + d2J * I2 + K * (J - type(J)(1.0))
+    dJJ = (type(J)(-5.0) / type(J)(3.0) * d1J * I1 + type(J)(-7.0) / type(J)(3.0) * d2J * I2) / J + K
+    return d1, d2, dJ, zero, zero, d1J, zero, d2J, dJJ
+
+
+_DEVICE = {
+    "coupled": InvariantLaw("mooney_rivlin_coupled", _coupled_energy, _coupled_derivatives, second_invariant=True),
+    "uncoupled": InvariantLaw(
+        "mooney_rivlin_uncoupled", _uncoupled_energy, _uncoupled_derivatives, second_invariant=True
+    ),
+}
+
+
+@dataclass(frozen=True)
+class MooneyRivlin(Law):
+    """Mooney-Rivlin law.
+
+    Parameters
+    ----------
+    C1, C2 : float
+        Coefficients of `I1 - 3` and `I2 - 3` [Pa], `C1 + C2 > 0`.
+
+    Raises
+    ------
+    InputError
+        If a coefficient is not a number or the shear modulus `2 (C1 + C2)` is not positive.
+    """
+
+    C1: float
+    C2: float
+    name: ClassVar[str] = "mooney-rivlin"
+
+    def __post_init__(self) -> None:
+        require_finite(self.name, "C1, C2", self.C1, self.C2)
+        if self.shear_modulus <= 0.0:
+            raise InputError(
+                f"{self.name}: C1 = {self.C1:g} Pa, C2 = {self.C2:g} Pa: the shear modulus 2 (C1 + C2) must be positive"
+            )
+
+    @property
+    def shear_modulus(self) -> float:
+        return 2.0 * (self.C1 + self.C2)
+
+    def parameters(self) -> tuple[float, ...]:
+        return (self.C1, self.C2)
+
+    def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
+        squares = stretches**2
+        I1 = np.sum(squares, axis=-1)
+        I2 = squares[..., 0] * squares[..., 1] + squares[..., 1] * squares[..., 2] + squares[..., 2] * squares[..., 0]
+        return self.C1 * (I1 - 3.0) + self.C2 * (I2 - 3.0)
+
+    @classmethod
+    def device_law(cls, formulation: str) -> InvariantLaw:
+        return _DEVICE[formulation]
+
+    def scaled_to(self, shear_modulus: float) -> "MooneyRivlin":
+        factor = shear_modulus / self.shear_modulus
+        return MooneyRivlin(factor * self.C1, factor * self.C2)

@@ -1,0 +1,212 @@
+"""Ogden law with N terms: `w = sum_p mu_p/alpha_p (sum_i l_i^alpha_p - 3)` (supplement eq. (2)).
+
+    coupled    Psi = w(l) - (sum_p mu_p) ln J + lam/2 (ln J)^2
+    uncoupled  Psi = w(J^(-1/3) l) + K/2 (J - 1)^2
+
+Convention: `mu_p/alpha_p`, so `mu0 = 1/2 sum_p mu_p alpha_p`. Abaqus, FEBio and Budday write `2 mu_p/alpha_p^2`:
+`Ogden.from_abaqus` converts.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError
+from warpbrain.kernels.powers import power_minus_one, power_quotient
+from warpbrain.physics.laws.device import PrincipalLaw
+from warpbrain.physics.laws.law import Law, require_finite
+
+
+@wp.func
+def _coupled_energy(l: Any, parameters: wp.array2d[Any], e: int):
+    terms = (parameters.shape[1] - 1) / 2
+    log_0 = wp.log(l[0])
+    log_1 = wp.log(l[1])
+    log_2 = wp.log(l[2])
+    log_J = log_0 + log_1 + log_2
+    psi = l.dtype(0.5) * parameters[e, 0] * log_J * log_J
+    for p in range(terms):
+        mu = parameters[e, 1 + p]
+        alpha = parameters[e, 1 + terms + p]
+        powers = power_minus_one(log_0, alpha) + power_minus_one(log_1, alpha) + power_minus_one(log_2, alpha)
+        psi += mu / alpha * powers - mu * log_J
+    return psi
+
+
+@wp.func
+def _coupled_derivatives(l: Any, parameters: wp.array2d[Any], e: int):
+    terms = (parameters.shape[1] - 1) / 2
+    lam = parameters[e, 0]
+    one = l.dtype(1.0)
+    logs = type(l)(wp.log(l[0]), wp.log(l[1]), wp.log(l[2]))
+    volumetric = lam * (logs[0] + logs[1] + logs[2])
+    T = type(l)()
+    diagonal = type(l)()
+    m = type(l)()
+    # T_i l_i, H_ii l_i^2 and the quotients of the powers, summed over the terms
+    for p in range(terms):
+        mu = parameters[e, 1 + p]
+        alpha = parameters[e, 1 + terms + p]
+        volumetric -= mu
+        for i in range(3):
+            power = mu * wp.exp(alpha * logs[i])
+            T[i] += power
+            diagonal[i] += (alpha - one) * power
+        m[0] += mu * power_quotient(logs[0], logs[1], alpha - one)
+        m[1] += mu * power_quotient(logs[0], logs[2], alpha - one)
+        m[2] += mu * power_quotient(logs[1], logs[2], alpha - one)
+    inverse = type(l)(one / l[0], one / l[1], one / l[2])
+    H = lam * wp.outer(inverse, inverse)
+    for i in range(3):
+        T[i] = (T[i] + volumetric) * inverse[i]
+        H[i, i] = (diagonal[i] - volumetric + lam) * inverse[i] * inverse[i]
+    m[0] -= volumetric * inverse[0] * inverse[1]
+    m[1] -= volumetric * inverse[0] * inverse[2]
+    m[2] -= volumetric * inverse[1] * inverse[2]
+    return T, H, m
+
+
+@wp.func
+def _uncoupled_energy(l: Any, parameters: wp.array2d[Any], e: int):
+    terms = (parameters.shape[1] - 1) / 2
+    third = l.dtype(1.0) / l.dtype(3.0)
+    log_0 = wp.log(l[0])
+    log_1 = wp.log(l[1])
+    log_2 = wp.log(l[2])
+    mean = third * (log_0 + log_1 + log_2)
+    dilation = l[0] * l[1] * l[2] - l.dtype(1.0)
+    psi = l.dtype(0.5) * parameters[e, 0] * dilation * dilation
+    for p in range(terms):
+        alpha = parameters[e, 1 + terms + p]
+        psi += (
+            parameters[e, 1 + p]
+            / alpha
+            * (
+                power_minus_one(log_0 - mean, alpha)
+                + power_minus_one(log_1 - mean, alpha)
+                + power_minus_one(log_2 - mean, alpha)
+            )
+        )
+    return psi
+
+
+@wp.func
+def _uncoupled_derivatives(l: Any, parameters: wp.array2d[Any], e: int):
+    terms = (parameters.shape[1] - 1) / 2
+    K = parameters[e, 0]
+    one = l.dtype(1.0)
+    third = l.dtype(1.0) / l.dtype(3.0)
+    logs = type(l)(wp.log(l[0]), wp.log(l[1]), wp.log(l[2]))
+    mean = third * (logs[0] + logs[1] + logs[2])
+    J = l[0] * l[1] * l[2]
+    pressure = K * (J - one) * J
+    stiffness = K * (l.dtype(2.0) * J - one) * J
+    # With q_i = sum_p mu_p (l_i J^(-1/3))^alpha_p and its mean q: T_i l_i = q_i - q + K (J - 1) J
+    q = type(l)()
+    weighted = type(l)()
+    m = type(l)()
+    for p in range(terms):
+        mu = parameters[e, 1 + p]
+        alpha = parameters[e, 1 + terms + p]
+        for i in range(3):
+            power = mu * wp.exp(alpha * (logs[i] - mean))
+            q[i] += power
+            weighted[i] += alpha * power
+        scaled = mu * wp.exp(-alpha * mean)
+        m[0] += scaled * power_quotient(logs[0], logs[1], alpha - one)
+        m[1] += scaled * power_quotient(logs[0], logs[2], alpha - one)
+        m[2] += scaled * power_quotient(logs[1], logs[2], alpha - one)
+    common = pressure - third * (q[0] + q[1] + q[2])
+    all_weighted = third * third * (weighted[0] + weighted[1] + weighted[2])
+    inverse = type(l)(one / l[0], one / l[1], one / l[2])
+    T = type(l)()
+    H = wp.outer(inverse, inverse)
+    for i in range(3):
+        T[i] = (q[i] + common) * inverse[i]
+        for j in range(3):
+            h = all_weighted - third * (weighted[i] + weighted[j]) + stiffness
+            if i == j:
+                h += weighted[i] - q[i] - common
+            H[i, j] = h * inverse[i] * inverse[j]
+    m[0] -= common * inverse[0] * inverse[1]
+    m[1] -= common * inverse[0] * inverse[2]
+    m[2] -= common * inverse[1] * inverse[2]
+    return T, H, m
+
+
+_DEVICE = {
+    "coupled": PrincipalLaw("ogden_coupled", _coupled_energy, _coupled_derivatives),
+    "uncoupled": PrincipalLaw("ogden_uncoupled", _uncoupled_energy, _uncoupled_derivatives),
+}
+
+
+@dataclass(frozen=True)
+class Ogden(Law):
+    """Ogden law with N terms.
+
+    Parameters
+    ----------
+    mu : tuple of float
+        Coefficients `mu_p` [Pa], in the convention `mu_p/alpha_p`.
+    alpha : tuple of float
+        Exponents, none of them zero; as many as `mu`.
+
+    Raises
+    ------
+    InputError
+        If the lists differ in length or are empty, an exponent is zero, or `mu0` is not positive.
+    """
+
+    mu: tuple[float, ...]
+    alpha: tuple[float, ...]
+    name: ClassVar[str] = "ogden"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mu", tuple(float(v) for v in self.mu))
+        object.__setattr__(self, "alpha", tuple(float(v) for v in self.alpha))
+        if len(self.mu) != len(self.alpha) or not self.mu:
+            raise InputError(
+                f"{self.name}: {len(self.mu)} values of mu and {len(self.alpha)} of alpha: expected N of each"
+            )
+        require_finite(self.name, "mu", *self.mu)
+        require_finite(self.name, "alpha", *self.alpha)
+        if 0.0 in self.alpha:
+            raise InputError(f"{self.name}: alpha = {list(self.alpha)}: an exponent of 0 has no energy")
+        if self.shear_modulus <= 0.0:
+            raise InputError(
+                f"{self.name}: mu = {list(self.mu)} Pa, alpha = {list(self.alpha)}: the shear modulus "
+                f"1/2 sum mu_p alpha_p = {self.shear_modulus:g} Pa must be positive"
+            )
+
+    @classmethod
+    def from_abaqus(cls, mu: tuple[float, ...], alpha: tuple[float, ...]) -> "Ogden":
+        """From the convention `2 mu_p/alpha_p^2` of Abaqus, FEBio and Budday."""
+        return cls(tuple(2.0 * m / a for m, a in zip(mu, alpha, strict=True)), alpha)
+
+    @property
+    def shear_modulus(self) -> float:
+        return 0.5 * sum(m * a for m, a in zip(self.mu, self.alpha, strict=True))
+
+    def parameters(self) -> tuple[float, ...]:
+        return self.mu + self.alpha
+
+    def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
+        logs = np.log(stretches)
+        terms = [m / a * np.sum(np.expm1(a * logs), axis=-1) for m, a in zip(self.mu, self.alpha, strict=True)]
+        return np.sum(terms, axis=0)
+
+    @classmethod
+    def device_law(cls, formulation: str) -> PrincipalLaw:
+        return _DEVICE[formulation]
+
+    def scaled_to(self, shear_modulus: float) -> "Ogden":
+        factor = shear_modulus / self.shear_modulus
+        return Ogden(tuple(factor * m for m in self.mu), self.alpha)
+
+    def with_terms(self, terms: int) -> "Ogden":
+        """The same law written with more terms, the new ones zero: tissues of one model share one number of terms."""
+        extra = terms - len(self.mu)
+        return Ogden(self.mu + (0.0,) * extra, self.alpha + (2.0,) * extra)

@@ -1,0 +1,1 @@
+"""What would follow: a model pre-processed for a device, its equilibrium and its motion."""

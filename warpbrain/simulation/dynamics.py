@@ -1,0 +1,230 @@
+"""Motion: implicit backward Euler with Rayleigh damping, in the four phases that the paper times.
+
+    M (v - v0) + h (k_d K + m_d M) v = h (f_ext - f_int(u)),   u = u0 + h v
+
+One step of Newton's method from `v = 0` is the paper's linearised step, written here for `dv = v - v0`:
+
+    A dv = M v0 + h (f_ext - f_int(u0)) - A v0,   A = (1 + h m_d) M + (h k_d + h^2) K(u0),
+
+which is `(M + h D + h^2 K) dv = h (f_ext - f_int - D v0 - h K v0)`. Further iterations (``newton > 1``) solve the
+implicit equation itself, with `K v = (A v - (1 + h m_d) M v) / (h k_d + h^2)` in the damping force.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError, SolveError
+from warpbrain.kernels.dynamics import dynamics_kernels
+from warpbrain.kernels.linear import ConjugateGradient, LinearResult
+from warpbrain.simulation.system import System
+
+#: The paper's phases of a step, in order, by their names in its Table 3.
+PHASES = ("internal forces", "assemble system", "solve system", "time integration")
+
+
+class Simulator:
+    """Steps a pre-processed model through time.
+
+    Parameters
+    ----------
+    system : System
+        Its `u` is the displacement; the simulator owns it from now on.
+    time_step : float
+        `h` [s].
+    tolerance : float
+        Relative tolerance of each linear solve.
+    max_cg : int
+        Iterations of a linear solve.
+    newton : int
+        Newton iterations a step; 1 is the paper's linearised step.
+    preconditioner : str
+        See `warpbrain.kernels.linear.PRECONDITIONERS`.
+    captured : bool
+        Keep the convergence test of CG on the device, so that a step can be captured in a CUDA graph. GPU only.
+
+    Attributes
+    ----------
+    v : wp.array of vec3, shape (n,)
+        Velocity [m/s].
+    time : float
+        [s]
+    """
+
+    def __init__(
+        self,
+        system: System,
+        *,
+        time_step: float = 0.001,
+        tolerance: float = 1e-6,
+        max_cg: int = 2000,
+        newton: int = 1,
+        preconditioner: str = "block-jacobi",
+        captured: bool = False,
+    ) -> None:
+        if not (np.isfinite(time_step) and time_step > 0.0):
+            raise InputError(f"time step = {time_step} s: expected a positive number")
+        if newton < 1:
+            raise InputError(f"newton = {newton}: expected at least one iteration a step")
+        if captured and system.device.is_cpu:
+            raise InputError("captured = True: a CUDA graph needs a CUDA device")
+        self.system = system
+        self.newton = newton
+        self.time = 0.0
+        self._h = time_step
+        self._kernels = dynamics_kernels(system.precision)
+        vec3, n, device = system.precision.vec3, system.size, system.device
+        self.v = wp.zeros(n, dtype=vec3, device=device)
+        self._v_start = wp.zeros_like(self.v)
+        self._u_start = wp.zeros_like(self.v)
+        self._v_prescribed = wp.zeros_like(self.v)
+        self._moving = False
+        self._cg = ConjugateGradient(
+            system.matrix,
+            system.diagonal,
+            system.load,
+            system.solution,
+            system.precision,
+            tolerance=tolerance,
+            max_iterations=max_cg,
+            preconditioner=preconditioner,
+            check_every=0 if captured else (1 if system.device.is_cpu else 10),
+        )
+        self._outcome: object = None
+        self._graph: object = None
+        self._external_factor: tuple[float, ...] | None = None
+        self.apply_loads()
+
+    # -- what acts ------------------------------------------------------------------------------------------------
+
+    def apply_loads(self) -> None:
+        """Set the external forces to the model's loads at the end of the coming step."""
+        factors = tuple(load.factor(self.time + self._h) for load in self.system.model.loads)
+        if factors != self._external_factor:
+            self.system.external.assign(self.system.model.external_forces(self.time + self._h))
+            self._external_factor = factors
+
+    def prescribe(self, displacement: NDArray[np.float64]) -> None:
+        """Move the constrained components to a displacement [m], shape (n, 3), within the coming step."""
+        velocity = (displacement - self.system.u.numpy()) / self._h
+        velocity[~self.system.model.constrained] = 0.0
+        self._v_prescribed.assign(velocity)
+        self._moving = bool(np.any(velocity))
+
+    # -- the four phases ------------------------------------------------------------------------------------------
+
+    def internal_forces(self) -> None:
+        """Phase 1: forces and tangents of the elements."""
+        self.system.evaluate_tangents()
+
+    def assemble_system(self, first: bool = True) -> None:
+        """Phase 2: sum the elements into matrix and right-hand side, and renew the preconditioner."""
+        s, h, damping = self.system, self._h, self.system.model.damping
+        scalar = s.precision.scalar
+        k, m = h * damping.stiffness + h * h, 1.0 + h * damping.mass
+        s.gather_forces()
+        s.assemble(k, m)
+        self._cg.multiply(self.v, s.solution)
+        along_Av = -1.0 if first else -damping.stiffness / (damping.stiffness + h)
+        along_Mv = 0.0 if first else -m - along_Av * m
+        wp.launch(
+            self._kernels.right_hand_side,
+            dim=s.size,
+            inputs=[
+                s.external, s.internal, s.mass, self._v_start, self.v, s.solution, s.free,
+                scalar(h), scalar(along_Mv), scalar(along_Av), s.load,
+            ],
+            device=s.device,
+        )  # fmt: skip
+        if first and self._moving:
+            s.subtract_constrained_load(self._v_prescribed, k)
+        self._cg.prepare()
+
+    def solve_system(self) -> None:
+        """Phase 3: conjugate gradients for the change of velocity."""
+        self.system.solution.zero_()
+        self._outcome = self._cg.solve()
+
+    def integrate(self) -> None:
+        """Phase 4: velocity and displacement at the end of the step."""
+        s = self.system
+        wp.launch(
+            self._kernels.update,
+            dim=s.size,
+            inputs=[
+                self._u_start, s.solution, self._v_prescribed, s.free, s.precision.scalar(self._h), self.v, s.u,
+            ],
+            device=s.device,
+        )  # fmt: skip
+
+    def _run_phases(self) -> None:
+        wp.copy(self._v_start, self.v)
+        wp.copy(self._u_start, self.system.u)
+        for iteration in range(self.newton):
+            self.internal_forces()
+            self.assemble_system(first=iteration == 0)
+            self.solve_system()
+            self.integrate()
+
+    def step(self) -> None:
+        """Advance by one time step."""
+        self.apply_loads()
+        if self._graph is None:
+            self._run_phases()
+        else:
+            wp.capture_launch(self._graph)
+        self.time += self._h
+
+    def capture(self) -> None:
+        """Capture a step in a CUDA graph, which later steps replay: one launch from the host instead of hundreds."""
+        # a step outside the capture loads every module
+        u, v = wp.clone(self.system.u), wp.clone(self.v)
+        self._run_phases()
+        wp.copy(self.system.u, u)
+        wp.copy(self.v, v)
+        with wp.ScopedCapture(device=self.system.device) as capture:
+            self._run_phases()
+        self._graph = capture.graph
+
+    # -- looking at the state -------------------------------------------------------------------------------------
+
+    def last_solve(self) -> LinearResult:
+        """How the last linear solve ended (waits for the device)."""
+        return self._cg.result(self._outcome)
+
+    def check(self) -> float:
+        """Smallest `J` of an element.
+
+        Raises
+        ------
+        SolveError
+            If an element is inverted, the state is not finite or the last linear solve failed: when, where and why.
+        """
+        linear = self.last_solve()
+        _, min_J = self.system.energy()
+        if not np.isfinite(linear.residual) or not np.all(np.isfinite(self.v.numpy())):
+            raise SolveError(
+                f"the motion is not finite after {1000.0 * self.time:.4g} ms: conjugate gradients broke down"
+            )
+        if not linear.converged:
+            raise SolveError(
+                f"conjugate gradients did not converge in the step to {1000.0 * self.time:.4g} ms: residual "
+                f"{linear.residual:.1e} after {linear.iterations} iterations, goal {linear.tolerance:.1e}"
+            )
+        if not min_J > 0.0:
+            J = self.system.element_J.numpy()
+            mesh = self.system.model.mesh
+            e = int(np.argmin(J))
+            x, y, z = 1000.0 * mesh.points[mesh.tetrahedra[e]].mean(axis=0)
+            raise SolveError(
+                f"element {e} at ({x:.1f}, {y:.1f}, {z:.1f}) mm, tissue {mesh.tissue[e]}, turned inside out by "
+                f"{1000.0 * self.time:.4g} ms (J = {J[e]:.3g}): the load is too much for this tissue or this time step"
+            )
+        return min_J
+
+    def kinetic_energy(self) -> float:
+        """[J]"""
+        v = self.v.numpy().astype(np.float64)
+        return 0.5 * float(np.sum(self.system.mass.numpy().astype(np.float64)[:, None] * v**2))

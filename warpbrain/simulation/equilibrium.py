@@ -1,0 +1,303 @@
+"""Static equilibrium: Newton's method with an energy line search, inside load steps that adapt.
+
+The potential is `Pi(u) = stored energy - t f . u` at load fraction `t`. An iterate is accepted only with `J > 0` in
+every element and a sufficient decrease of `Pi` (Armijo). Prescribed displacements enter the first linear solve of a load
+step through `K d`: writing them into the state first would distort the elements along the boundary before the interior
+can follow. Linear systems are solved inexactly while far from the solution (Eisenstat and Walker 1996).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError, SolveError
+from warpbrain.kernels.linear import ConjugateGradient, LinearResult
+from warpbrain.simulation.system import System
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NewtonStep:
+    """One line of the solver's history.
+
+    Attributes
+    ----------
+    load : float
+        Load fraction that is being solved for.
+    iteration : int
+        Newton iteration within the load step, from 1.
+    residual : float
+        Norm of the out-of-balance force before the iteration, relative to the forces in play.
+    cg_iterations : int
+    step : float
+        Length of the accepted step, 1 for a full one.
+    min_J : float
+        Smallest volume ratio after the step.
+    """
+
+    load: float
+    iteration: int
+    residual: float
+    cg_iterations: int
+    step: float
+    min_J: float
+
+
+@dataclass(frozen=True)
+class EquilibriumOptions:
+    """How to solve.
+
+    Attributes
+    ----------
+    tolerance : float
+        Converged when ``|r| <= tolerance (|f_int| + |f_ext|)``: out-of-balance force on the free components against
+        all nodal forces, reactions included.
+    max_newton : int
+        Iterations in a load step before it is cut.
+    min_load_step : float
+        Smallest load step before the solve gives up.
+    cg_tolerance : float
+        Loosest relative tolerance of a linear solve; tightened as Newton converges.
+    max_cg : int
+        Iterations of a linear solve.
+    preconditioner : str
+        See `warpbrain.kernels.linear.PRECONDITIONERS`.
+    """
+
+    tolerance: float = 1e-8
+    max_newton: int = 25
+    min_load_step: float = 1.0 / 1024.0
+    cg_tolerance: float = 0.03
+    max_cg: int = 10_000
+    preconditioner: str = "block-jacobi"
+
+    def __post_init__(self) -> None:
+        for name in ("tolerance", "min_load_step", "cg_tolerance"):
+            value = getattr(self, name)
+            if not 0.0 < value < 1.0:
+                raise InputError(f"equilibrium: {name} = {value}: expected a number between 0 and 1")
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A converged state.
+
+    Attributes
+    ----------
+    u : (n, 3) array
+        Displacement [m].
+    internal : (n, 3) array
+        Internal forces [N]; on constrained components they are the reactions.
+    energy : float
+        Stored energy [J].
+    residual : float
+        Relative out-of-balance force reached.
+    history : tuple of NewtonStep
+    """
+
+    u: Floats
+    internal: Floats
+    energy: float
+    residual: float
+    history: tuple[NewtonStep, ...]
+
+
+class _StepFailed(Exception):
+    """A load step that must be cut; the message says why."""
+
+
+class EquilibriumSolver:
+    """Finds equilibria of one pre-processed model.
+
+    Parameters
+    ----------
+    system : System
+    options : EquilibriumOptions
+    on_step : callable, optional
+        Called with each `NewtonStep` as it is taken.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        options: EquilibriumOptions | None = None,
+        on_step: Callable[[NewtonStep], None] | None = None,
+    ) -> None:
+        self.system = system
+        self.options = options or EquilibriumOptions()
+        self._on_step = on_step
+        self._history: list[NewtonStep] = []
+        self._free = 1.0 - system.model.constrained
+        # residuals cannot fall below the rounding of the sums of element forces
+        self.tolerance = max(self.options.tolerance, 50.0 * system.precision.epsilon)
+        # force of the order of rounding, so that a body without any load is in equilibrium
+        stiffest = max(material.law.shear_modulus for material in system.model.materials.values())
+        self._noise = system.precision.epsilon * stiffest * system.model.mesh.volume ** (2.0 / 3.0)
+
+    def solve(self, external: Floats | None = None, start: Floats | None = None) -> Equilibrium:
+        """Go from a start (rest by default) to equilibrium at full load.
+
+        Parameters
+        ----------
+        external : (n, 3) array, optional
+            Nodal forces at full load [N]; those of the model by default.
+        start : (n, 3) array, optional
+            Displacement to start from [m], taken as in equilibrium at no load.
+
+        Returns
+        -------
+        Equilibrium
+
+        Raises
+        ------
+        SolveError
+            If no equilibrium is found: at what load fraction, where and why.
+        """
+        model = self.system.model
+        full = model.external_forces() if external is None else external
+        u = np.zeros_like(full) if start is None else np.array(start, dtype=np.float64)
+        origin = np.where(model.constrained, u, 0.0)
+        self._history = []
+        done, step = 0.0, 1.0
+        while done < 1.0:
+            load = min(1.0, done + step)
+            target = origin + load * (model.prescribed - origin * model.constrained)
+            try:
+                reached, energy, residual = self._newton(u, load, load * full, target)
+            except _StepFailed as failure:
+                step *= 0.5
+                if step < self.options.min_load_step:
+                    raise SolveError(
+                        f"no equilibrium found beyond {100.0 * done:.3g} % of the load "
+                        f"(load step cut to {100.0 * step:.2g} %): {failure}"
+                    ) from None
+                continue
+            u, done, step = reached, load, 2.0 * step
+        return Equilibrium(u, self.system.internal.numpy().astype(np.float64), energy, residual, tuple(self._history))
+
+    def _newton(self, start: Floats, load: float, external: Floats, target: Floats) -> tuple[Floats, float, float]:
+        """Newton's method at one load; returns displacement, stored energy and relative residual."""
+        system, options = self.system, self.options
+        u = start.copy()
+        potential, _ = self._potential(u, external)
+        previous = np.inf
+        forcing = options.cg_tolerance
+        for iteration in range(1, options.max_newton + 1):
+            system.u.assign(u)
+            system.evaluate_tangents()
+            system.gather_forces()
+            internal = system.internal.numpy().astype(np.float64)
+            r = self._free * (external - internal)
+            scale = float(np.linalg.norm(internal) + np.linalg.norm(external))
+            norm = float(np.linalg.norm(r))
+            relative = norm / (scale + self._noise)
+            prescribed = np.where(system.model.constrained, target - u, 0.0)
+            moving = bool(np.any(prescribed))
+            if not np.isfinite(norm):
+                raise _StepFailed("the out-of-balance force is not finite")
+            if not moving and relative <= self.tolerance:
+                return u, potential + float(np.vdot(external, u)), relative
+            # Eisenstat-Walker: as exact as Newton's own error deserves, and no more exact than the goal needs
+            if moving:
+                eta = min(options.cg_tolerance, 1e-3)
+            else:
+                ratio = norm / previous if np.isfinite(previous) else 1.0
+                eta = min(options.cg_tolerance, max(0.9 * ratio**2, 0.9 * forcing**2 if forcing**2 > 0.1 else 0.0))
+                eta = max(eta, 0.3 * self.tolerance / relative, 20.0 * system.precision.epsilon)
+            forcing, previous = eta, np.inf if moving else norm
+            d, linear = self._direction(r, prescribed, moving, min(eta, 0.5))
+            alpha, u, potential, min_J = self._line_search(u, d, r, external, potential, moving)
+            record = NewtonStep(load, iteration, relative, linear.iterations, alpha, min_J)
+            self._history.append(record)
+            if self._on_step is not None:
+                self._on_step(record)
+        raise _StepFailed(
+            f"Newton's method did not converge in {options.max_newton} iterations "
+            f"(relative residual {relative:.1e}, goal {self.tolerance:.1e})"
+        )
+
+    def _direction(self, r: Floats, prescribed: Floats, moving: bool, eta: float) -> tuple[Floats, LinearResult]:
+        system = self.system
+        system.assemble(k=1.0, m=0.0)
+        system.load.assign(r)
+        if moving:
+            system.increment.assign(prescribed)
+            system.subtract_constrained_load(system.increment, 1.0)
+        system.solution.zero_()
+        cg = ConjugateGradient(
+            system.matrix,
+            system.diagonal,
+            system.load,
+            system.solution,
+            system.precision,
+            tolerance=eta,
+            max_iterations=self.options.max_cg,
+            preconditioner=self.options.preconditioner,
+            watch_curvature=True,
+            check_every=5 if system.device.is_cpu else 25,
+        )
+        cg.prepare()
+        linear = cg.result(cg.solve())
+        d = system.solution.numpy().astype(np.float64) * self._free + prescribed
+        if linear.indefinite:
+            raise _StepFailed(
+                f"the tangent stiffness is indefinite (curvature {linear.curvature:.2e} N/m along a search direction): "
+                f"the equilibrium path turns or branches here{self._worst_element()}"
+            )
+        if not np.all(np.isfinite(d)):
+            raise _StepFailed(
+                f"conjugate gradients broke down after {linear.iterations} iterations{self._worst_element()}"
+            )
+        if not linear.converged:
+            raise _StepFailed(
+                f"conjugate gradients did not converge in {linear.iterations} iterations "
+                f"(residual {linear.residual:.1e}, goal {linear.tolerance:.1e})"
+            )
+        return d, linear
+
+    def _potential(self, u: Floats, external: Floats) -> tuple[float, float]:
+        self.system.u.assign(u)
+        energy, min_J = self.system.energy()
+        return energy - float(np.vdot(external, u)), min_J
+
+    def _line_search(
+        self, u: Floats, d: Floats, r: Floats, external: Floats, potential: float, moving: bool
+    ) -> tuple[float, Floats, float, float]:
+        slope = -float(np.vdot(r, d))
+        # below this a change of the potential is rounding
+        noise = 100.0 * self.system.precision.epsilon * (abs(potential) + float(np.sum(np.abs(external * u))))
+        if not moving and slope > noise:
+            raise _StepFailed("Newton's direction does not descend: the tangent stiffness is not positive definite")
+        alpha = 1.0
+        min_J = np.nan
+        while alpha > 1e-3:
+            trial = u + alpha * d
+            reached, min_J = self._potential(trial, external)
+            descends = moving or reached <= potential + 1e-4 * alpha * slope + noise
+            if min_J > 0.0 and np.isfinite(reached) and descends:
+                return alpha, trial, reached, min_J
+            alpha *= 0.5
+        why = "elements turn inside out" if not min_J > 0.0 else "the energy does not decrease"
+        raise _StepFailed(f"{why} along Newton's direction, however short the step{self._worst_element()}")
+
+    def _worst_element(self) -> str:
+        """Where the element with the smallest J of the last evaluation is, for a message."""
+        mesh = self.system.model.mesh
+        J = self.system.element_J.numpy()
+        e = int(np.argmin(J))
+        x, y, z = 1000.0 * mesh.points[mesh.tetrahedra[e]].mean(axis=0)
+        return (
+            f"; most compressed element {e} at ({x:.1f}, {y:.1f}, {z:.1f}) mm, tissue {mesh.tissue[e]}, J = {J[e]:.3g}"
+        )
+
+
+def solve_equilibrium(
+    system: System, options: EquilibriumOptions | None = None, on_step: Callable[[NewtonStep], None] | None = None
+) -> Equilibrium:
+    """Equilibrium of a pre-processed model at full load; see `EquilibriumSolver`."""
+    return EquilibriumSolver(system, options, on_step).solve()

@@ -1,0 +1,133 @@
+"""A model: what is assumed about a body. Plain data, checked when made, independent of any device."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.laws import Law
+from warpbrain.physics.load import Load
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Material:
+    """A law with its compressibility.
+
+    Parameters
+    ----------
+    law : Law
+    poisson : float
+        Poisson ratio at rest, in (-1, 0.5).
+    formulation : str
+        ``"coupled"`` or ``"uncoupled"``; see `warpbrain.physics.laws.law`.
+    """
+
+    law: Law
+    poisson: float = 0.45
+    formulation: str = "coupled"
+
+    def __post_init__(self) -> None:
+        # refuses a bad Poisson ratio or formulation
+        self.law.volumetric_modulus(self.poisson, self.formulation)
+
+    @property
+    def volumetric_modulus(self) -> float:
+        """`lam` or `K` [Pa], by the formulation."""
+        return self.law.volumetric_modulus(self.poisson, self.formulation)
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Rayleigh damping `D = stiffness K + mass M` (the paper's Table 4: 0.001 s and 0)."""
+
+    stiffness: float = 0.001
+    mass: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("stiffness", self.stiffness), ("mass", self.mass)):
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InputError(f"damping: {name} = {value}: expected a number >= 0")
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything that is assumed to act on a body.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    materials : mapping of int to Material
+        By tissue label; every label of the mesh must be there.
+    density : float
+        [kg/m3]
+    constrained : (n, 3) bool array
+        Components of the nodal displacements that are prescribed.
+    prescribed : (n, 3) array
+        Their values [m] at full load; zero where not given.
+    loads : sequence of Load
+        What else acts, each a file of `warpbrain.physics`.
+    damping : Damping
+
+    Raises
+    ------
+    InputError
+        If a tissue has no material, an array has the wrong shape or holds NaN, or the density is not positive.
+    """
+
+    mesh: TetMesh
+    materials: Mapping[int, Material]
+    density: float = 1211.5
+    constrained: Bools = None  # type: ignore[assignment]  # nothing constrained
+    prescribed: Floats = None  # type: ignore[assignment]  # zero
+    loads: Sequence[Load] = ()
+    damping: Damping = field(default_factory=Damping)
+
+    def __post_init__(self) -> None:
+        shape = self.mesh.points.shape
+        constrained = np.zeros(shape, dtype=bool) if self.constrained is None else np.asarray(self.constrained)
+        prescribed = np.zeros(shape) if self.prescribed is None else np.asarray(self.prescribed, dtype=np.float64)
+        if constrained.dtype != bool or constrained.shape != shape:
+            raise InputError(f"constrained: expected a boolean array of shape {shape}, found {constrained.shape}")
+        if prescribed.shape != shape:
+            raise InputError(f"prescribed: expected an array of shape {shape}, found {prescribed.shape}")
+        if not np.all(np.isfinite(prescribed)):
+            node = int(np.flatnonzero(~np.all(np.isfinite(prescribed), axis=1))[0])
+            raise InputError(f"prescribed: the displacement of node {node} is not finite")
+        if np.any(prescribed[~constrained] != 0.0):
+            raise InputError("prescribed: a component that is not constrained has a displacement")
+        if not (math.isfinite(self.density) and self.density > 0.0):
+            raise InputError(f"density = {self.density:g} kg/m3: expected a positive number")
+        missing = sorted(set(np.unique(self.mesh.tissue).tolist()) - set(self.materials))
+        if missing:
+            raise InputError(f"materials: no material for tissue {', '.join(map(str, missing))} of the mesh")
+        object.__setattr__(self, "constrained", constrained)
+        object.__setattr__(self, "prescribed", prescribed)
+
+    @property
+    def node_masses(self) -> Floats:
+        """Lumped mass of each node [kg], a quarter of each of its tetrahedra, shape (n,)."""
+        quarter = np.repeat(self.density * self.mesh.volumes / 4.0, 4)
+        return np.bincount(self.mesh.tetrahedra.ravel(), weights=quarter, minlength=len(self.mesh.points)).astype(
+            np.float64
+        )
+
+    @property
+    def mass(self) -> float:
+        """[kg]"""
+        return self.density * self.mesh.volume
+
+    def external_forces(self, time: float = math.inf) -> Floats:
+        """Sum of the loads on the nodes [N] at a time [s], shape (n, 3); by default long after every ramp."""
+        total = np.zeros(self.mesh.points.shape)
+        for load in self.loads:
+            total += load.factor(time) * load.nodal_forces(self.mesh)
+        return total

@@ -1,0 +1,267 @@
+"""Pre-processing: a model on a device. Everything that is made once for a mesh; the loops allocate nothing after it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+from warp.sparse import BsrMatrix, bsr_zeros
+
+from warpbrain.errors import InputError
+from warpbrain.kernels.assembly import assembly_kernels
+from warpbrain.kernels.precision import PRECISIONS, Precision
+from warpbrain.kernels.tetrahedron import PAIRS, ElementKernels
+from warpbrain.physics.laws import Law, Ogden
+from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.pattern import build_pattern
+
+Floats = NDArray[np.float64]
+
+
+def find_device(name: str | None) -> wp.Device:
+    """The Warp device of a name (``"cpu"``, ``"cuda:0"``; None for the default one).
+
+    Raises
+    ------
+    InputError
+        If there is no such device; the message lists those there are.
+    """
+    try:
+        return wp.get_device(name)
+    except Exception as error:  # Warp raises RuntimeError or ValueError, by version and cause
+        there = ", ".join(device.alias for device in wp.get_devices())
+        raise InputError(f"device '{name}': not found on this machine (there are: {there})") from error
+
+
+def find_precision(name: str) -> Precision:
+    """The precision of a name, ``"double"`` or ``"single"``; `InputError` otherwise."""
+    if name not in PRECISIONS:
+        raise InputError(f"precision '{name}': expected one of {', '.join(PRECISIONS)}")
+    return PRECISIONS[name]
+
+
+@dataclass(frozen=True)
+class ElementGroup:
+    """Elements that share a law and formulation: one launch, whatever their tissues."""
+
+    kernels: ElementKernels
+    elements: wp.array
+    parameters: wp.array
+
+
+class System:
+    """A model pre-processed for a device: arrays, pattern and the sums over elements.
+
+    Parameters
+    ----------
+    model : Model
+    device : str or None
+        Warp device; None for Warp's default.
+    precision : str
+        ``"double"`` or ``"single"``.
+
+    Attributes
+    ----------
+    u : wp.array of vec3, shape (n,)
+        Displacement [m]: what forces, tangents and energy are evaluated at.
+    internal, external : wp.array of vec3, shape (n,)
+        Internal and external nodal forces [N].
+    load : wp.array of vec3, shape (n,)
+        Right-hand side of the linear system.
+    solution : wp.array of vec3, shape (n,)
+        Its solution.
+    matrix : BsrMatrix
+        The system's matrix, 3 x 3 blocks, pattern fixed.
+    free : wp.array of vec3, shape (n,)
+        1 for free components, 0 for constrained ones.
+    mass : wp.array, shape (n,)
+        Lumped masses [kg].
+    seconds : float
+        Wall time that the pre-processing took [s].
+    """
+
+    def __init__(self, model: Model, device: str | None = None, precision: str = "double") -> None:
+        start = time.perf_counter()
+        self.model = model
+        self.device = find_device(device)
+        self.precision = find_precision(precision)
+        self.size = len(model.mesh.points)
+        self.elements = len(model.mesh.tetrahedra)
+        self._kernels = assembly_kernels(self.precision)
+        self._place_mesh()
+        self._place_pattern()
+        self.groups = self._group_elements()
+        self._place_fields()
+        self.seconds = time.perf_counter() - start
+
+    # -- pre-processing -------------------------------------------------------------------------------------------
+
+    def _array(self, values: Any, dtype: Any) -> wp.array:
+        return wp.array(values, dtype=dtype, device=self.device)
+
+    def _place_mesh(self) -> None:
+        mesh, p = self.model.mesh, self.precision
+        # Ascending node ids make every stored block belong to an upper block of the matrix. Odd permutations turn an
+        # element inside out, which nothing below notices: gradients do not depend on the order, volumes are taken
+        # before it.
+        self.tetrahedra = np.sort(mesh.tetrahedra, axis=1)
+        edges = mesh.points[self.tetrahedra[:, 1:]] - mesh.points[self.tetrahedra[:, :1]]
+        # rows of the inverse edge matrix: gradients of the shape functions of nodes 1 to 3
+        self.shape_gradients = np.linalg.inv(edges.transpose(0, 2, 1))
+        self.nodes = self._array(self.tetrahedra, wp.vec4i)
+        self.inverse_edges = self._array(self.shape_gradients, p.mat33)
+        self.volume = self._array(mesh.volumes, p.scalar)
+        self.mass = self._array(self.model.node_masses, p.scalar)
+
+    def _place_pattern(self) -> None:
+        p = self.precision
+        pattern = build_pattern(self.tetrahedra, self.size)
+        self.pairs = self._array(pattern.pairs, wp.vec2i)
+        self.pair_positions = self._array(pattern.positions, wp.vec2i)
+        self.pair_first = self._array(pattern.first, int)
+        self.contributions = self._array(pattern.contributions, int)
+        self.corner_first = self._array(pattern.corner_first, int)
+        self.corners = self._array(pattern.corners, int)
+        self.diagonal = self._array(pattern.diagonal, int)
+        self.matrix: BsrMatrix = bsr_zeros(self.size, self.size, p.mat33, device=self.device)
+        self.matrix.offsets = self._array(pattern.offsets, int)
+        self.matrix.columns = self._array(pattern.columns, int)
+        self.matrix.values = wp.zeros(len(pattern.columns), dtype=p.mat33, device=self.device)
+        self.matrix.nnz = len(pattern.columns)
+
+    def _group_elements(self) -> list[ElementGroup]:
+        model, p = self.model, self.precision
+        labels = model.mesh.tissue
+        by_code: dict[tuple[type[Law], str], dict[int, Material]] = {}
+        for label in np.unique(labels).tolist():
+            material = model.materials[label]
+            by_code.setdefault((type(material.law), material.formulation), {})[label] = material
+        groups = []
+        for (law_type, formulation), materials in by_code.items():
+            rows = _parameter_rows(materials)
+            parameters = np.zeros((self.elements, len(next(iter(rows.values())))))
+            for label, row in rows.items():
+                parameters[labels == label] = row
+            members = np.flatnonzero(np.isin(labels, list(materials)))
+            kernels = law_type.device_law(formulation).kernels(p)
+            groups.append(ElementGroup(kernels, self._array(members, int), self._array(parameters, p.scalar)))
+        return groups
+
+    def _place_fields(self) -> None:
+        p, n, m = self.precision, self.size, self.elements
+
+        def vectors() -> wp.array:
+            return wp.zeros(n, dtype=p.vec3, device=self.device)
+
+        self.u, self.internal, self.external = vectors(), vectors(), vectors()
+        self.load, self.solution, self.increment = vectors(), vectors(), vectors()
+        self.free = self._array(1.0 - self.model.constrained, p.vec3)
+        self.element_forces = wp.zeros((m, 4), dtype=p.vec3, device=self.device)
+        self.element_blocks = wp.zeros((m, len(PAIRS)), dtype=p.mat33, device=self.device)
+        self._flat_forces = self.element_forces.flatten()
+        self._flat_blocks = self.element_blocks.flatten()
+        self.element_energy = wp.zeros(m, dtype=p.scalar, device=self.device)
+        self.element_J = wp.zeros(m, dtype=p.scalar, device=self.device)
+
+    # -- sums over elements ---------------------------------------------------------------------------------------
+
+    def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
+        wp.launch(kernel, dim=dim, inputs=list(inputs), device=self.device)
+
+    def _geometry(self, group: ElementGroup) -> tuple[wp.array, ...]:
+        return (group.elements, self.nodes, self.inverse_edges, self.volume, group.parameters)
+
+    def evaluate_forces(self) -> None:
+        """Element forces at `u`."""
+        for g in self.groups:
+            self._launch(g.kernels.forces, len(g.elements), *self._geometry(g), self.u, self.element_forces)
+
+    def evaluate_tangents(self) -> None:
+        """Element forces and tangent blocks at `u`."""
+        for g in self.groups:
+            self._launch(
+                g.kernels.forces_and_tangents,
+                len(g.elements),
+                *self._geometry(g),
+                self.u,
+                self.element_forces,
+                self.element_blocks,
+            )
+
+    def gather_forces(self) -> None:
+        """Internal forces from the element forces."""
+        self._launch(
+            self._kernels.gather_forces, self.size, self.corner_first, self.corners, self._flat_forces, self.internal
+        )
+
+    def assemble(self, k: float, m: float) -> None:
+        """`matrix = k K + m M` from the element blocks, constrained rows and columns replaced by the identity."""
+        scalar = self.precision.scalar
+        self._launch(
+            self._kernels.gather_matrix,
+            len(self.pairs),
+            self.pairs,
+            self.pair_first,
+            self.contributions,
+            self.pair_positions,
+            self._flat_blocks,
+            self.mass,
+            self.free,
+            scalar(k),
+            scalar(m),
+            self.matrix.values,
+        )
+
+    def subtract_constrained_load(self, increment: wp.array, k: float) -> None:
+        """`load -= k K increment` on the free components, for increments of the constrained ones."""
+        self._launch(
+            self._kernels.constrained_load,
+            self.size,
+            self.corner_first,
+            self.corners,
+            self.nodes,
+            self.element_blocks,
+            increment,
+            self.free,
+            self.precision.scalar(k),
+            self.load,
+        )
+
+    def energy(self) -> tuple[float, float]:
+        """Stored energy [J] at `u`, and the smallest `J` of an element (not positive: the energy means nothing)."""
+        for g in self.groups:
+            self._launch(
+                g.kernels.energy, len(g.elements), *self._geometry(g), self.u, self.element_energy, self.element_J
+            )
+        return float(np.sum(self.element_energy.numpy(), dtype=np.float64)), float(np.min(self.element_J.numpy()))
+
+    def deformation_gradients(self) -> Floats:
+        """`F` of each element at `u`, shape (m, 3, 3), computed on the host in double precision."""
+        u = self.u.numpy().astype(np.float64)
+        edges = u[self.tetrahedra[:, 1:]] - u[self.tetrahedra[:, :1]]
+        return np.eye(3) + edges.transpose(0, 2, 1) @ self.shape_gradients
+
+    def stresses(self) -> Floats:
+        """First Piola-Kirchhoff stress of each element at `u` [Pa], shape (m, 3, 3)."""
+        p = self.precision
+        F = self._array(self.deformation_gradients(), p.mat33)
+        density = wp.zeros(self.elements, dtype=p.scalar, device=self.device)
+        P = wp.zeros(self.elements, dtype=p.mat33, device=self.device)
+        for g in self.groups:
+            self._launch(g.kernels.stress, len(g.elements), g.elements, F, g.parameters, density, P)
+        return P.numpy().astype(np.float64)
+
+
+def _parameter_rows(materials: dict[int, Material]) -> dict[int, tuple[float, ...]]:
+    """Device parameters by tissue: the volumetric modulus, then those of the law, as many for every tissue."""
+    laws = {label: material.law for label, material in materials.items()}
+    terms = max((len(law.mu) for law in laws.values() if isinstance(law, Ogden)), default=0)
+    rows = {}
+    for label, law in laws.items():
+        padded = law.with_terms(terms) if isinstance(law, Ogden) else law
+        rows[label] = (materials[label].volumetric_modulus, *padded.parameters())
+    return rows
