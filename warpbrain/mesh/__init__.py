@@ -1,0 +1,39 @@
+"""Tetrahedral meshes: the body, its surfaces, its quality, and the files it is kept in.
+
+Importing this package costs NumPy and nothing else; SciPy and meshio are imported by the functions that need them.
+"""
+
+from warpbrain.mesh.files import read_mesh, write_mesh
+from warpbrain.mesh.ordering import ordered
+from warpbrain.mesh.quality import Quality, components, dihedral_angles, measure
+from warpbrain.mesh.surface import (
+    boundary_faces,
+    closed_surfaces,
+    face_vectors,
+    interface_faces,
+    node_areas,
+    nodes_of,
+    pinched_nodes,
+    split_boundary,
+)
+from warpbrain.mesh.tet_mesh import MeshError, TetMesh
+
+__all__ = [
+    "MeshError",
+    "Quality",
+    "TetMesh",
+    "boundary_faces",
+    "closed_surfaces",
+    "components",
+    "dihedral_angles",
+    "face_vectors",
+    "interface_faces",
+    "measure",
+    "node_areas",
+    "nodes_of",
+    "ordered",
+    "pinched_nodes",
+    "read_mesh",
+    "split_boundary",
+    "write_mesh",
+]

@@ -1,0 +1,136 @@
+"""Meshes on disk: anything meshio reads comes in, a compressed VTU goes out.
+
+Conventions of the files
+    * tissue labels: an integer cell array, ``tissue`` unless the caller says otherwise;
+    * node sets: every integer or boolean point array of one column, non-zero = member;
+    * element sets: every integer or boolean cell array whose name starts with ``set_``; the set's name is the rest.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.atomic import whole_file
+from warpbrain.mesh.tet_mesh import MeshError, TetMesh
+
+ELEMENT_SET_PREFIX = "set_"
+METRES = {"m": 1.0, "mm": 1e-3}
+# cells of lower dimension are other people's boundary markers: they take nothing away from the volume
+_IGNORED = ("vertex", "line", "line3", "triangle", "triangle6", "quad", "quad8", "quad9", "polygon", "polyline")
+
+
+def read_mesh(path: str | os.PathLike[str], unit: str = "m", tissue: str = "tissue") -> TetMesh:
+    """Read a tetrahedral mesh from any file that meshio reads.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    unit : {"m", "mm"}
+        Unit of the coordinates in the file; the mesh is in metres.
+    tissue : str
+        Name of the cell array of tissue labels; a file without it is one tissue, label 1, if `tissue`
+        is left at its default, and an error otherwise.
+
+    Returns
+    -------
+    TetMesh
+        Axes are taken as they are: RAS is the caller's business.
+
+    Raises
+    ------
+    MeshError
+        Naming the file, what was found and what was expected.
+    """
+    import meshio
+
+    source = Path(path)
+    scale = _scale(unit)
+    if not source.is_file():
+        raise MeshError(f"{source}: no such file")
+    try:
+        raw = meshio.read(source)
+    except SystemExit as error:  # meshio leaves the program on some unreadable files
+        raise MeshError(f"{source}: not a mesh that meshio can read") from error
+    except Exception as error:  # its readers raise whatever their parsers do
+        detail = " ".join(str(error).split()) or type(error).__name__
+        raise MeshError(f"{source}: not a mesh that meshio can read ({detail})") from error
+    try:
+        return _from_meshio(raw, scale, tissue)
+    except MeshError as error:
+        raise MeshError(f"{source}: {error}") from error
+
+
+def _from_meshio(raw: Any, scale: float, tissue: str) -> TetMesh:
+    kinds = [block.type for block in raw.cells]
+    foreign = sorted({kind for kind in kinds if kind != "tetra" and kind not in _IGNORED})
+    if foreign:
+        raise MeshError(f"found volume cells of type {', '.join(foreign)}; expected four-node tetrahedra only")
+    blocks = [number for number, kind in enumerate(kinds) if kind == "tetra"]
+    if not blocks:
+        raise MeshError(f"found no tetrahedra (cells: {', '.join(sorted(set(kinds))) or 'none'})")
+    cells = {name: np.concatenate([data[b] for b in blocks]) for name, data in raw.cell_data.items()}
+    if tissue != "tissue" and tissue not in cells:
+        raise MeshError(f"no cell array '{tissue}' for tissue labels; found {', '.join(sorted(cells)) or 'none'}")
+    return TetMesh(
+        np.asarray(raw.points, dtype=np.float64) * scale,
+        np.concatenate([raw.cells[b].data for b in blocks]),
+        cells.get(tissue),  # type: ignore[arg-type]  # TetMesh fills in and converts labels itself
+        _members(raw.point_data, ""),
+        _members({name: data for name, data in cells.items() if name != tissue}, ELEMENT_SET_PREFIX),
+    )
+
+
+def _members(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[np.bool_]]:
+    sets = {}
+    for name, data in arrays.items():
+        flag = np.asarray(data)
+        if flag.ndim == 2 and flag.shape[1] == 1:
+            flag = flag[:, 0]
+        counts = np.issubdtype(flag.dtype, np.integer) or flag.dtype == bool
+        if name.startswith(prefix) and flag.ndim == 1 and counts:
+            sets[name.removeprefix(prefix)] = flag != 0
+    return sets
+
+
+def write_mesh(path: str | os.PathLike[str], mesh: TetMesh, unit: str = "m") -> None:
+    """Write a mesh as compressed binary VTU, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Where to; must end in ``.vtu``. An existing file is replaced only once the new one is complete.
+    mesh : TetMesh
+        What to write.
+    unit : {"m", "mm"}
+        Unit of the coordinates in the file.
+    """
+    import meshio
+
+    target = Path(path)
+    if target.suffix.lower() != ".vtu":
+        raise MeshError(f"{target}: meshes are written as .vtu, found '{target.suffix}'")
+    scale = _scale(unit)
+    raw = meshio.Mesh(
+        mesh.points / scale,
+        [("tetra", mesh.tetrahedra)],
+        point_data={name: members.astype(np.uint8) for name, members in mesh.node_sets.items()},
+        cell_data={
+            "tissue": [mesh.tissue],
+            **{ELEMENT_SET_PREFIX + name: [members.astype(np.uint8)] for name, members in mesh.element_sets.items()},
+        },
+    )
+    with whole_file(target) as scratch:
+        meshio.write(scratch, raw, file_format="vtu", binary=True, compression="zlib")
+
+
+def _scale(unit: str) -> float:
+    if unit not in METRES:
+        raise MeshError(f"unit must be one of {', '.join(METRES)}, found '{unit}'")
+    return METRES[unit]

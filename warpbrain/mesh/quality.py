@@ -1,0 +1,123 @@
+"""How good a mesh is: dihedral angles, and the pieces that faces hold together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.mesh.surface import FACES, paired_faces
+from warpbrain.mesh.tet_mesh import Floats, Ints, TetMesh, signed_volumes
+
+# the two faces that meet at each edge, by the corner each face is opposite to; edge ij lies on the faces opposite k, l
+EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+_OPPOSITE = np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]])
+
+
+def dihedral_angles(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
+    """Angles between the faces of tetrahedra.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        Node positions, any unit.
+    tetrahedra : (m, 4) array
+        Node ids, positively oriented.
+
+    Returns
+    -------
+    (m, 6) array
+        Interior dihedral angle [degrees] at edges 01, 02, 03, 12, 13, 23. A regular tetrahedron has
+        arccos(1/3) = 70.53 degrees at every edge. The angle is made from the sine and the cosine, so that
+        flat tetrahedra are measured as well as good ones.
+    """
+    corner = np.asarray(points, dtype=np.float64)[np.asarray(tetrahedra)]
+    start, end = corner[:, EDGES[:, 0]], corner[:, EDGES[:, 1]]
+    edge = end - start
+    edge /= np.maximum(np.linalg.norm(edge, axis=2, keepdims=True), np.finfo(float).tiny)
+    legs = [corner[:, _OPPOSITE[:, k]] - start for k in (0, 1)]
+    across = [leg - np.einsum("mei,mei->me", leg, edge)[..., None] * edge for leg in legs]
+    sine = np.linalg.norm(np.cross(across[0], across[1]), axis=2)
+    cosine = np.einsum("mei,mei->me", across[0], across[1])
+    return np.asarray(np.degrees(np.arctan2(sine, cosine)))
+
+
+def components(tetrahedra: ArrayLike, tissue: ArrayLike | None = None) -> Ints:
+    """Number of the face-connected piece that each tetrahedron belongs to.
+
+    Parameters
+    ----------
+    tetrahedra : (m, 4) array
+        Node ids.
+    tissue : (m,) array, optional
+        If given, faces between different labels do not connect: pieces are then pieces of one tissue.
+
+    Returns
+    -------
+    (m,) int32 array
+        Piece numbers 0, 1, ... in order of each piece's first tetrahedron.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    tets = np.asarray(tetrahedra)
+    pair = paired_faces(tets)[0] // len(FACES)
+    if tissue is not None:
+        labels = np.asarray(tissue)
+        pair = pair[labels[pair[:, 0]] == labels[pair[:, 1]]]
+    graph = coo_array((np.ones(len(pair), dtype=bool), (pair[:, 0], pair[:, 1])), shape=(len(tets), len(tets)))
+    numbers: NDArray[np.int32] = connected_components(graph, directed=False)[1]
+    first = np.unique(numbers, return_index=True)[1]
+    rank = np.empty(len(first), dtype=np.int32)
+    rank[np.argsort(first)] = np.arange(len(first), dtype=np.int32)
+    return rank[numbers]
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Summary of a mesh; angles in degrees, volumes in m3, lengths in m."""
+
+    nodes: int
+    tetrahedra: int
+    volume: float
+    inverted: int
+    min_dihedral: float
+    first_percentile_dihedral: float
+    max_dihedral: float
+    mean_edge: float
+    components: int
+    tissue_components: dict[int, int]
+    smallest_tissue_component_volume: float
+    smallest_tissue_component_tetrahedra: int
+
+
+def measure(mesh: TetMesh) -> Quality:
+    """Quality summary of a mesh.
+
+    The first percentile is taken over the smallest dihedral angle of each tetrahedron, which is a harder
+    measure than over all six angles.
+    """
+    return measure_arrays(mesh.points, mesh.tetrahedra, mesh.tissue)
+
+
+def measure_arrays(points: Floats, tetrahedra: Ints, tissue: Ints) -> Quality:
+    """As `measure`, of arrays that need not be a valid mesh: points (n, 3) [m], tetrahedra (m, 4), tissue (m,)."""
+    angles = dihedral_angles(points, tetrahedra)
+    volumes = signed_volumes(points, tetrahedra)
+    pieces = components(tetrahedra, tissue)
+    edges = np.unique(np.sort(tetrahedra[:, EDGES].reshape(-1, 2), axis=1), axis=0)
+    return Quality(
+        nodes=len(points),
+        tetrahedra=len(tetrahedra),
+        volume=float(volumes.sum()),
+        inverted=int((volumes <= 0).sum()),
+        min_dihedral=float(angles.min()),
+        first_percentile_dihedral=float(np.percentile(angles.min(axis=1), 1)),
+        max_dihedral=float(angles.max()),
+        mean_edge=float(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).mean()),
+        components=int(components(tetrahedra).max()) + 1,
+        tissue_components={int(t): len(np.unique(pieces[tissue == t])) for t in np.unique(tissue)},
+        smallest_tissue_component_volume=float(np.bincount(pieces, weights=volumes).min()),
+        smallest_tissue_component_tetrahedra=int(np.bincount(pieces).min()),
+    )

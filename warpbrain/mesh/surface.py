@@ -1,0 +1,214 @@
+"""Surfaces of a tetrahedral mesh: its boundary, the closed surfaces that make it up, and interfaces between tissues."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.mesh.tet_mesh import Bools, Floats, Ints
+
+# corners of the four faces of a positive tetrahedron, each seen counter-clockwise from outside; face i is opposite i
+FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+
+
+def paired_faces(tetrahedra: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which faces of which tetrahedra coincide.
+
+    Parameters
+    ----------
+    tetrahedra : (m, 4) array
+        Node ids.
+
+    Returns
+    -------
+    pairs : (k, 2) int64 array
+        Faces shared by two tetrahedra; face number = 4 * tetrahedron + local face.
+    single : (b,) int64 array
+        Faces that only one tetrahedron has.
+
+    Raises
+    ------
+    ValueError
+        If a face belongs to three or more tetrahedra.
+    """
+    tets = np.asarray(tetrahedra)
+    faces = np.sort(tets[:, FACES].reshape(-1, 3), axis=1)
+    order = np.lexsort(faces.T[::-1])
+    ordered = faces[order]
+    same = np.append((ordered[1:] == ordered[:-1]).all(axis=1), False)
+    if (same[1:] & same[:-1]).any():
+        at = int(np.flatnonzero(same[1:] & same[:-1])[0])
+        raise ValueError(f"face {ordered[at].tolist()} belongs to three or more tetrahedra")
+    follows = np.append(False, same[:-1])
+    first = np.flatnonzero(same)
+    pairs = np.sort(np.stack([order[first], order[first + 1]], axis=1), axis=1)
+    return pairs[np.argsort(pairs[:, 0])], np.sort(order[~same & ~follows])
+
+
+def _corners(tetrahedra: ArrayLike, faces: NDArray[np.int64]) -> Ints:
+    tets = np.asarray(tetrahedra)
+    return np.asarray(tets[faces[:, None] // 4, FACES[faces % 4]], dtype=np.int32)
+
+
+def boundary_faces(tetrahedra: ArrayLike) -> Ints:
+    """Triangles of the boundary, oriented outwards.
+
+    Parameters
+    ----------
+    tetrahedra : (m, 4) array
+        Node ids, positively oriented.
+
+    Returns
+    -------
+    (b, 3) int32 array
+        Node ids; ``(p1 - p0) x (p2 - p0)`` points out of the body, into a cavity where there is one.
+    """
+    return _corners(tetrahedra, paired_faces(tetrahedra)[1])
+
+
+def interface_faces(tetrahedra: ArrayLike, tissue: ArrayLike) -> Ints:
+    """Triangles between tetrahedra of different labels.
+
+    Parameters
+    ----------
+    tetrahedra : (m, 4) array
+        Node ids, positively oriented.
+    tissue : (m,) array
+        Labels; a boolean element set works as well.
+
+    Returns
+    -------
+    (k, 3) int32 array
+        Node ids; the normal points away from the smaller label.
+    """
+    pairs = paired_faces(tetrahedra)[0]
+    labels = np.asarray(tissue)[pairs // 4]
+    between = labels[:, 0] != labels[:, 1]
+    owner = np.where(labels[between, 0] < labels[between, 1], pairs[between, 0], pairs[between, 1])
+    return _corners(tetrahedra, owner)
+
+
+def closed_surfaces(faces: ArrayLike) -> Ints:
+    """Number of the edge-connected surface each triangle belongs to.
+
+    Parameters
+    ----------
+    faces : (b, 3) array
+        Node ids.
+
+    Returns
+    -------
+    (b,) int32 array
+        Surface numbers 0, 1, ...
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    triangles = np.asarray(faces)
+    edges = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    number = np.unique(edges, axis=0, return_inverse=True)[1].ravel()
+    owner = np.repeat(np.arange(len(triangles)), 3)
+    # triangles and edges are the two sides of one graph, so an edge of any number of triangles is no special case
+    size = len(triangles) + int(number.max()) + 1
+    graph = coo_array((np.ones(len(owner), dtype=bool), (owner, len(triangles) + number)), shape=(size, size))
+    labels: Ints = connected_components(graph, directed=False)[1][: len(triangles)]
+    return np.asarray(np.unique(labels, return_inverse=True)[1].ravel(), dtype=np.int32)
+
+
+def pinched_nodes(faces: ArrayLike) -> Ints:
+    """Nodes where closed surfaces touch themselves or each other.
+
+    Parameters
+    ----------
+    faces : (b, 3) array
+        Node ids; every edge belongs to an even number of triangles.
+
+    Returns
+    -------
+    (k,) int32 array
+        Ids of nodes on an edge of more than two triangles, and of nodes whose triangles form more than one fan.
+        Empty for smooth closed surfaces.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    triangles = np.asarray(faces)
+    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    # number of the triangle's own corner at either end of each side, sides turned so that equal ones look equal
+    own = (3 * np.arange(len(triangles))[:, None, None] + np.array([[0, 1], [1, 2], [2, 0]])).reshape(-1, 2)
+    turned = sides[:, 0] > sides[:, 1]
+    sides[turned], own[turned] = sides[turned, ::-1], own[turned, ::-1]
+    order = np.lexsort(sides.T)
+    same = (sides[order][1:] == sides[order][:-1]).all(axis=1)
+    first, second = own[order][:-1][same], own[order][1:][same]
+    links = np.concatenate([np.stack([first[:, k], second[:, k]], axis=1) for k in (0, 1)])
+    size = triangles.size
+    graph = coo_array((np.ones(len(links), dtype=bool), (links[:, 0], links[:, 1])), shape=(size, size))
+    fan = connected_components(graph, directed=False)[1]
+    node_of_fan = np.unique(np.stack([triangles.ravel(), fan], axis=1), axis=0)[:, 0]
+    nodes, fans = np.unique(node_of_fan, return_counts=True)
+    edges, owners = np.unique(sides, axis=0, return_counts=True)
+    return np.asarray(np.union1d(nodes[fans > 1], edges[owners > 2].ravel()), dtype=np.int32)
+
+
+def split_boundary(points: ArrayLike, tetrahedra: ArrayLike) -> tuple[Ints, list[Ints]]:
+    """Outer surface and cavity walls.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        Node positions.
+    tetrahedra : (m, 4) array
+        Node ids, positively oriented.
+
+    Returns
+    -------
+    outer : (b, 3) int32 array
+        Triangles of the surfaces that enclose volume: one surface for a body in one piece.
+    cavities : list of (c, 3) int32 arrays
+        Triangles of each closed surface that excludes volume, largest volume first; normals point into the cavity.
+    """
+    faces = boundary_faces(tetrahedra)
+    surface = closed_surfaces(faces)
+    xyz = np.asarray(points, dtype=np.float64)
+    xyz = xyz - xyz.mean(axis=0)
+    corner = xyz[faces]
+    enclosed = np.einsum("ij,ij->i", np.cross(corner[:, 0], corner[:, 1]), corner[:, 2]) / 6.0
+    volume = np.bincount(surface, weights=enclosed)
+    holes = np.flatnonzero(volume < 0)
+    cavities = [faces[surface == k] for k in holes[np.argsort(volume[holes])]]
+    return faces[volume[surface] > 0], cavities
+
+
+def nodes_of(faces: ArrayLike, count: int) -> Bools:
+    """Node set of some triangles: (count,) bool array, true for every node that `faces` (b, 3) names."""
+    members = np.zeros(count, dtype=bool)
+    members[np.asarray(faces).ravel()] = True
+    return members
+
+
+def face_vectors(points: ArrayLike, faces: ArrayLike) -> Floats:
+    """Area vectors (b, 3) of triangles (b, 3): along the normal, as long as the area is large."""
+    corner = np.asarray(points, dtype=np.float64)[np.asarray(faces)]
+    return np.asarray(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) / 2.0)
+
+
+def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:
+    """Surface area lumped to nodes: a third of every triangle's area goes to each of its corners.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        Node positions [m].
+    faces : (b, 3) array
+        Triangles.
+
+    Returns
+    -------
+    (n,) array
+        Area [m2]; zero for nodes that `faces` does not name.
+    """
+    share = np.linalg.norm(face_vectors(points, faces), axis=1) / 3.0
+    triangles = np.asarray(faces)
+    lumped = np.bincount(triangles.ravel(), weights=np.repeat(share, 3), minlength=len(np.asarray(points)))
+    return np.asarray(lumped, dtype=np.float64)

@@ -1,0 +1,236 @@
+"""`TetMesh`: points, tetrahedra, tissue labels and named sets, checked once when made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.errors import InputError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+
+class MeshError(InputError):
+    """A mesh that cannot be computed with; the message is one line that says what is wrong and where."""
+
+
+def _ids(mask_or_ids: ArrayLike, limit: int = 5) -> str:
+    """First few ids as text, for an error message: ``"3, 7, 12, ... (41 in all)"``."""
+    found = np.asarray(mask_or_ids)
+    if found.dtype == bool:
+        found = np.flatnonzero(found)
+    text = ", ".join(str(int(i)) for i in found[:limit])
+    return f"{text}, ... ({len(found)} in all)" if len(found) > limit else text
+
+
+def _integers(values: ArrayLike, what: str) -> Ints:
+    """`values` as int32; floats are accepted only where they are whole numbers."""
+    array = np.asarray(values)
+    if array.dtype == bool or not (np.issubdtype(array.dtype, np.integer) or np.issubdtype(array.dtype, np.floating)):
+        raise MeshError(f"{what} must be integers, found {array.dtype}")
+    with np.errstate(invalid="ignore"):
+        whole = array.astype(np.int32)
+    if not np.array_equal(whole, array):
+        raise MeshError(f"{what} must be whole numbers that fit 32 bits, found {array[whole != array].ravel()[0]}")
+    return whole
+
+
+def _sets(given: Mapping[str, ArrayLike], length: int, what: str) -> Mapping[str, Bools]:
+    checked = {}
+    for name, values in given.items():
+        array = np.asarray(values)
+        if array.dtype != bool:
+            raise MeshError(f"{what} set '{name}' must be a boolean array, found {array.dtype}")
+        if array.shape != (length,):
+            raise MeshError(f"{what} set '{name}' has shape {array.shape}, expected ({length},)")
+        checked[name] = _frozen(array)
+    return MappingProxyType(checked)
+
+
+def _frozen(array: NDArray[Any]) -> NDArray[Any]:
+    """A contiguous copy that refuses writing: a checked mesh stays what was checked."""
+    copy = np.array(array, order="C", copy=True)
+    copy.setflags(write=False)
+    return copy
+
+
+@dataclass(frozen=True, eq=False)
+class TetMesh:
+    """A body made of linear tetrahedra.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        Node positions [m], axes RAS (x right, y anterior, z superior).
+    tetrahedra : (m, 4) array
+        Node ids of each tetrahedron, positively oriented: ``(p1 - p0) x (p2 - p0) . (p3 - p0) > 0``.
+    tissue : (m,) array, optional
+        Integer label of each tetrahedron; one everywhere if left out.
+    node_sets : mapping of str to (n,) bool array
+        Named sets of nodes.
+    element_sets : mapping of str to (m,) bool array
+        Named sets of tetrahedra.
+
+    Raises
+    ------
+    MeshError
+        If anything above does not hold, a coordinate is not finite, or a node is used by no tetrahedron.
+
+    Examples
+    --------
+    >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    >>> round(mesh.volume, 6)
+    0.166667
+    """
+
+    points: Floats
+    tetrahedra: Ints
+    tissue: Ints = None  # type: ignore[assignment]  # filled in below
+    node_sets: Mapping[str, Bools] = field(default_factory=dict)
+    element_sets: Mapping[str, Bools] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        points = np.asarray(self.points, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise MeshError(f"points must have shape (n, 3), found {points.shape}")
+        tetrahedra = _integers(self.tetrahedra, "tetrahedra")
+        if tetrahedra.size == 0:
+            raise MeshError("the mesh is empty: it has no tetrahedra")
+        if tetrahedra.ndim != 2 or tetrahedra.shape[1] != 4:
+            raise MeshError(f"tetrahedra must have shape (m, 4), found {tetrahedra.shape}")
+        count = len(tetrahedra)
+        tissue = np.ones(count, dtype=np.int32) if self.tissue is None else _integers(self.tissue, "tissue labels")
+        if tissue.shape != (count,):
+            raise MeshError(f"tissue has shape {tissue.shape}, expected one label a tetrahedron: ({count},)")
+        _check_points(points)
+        _check_connectivity(points, tetrahedra)
+        _check_orientation(points, tetrahedra)
+        for name, value in (("points", points), ("tetrahedra", tetrahedra), ("tissue", tissue)):
+            object.__setattr__(self, name, _frozen(value))
+        object.__setattr__(self, "node_sets", _sets(self.node_sets, len(points), "node"))
+        object.__setattr__(self, "element_sets", _sets(self.element_sets, count, "element"))
+
+    def __repr__(self) -> str:
+        labels = ", ".join(str(label) for label in np.unique(self.tissue))
+        return (
+            f"TetMesh({len(self.points)} nodes, {len(self.tetrahedra)} tetrahedra, {self.volume:.6g} m3, "
+            f"tissue {labels}, node sets {sorted(self.node_sets)}, element sets {sorted(self.element_sets)})"
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # a mapping proxy cannot be pickled, and meshes travel to worker processes
+        sets = (dict(self.node_sets), dict(self.element_sets))
+        return (TetMesh, (self.points, self.tetrahedra, self.tissue, *sets))
+
+    @property
+    def volumes(self) -> Floats:
+        """Volume of each tetrahedron [m3], shape (m,)."""
+        return signed_volumes(self.points, self.tetrahedra)
+
+    @property
+    def volume(self) -> float:
+        """Volume of the body [m3]."""
+        return float(self.volumes.sum())
+
+    def without(self, elements: ArrayLike) -> tuple[TetMesh, Ints, Ints]:
+        """The mesh that is left when some tetrahedra are removed.
+
+        Parameters
+        ----------
+        elements : (m,) bool array
+            True for the tetrahedra to remove.
+
+        Returns
+        -------
+        mesh : TetMesh
+            What remains; nodes that belonged to removed tetrahedra only are gone, and every set is restricted.
+        node_ids : (n',) int32 array
+            Id in this mesh of every node of the new one.
+        element_ids : (m',) int32 array
+            Id in this mesh of every tetrahedron of the new one.
+        """
+        removed = np.asarray(elements)
+        if removed.dtype != bool or removed.shape != (len(self.tetrahedra),):
+            raise MeshError(
+                f"elements to remove must be a boolean array of shape ({len(self.tetrahedra)},), "
+                f"found {removed.dtype} {removed.shape}"
+            )
+        if removed.all():
+            raise MeshError("removing every tetrahedron leaves no mesh")
+        element_ids = np.flatnonzero(~removed).astype(np.int32)
+        kept = self.tetrahedra[element_ids]
+        node_ids = np.unique(kept).astype(np.int32)
+        new_id = np.full(len(self.points), -1, dtype=np.int32)
+        new_id[node_ids] = np.arange(len(node_ids), dtype=np.int32)
+        mesh = TetMesh(
+            self.points[node_ids],
+            new_id[kept],
+            self.tissue[element_ids],
+            {name: members[node_ids] for name, members in self.node_sets.items()},
+            {name: members[element_ids] for name, members in self.element_sets.items()},
+        )
+        return mesh, node_ids, element_ids
+
+
+def signed_volumes(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
+    """Signed volume of tetrahedra, in the cube of the unit of `points`.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        Node positions.
+    tetrahedra : (m, 4) array
+        Node ids.
+
+    Returns
+    -------
+    (m,) array
+        Positive where the tetrahedron is positively oriented.
+    """
+    corner = np.asarray(points, dtype=np.float64)[np.asarray(tetrahedra)]
+    a, b, c = (corner[:, i] - corner[:, 0] for i in (1, 2, 3))
+    return np.asarray(np.einsum("ij,ij->i", np.cross(a, b), c) / 6.0)
+
+
+def _check_points(points: Floats) -> None:
+    bad = ~np.isfinite(points).all(axis=1)
+    if bad.any():
+        raise MeshError(f"{bad.sum()} node(s) with a coordinate that is not finite: node {_ids(bad)}")
+
+
+def _check_connectivity(points: Floats, tetrahedra: Ints) -> None:
+    count = len(points)
+    outside = ((tetrahedra < 0) | (tetrahedra >= count)).any(axis=1)
+    if outside.any():
+        first = int(np.flatnonzero(outside)[0])
+        raise MeshError(
+            f"{outside.sum()} tetrahedra name a node that does not exist (nodes are 0 to {count - 1}): "
+            f"tetrahedron {_ids(outside)}; the first has nodes {tetrahedra[first].tolist()}"
+        )
+    ordered = np.sort(tetrahedra, axis=1)
+    repeated = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    if repeated.any():
+        raise MeshError(f"{repeated.sum()} tetrahedra name a node twice: tetrahedron {_ids(repeated)}")
+    unused = np.bincount(tetrahedra.ravel(), minlength=count) == 0
+    if unused.any():
+        raise MeshError(f"{unused.sum()} node(s) belong to no tetrahedron: node {_ids(unused)}")
+
+
+def _check_orientation(points: Floats, tetrahedra: Ints) -> None:
+    volumes = signed_volumes(points, tetrahedra)
+    corner = points[tetrahedra]
+    longest = np.sqrt(((corner[:, :, None] - corner[:, None]) ** 2).sum(-1).max(axis=(1, 2)))
+    # flat to rounding: such a volume has no sign that means anything
+    flat = np.abs(volumes) <= 1e-12 * longest**3
+    if flat.any():
+        raise MeshError(f"{flat.sum()} tetrahedra have zero volume: tetrahedron {_ids(flat)}")
+    inverted = volumes < 0
+    if inverted.any():
+        raise MeshError(f"{inverted.sum()} tetrahedra are inverted (negative volume): tetrahedron {_ids(inverted)}")
