@@ -1,0 +1,141 @@
+"""The build: its parts on shapes with known answers, and the whole against the shipped files."""
+
+import json
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+pytest.importorskip("scipy")
+
+from warpbrain.cases.building import NAMES, BuildError, build
+from warpbrain.cases.building.cutting import compact, cut
+from warpbrain.cases.building.individual import individual_warp
+from warpbrain.cases.building.lattice import bcc_lattice
+from warpbrain.cases.building.optimising import open_angles
+from warpbrain.cases.building.remeshing import Cells, Size
+from warpbrain.cases.building.resection import anterior_temporal_lobe
+from warpbrain.mesh import boundary_faces, dihedral_angles, pinched_nodes, read_mesh, split_boundary
+from warpbrain.mesh.tet_mesh import signed_volumes
+
+ZERO, TWO = np.zeros(3), np.full(3, 2.0)
+
+
+def sphere(radius: float):
+    return lambda points: radius - np.linalg.norm(points - 1.0, axis=1)
+
+
+def test_lattice_is_regular():
+    points, tets = bcc_lattice(ZERO, TWO, 0.5)
+    np.testing.assert_allclose(signed_volumes(points, tets), 0.5**3 / 12)
+    np.testing.assert_allclose(np.sort(dihedral_angles(points, tets)), np.tile([60.0] * 4 + [90.0] * 2, (len(tets), 1)))
+    points, tets = compact(points, tets)
+    assert len(pinched_nodes(boundary_faces(tets))) == 0
+
+
+def test_cut_finds_the_surface_and_keeps_the_volume():
+    points, tets = bcc_lattice(ZERO, TWO, 0.2)
+    whole = signed_volumes(points, tets).sum()
+    points, tets, labels, inside = cut(points, tets, np.arange(len(tets)), sphere(0.6))
+    volumes = signed_volumes(points, tets)
+    assert (volumes > 0).all()
+    assert volumes.sum() == pytest.approx(whole)
+    assert labels.max() < len(tets)
+    ball_points, ball = compact(points, tets[inside])
+    assert volumes[inside].sum() == pytest.approx(4 / 3 * np.pi * 0.6**3, rel=0.05)
+    surface = np.unique(boundary_faces(ball))
+    # nodes lie on the sphere, but for those that were so near that they were taken to be on it
+    np.testing.assert_allclose(np.linalg.norm(ball_points[surface] - 1, axis=1), 0.6, atol=0.2 * 0.07)
+
+
+def test_cut_conforms():
+    points, tets = bcc_lattice(ZERO, TWO, 0.25)
+    outside = len(boundary_faces(tets))
+    points, tets, _, inside = cut(points, tets, np.zeros(len(tets), dtype=np.int64), sphere(0.5))
+    # a face that does not meet its neighbour would be boundary
+    assert len(boundary_faces(tets)) == outside
+    assert len(split_boundary(points, tets[~inside])[1]) == 1
+
+
+def test_cut_that_meets_nothing_changes_nothing():
+    points, tets = bcc_lattice(ZERO, TWO, 0.5)
+    cut_points, cut_tets, _, inside = cut(points, tets, np.zeros(len(tets), dtype=np.int64), sphere(9.0))
+    np.testing.assert_array_equal(cut_points, points)
+    np.testing.assert_array_equal(cut_tets, tets)
+    assert inside.all()
+
+
+def test_open_angles_opens_them_and_keeps_the_shape():
+    points, tets = bcc_lattice(ZERO, TWO, 0.3)
+    points, tets, labels, inside = cut(points, tets, np.ones(len(tets), dtype=np.int64), sphere(0.7))
+    points, tets = compact(points, tets[inside])
+    assert dihedral_angles(points, tets).min() < 10
+    before = Cells(points, tets, labels[inside])
+    after = open_angles(before, 20.0)
+    assert dihedral_angles(after.points, tets).min() > 2 * dihedral_angles(points, tets).min()
+    assert (signed_volumes(after.points, tets) > 0).all()
+    assert signed_volumes(after.points, tets).sum() == pytest.approx(signed_volumes(points, tets).sum(), rel=0.1)
+
+
+def test_individual_warp_is_smooth_repeatable_and_invertible():
+    points = np.random.default_rng(0).uniform(-80, 80, (500, 3))
+    warp = individual_warp(7, 3.0)
+    moved = warp(points)
+    np.testing.assert_array_equal(moved, individual_warp(7, 3.0)(points))
+    assert not np.allclose(moved, individual_warp(8, 3.0)(points))
+    shift = np.linalg.norm(moved - points, axis=1)
+    assert 1.0 < np.sqrt((shift**2).mean()) < 6.0
+    step = 1e-3
+    gradient = np.stack([(warp(points + step * e) - moved) / step for e in np.eye(3)], axis=-1)
+    determinant = np.linalg.det(gradient)
+    assert 0.5 < determinant.min() and determinant.max() < 1.8
+
+
+def test_resection_sides_mirror_each_other():
+    points = np.random.default_rng(0).uniform(-80, 80, (50, 3))
+    mirrored = points * [-1, 1, 1]
+    np.testing.assert_array_equal(anterior_temporal_lobe(points, "left"), anterior_temporal_lobe(mirrored, "right"))
+    pole = np.array([[-42.0, 14.0, -34.0]])
+    assert anterior_temporal_lobe(pole, "left")[0] > 0 > anterior_temporal_lobe(pole, "right")[0]
+
+
+def test_size_counts_what_it_says():
+    points, tets = bcc_lattice(ZERO, TWO, 1.0)
+    cells = Cells(points, tets, np.ones(len(tets), dtype=np.int64))
+    assert Size("nodes", 1, 2).count(cells) == len(points)
+    assert Size("tetrahedra", 1, 2).count(cells) == len(tets)
+
+
+def test_unknown_case_is_named():
+    with pytest.raises(BuildError, match="no case 'nobody' can be built; choose from phantom, 0529"):
+        build("nobody", "unused")
+
+
+def test_missing_extra_is_named(monkeypatch, tmp_path):
+    import importlib.util
+
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(BuildError, match=r"mmgpy, nilearn, nibabel.*warpbrain\[build\]"):
+        build("phantom", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_building_again_gives_the_shipped_meshes(name, tmp_path):
+    for package in ("mmgpy", "nilearn", "nibabel"):
+        pytest.importorskip(package)
+    from warpbrain.cases.building.pipeline import versions
+
+    shipped = files("warpbrain") / "cases" / "data" / name
+    record = json.loads((shipped / "meshes.json").read_text(encoding="utf-8"))
+    if record["versions"] != versions():
+        pytest.skip(f"shipped meshes were made with {record['versions']}, here are {versions()}")
+    folder = build(name, tmp_path)
+    for file in record["meshes"]:
+        made, kept = (read_mesh(str(place / f"{file}.vtu"), unit="mm") for place in (folder, shipped))
+        np.testing.assert_array_equal(made.tetrahedra, kept.tetrahedra)
+        np.testing.assert_allclose(made.points, kept.points, rtol=0, atol=1e-9)
+        np.testing.assert_array_equal(made.tissue, kept.tissue)
+        for key, members in kept.node_sets.items():
+            np.testing.assert_array_equal(made.node_sets[key], members)

@@ -1,0 +1,1 @@
+"""The case folder, and the cases that ship with the package."""

@@ -1,0 +1,103 @@
+"""Cut tetrahedra along the zero level of a field, so that no tetrahedron crosses it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+# a node closer to the surface than this share of an edge is taken to lie on it: no needle is cut off there
+SNAP = 0.06
+
+
+def cut(
+    points: Floats, tetrahedra: Integers, labels: Integers, field: Callable[[Floats], Floats]
+) -> tuple[Floats, Integers, Integers, NDArray[np.bool_]]:
+    """Split every edge that crosses the zero level, there.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        Node positions.
+    tetrahedra : (m, 4) int64 array
+        Positively oriented.
+    labels : (m,) int64 array
+        Handed down to the pieces.
+    field : callable
+        From positions (k, 3) to values (k,).
+
+    Returns
+    -------
+    points, tetrahedra, labels
+        The cut mesh; conforming and positively oriented if the given one is.
+    positive : (m',) bool array
+        True for the tetrahedra where the field is positive.
+
+    Notes
+    -----
+    Bisecting an edge splits every tetrahedron around it in two, which keeps the mesh conforming whatever the order.
+    Here the crossed edges are bisected in order of their number. One tetrahedron has at most four of them and each
+    piece inherits those that are left, so four rounds over all tetrahedra at once do all of it.
+    """
+    value = field(points)
+    edges = np.unique(np.sort(tetrahedra[:, _PAIRS].reshape(-1, 2), axis=1), axis=0)
+    crossed = edges[value[edges[:, 0]] * value[edges[:, 1]] < 0]
+    share = _roots(points, crossed, value, field)
+    value[crossed[share < SNAP, 0]] = 0.0
+    value[crossed[share > 1 - SNAP, 1]] = 0.0
+    still = value[crossed[:, 0]] * value[crossed[:, 1]] < 0
+    crossed, share = crossed[still], share[still, None]
+    key = crossed[:, 0] * len(points) + crossed[:, 1]
+    fresh = points[crossed[:, 0]] * (1 - share) + points[crossed[:, 1]] * share
+    count = len(points)
+    for _ in range(4):
+        tetrahedra, labels = _bisect_first(tetrahedra, labels, key, count)
+    value = np.append(value, np.zeros(len(fresh)))
+    points = np.concatenate([points, fresh])
+    total = value[tetrahedra].sum(axis=1)
+    # all four nodes on the surface: decided by what the field says in the middle
+    flat = total == 0
+    total[flat] = field(points[tetrahedra[flat]].mean(axis=1))
+    return points, tetrahedra, labels, total > 0
+
+
+def _roots(points: Floats, edges: Integers, value: Floats, field: Callable[[Floats], Floats]) -> Floats:
+    """Where along each edge the field vanishes, 0 to 1, by bisection: safe where the field levels off."""
+    start, end = points[edges[:, 0]], points[edges[:, 1]]
+    positive = value[edges[:, 0]] > 0
+    low, high = np.zeros(len(edges)), np.ones(len(edges))
+    for _ in range(12):
+        middle = (low + high) / 2
+        same = (field(start + middle[:, None] * (end - start)) > 0) == positive
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return (low + high) / 2
+
+
+def _bisect_first(tetrahedra: Integers, labels: Integers, key: Integers, count: int) -> tuple[Integers, Integers]:
+    """Bisect, in every tetrahedron that has one, the crossed edge of the lowest number."""
+    pairs = np.sort(tetrahedra[:, _PAIRS], axis=2)
+    old = (pairs < count).all(axis=2)
+    wanted = np.where(old, pairs[..., 0] * count + pairs[..., 1], -1)
+    at = np.minimum(np.searchsorted(key, wanted), max(len(key) - 1, 0))
+    found = old & (key[at] == wanted) if len(key) else np.zeros_like(old)
+    number = np.where(found, at, len(key))
+    local = number.argmin(axis=1)
+    split = np.flatnonzero(found.any(axis=1))
+    new = count + number[split, local[split]]
+    halves = [tetrahedra[split].copy() for _ in range(2)]
+    for end, half in enumerate(halves):
+        half[np.arange(len(split)), _PAIRS[local[split], end]] = new
+    keep = np.ones(len(tetrahedra), dtype=bool)
+    keep[split] = False
+    return np.concatenate([tetrahedra[keep], *halves]), np.concatenate([labels[keep], labels[split], labels[split]])
+
+
+def compact(points: Floats, tetrahedra: Integers) -> tuple[Floats, Integers]:
+    """Drop the nodes that no tetrahedron uses."""
+    used, inverse = np.unique(tetrahedra, return_inverse=True)
+    return points[used], inverse.reshape(tetrahedra.shape)

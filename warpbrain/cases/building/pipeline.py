@@ -1,0 +1,214 @@
+"""Build the meshes of a case: template maps in, VTU files and a record of what they are out."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpbrain.atomic import whole_file
+from warpbrain.cases.building.anatomy import Anatomy, make_anatomy
+from warpbrain.cases.building.cutting import compact, cut
+from warpbrain.cases.building.errors import BuildError, require_extra
+from warpbrain.cases.building.individual import individual_warp
+from warpbrain.cases.building.lattice import bcc_lattice
+from warpbrain.cases.building.maps import load_maps
+from warpbrain.cases.building.optimising import open_angles
+from warpbrain.cases.building.recipes import INDIVIDUAL_AMPLITUDE, RECIPES, CaseRecipe
+from warpbrain.cases.building.remeshing import Cells, fit_size, remesh
+from warpbrain.cases.building.resection import anterior_temporal_lobe
+from warpbrain.cases.building.tags import margin, node_sets
+from warpbrain.mesh import Quality, TetMesh, boundary_faces, measure, ordered, pinched_nodes, split_boundary, write_mesh
+from warpbrain.mesh.quality import components, measure_arrays
+from warpbrain.mesh.tet_mesh import signed_volumes
+
+NAMES = tuple(RECIPES)
+GREY, WHITE, RESECTED = 1, 2, 10
+
+# background lattice [mm]: finer than any mesh made from it
+LATTICE = 6.0
+# pieces of a tissue smaller than this [mm3, template] go to their neighbour
+SMALLEST_PIECE = 2000.0
+# largest edge [mm] of the first pass, which only takes out the needles left by the cutting
+FIRST_EDGE = 8.0
+# bars a finished mesh must clear, and what the last step aims at [degrees]
+MIN_DIHEDRAL = 15.0
+FIRST_PERCENTILE = 20.0
+WANTED_DIHEDRAL = 22.0
+
+
+def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], None] = lambda line: None) -> Path:
+    """Build every mesh of a case.
+
+    Parameters
+    ----------
+    name : str
+        ``"phantom"`` or ``"0529"``.
+    out_dir : path
+        The folder ``out_dir/name`` receives the meshes (VTU, millimetres) and ``meshes.json``, their record.
+    progress : callable
+        Called with one line of text whenever something is done.
+
+    Returns
+    -------
+    Path
+        The folder written.
+    """
+    if name not in RECIPES:
+        raise BuildError(f"no case '{name}' can be built; choose from {', '.join(NAMES)}")
+    require_extra()
+    recipe = RECIPES[name]
+    folder = Path(out_dir) / name
+    folder.mkdir(parents=True, exist_ok=True)
+    progress("reading template maps, smoothing")
+    anatomy = make_anatomy(load_maps())
+    record: dict[str, Any] = {"versions": versions(), "meshes": {}}
+    tetrahedra: dict[str, int] = {}
+    start: dict[bool, Cells] = {}
+    for wanted in recipe.meshes:
+        if wanted.multi not in start:
+            progress(f"cutting the lattice along the surfaces ({'two tissues' if wanted.multi else 'one tissue'})")
+            start[wanted.multi] = _first_pass(discretise(anatomy, recipe, wanted.multi))
+        size = wanted.size(tetrahedra)
+        progress(f"{wanted.file}: looking for {size.at_least} to {size.at_most} {size.of}")
+        cells = fit_size(start[wanted.multi], size, 13.0, _finish)
+        mesh = _to_mesh(cells, recipe)
+        tetrahedra[wanted.file] = len(mesh.tetrahedra)
+        write_mesh(folder / f"{wanted.file}.vtu", mesh, unit="mm")
+        quality = measure(mesh)
+        record["meshes"][wanted.file] = describe(mesh, quality)
+        progress(
+            f"{wanted.file}: {quality.nodes} nodes, {quality.tetrahedra} tetrahedra, smallest dihedral angle "
+            f"{quality.min_dihedral:.1f}, first percentile {quality.first_percentile_dihedral:.1f} degrees"
+        )
+    with whole_file(folder / "meshes.json") as scratch:
+        scratch.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+    return folder
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that has a say in the result."""
+    packages = {package: version(package) for package in ("mmgpy", "nilearn", "nibabel", "numpy", "scipy")}
+    return {**packages, "machine": f"{platform.system()} {platform.machine()}"}
+
+
+def describe(mesh: TetMesh, quality: Quality) -> dict[str, Any]:
+    """A mesh in numbers, for the record that ships beside it."""
+    _outer, cavities = split_boundary(mesh.points, mesh.tetrahedra)
+    return {
+        **{key: _rounded(value) for key, value in asdict(quality).items()},
+        "closed_surfaces": 1 + len(cavities),
+        "node_sets": {key: int(members.sum()) for key, members in mesh.node_sets.items()},
+        "element_sets": {key: int(members.sum()) for key, members in mesh.element_sets.items()},
+        "tissue_volume": {
+            str(label): _rounded(float(mesh.volumes[mesh.tissue == label].sum())) for label in np.unique(mesh.tissue)
+        },
+        "element_set_volume": {
+            key: _rounded(float(mesh.volumes[members].sum())) for key, members in mesh.element_sets.items()
+        },
+    }
+
+
+def _rounded(value: Any) -> Any:
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def discretise(anatomy: Anatomy, recipe: CaseRecipe, multi: bool) -> Cells:
+    """The lattice cut along every surface; labels are grey 1 and white 2, plus 10 in resected tissue."""
+    inside = np.argwhere(anatomy.brain > 0)
+    lower, upper = (anatomy.origin + end for end in (inside.min(axis=0) - LATTICE, inside.max(axis=0) + LATTICE))
+    points, tetrahedra = bcc_lattice(lower, upper, LATTICE)
+    tetrahedra = tetrahedra[(anatomy.sample(anatomy.brain, points)[tetrahedra] > -0.3).any(axis=1)]
+    points, tetrahedra = compact(points, tetrahedra)
+    labels = np.full(len(tetrahedra), GREY, dtype=np.int64)
+
+    points, tetrahedra, labels, brain = cut(points, tetrahedra, labels, lambda x: anatomy.sample(anatomy.brain, x))
+    # pockets of air that the lattice pinched off are filled, crumbs of tissue are dropped
+    brain = brain | _small(points, tetrahedra, ~brain, keep_largest=True)
+    brain &= ~_small(points, tetrahedra, brain, keep_largest=True)
+    brain = _opened_out(tetrahedra, brain)
+    tetrahedra, labels = tetrahedra[brain], labels[brain]
+
+    points, tetrahedra, labels, fluid = cut(points, tetrahedra, labels, lambda x: anatomy.sample(anatomy.ventricle, x))
+    fluid &= ~_small(points, tetrahedra, fluid)
+    tissue = _opened_out(tetrahedra, ~fluid)
+    tetrahedra, labels = tetrahedra[tissue], labels[tissue]
+
+    if multi:
+        points, tetrahedra, labels, white = cut(points, tetrahedra, labels, lambda x: anatomy.sample(anatomy.white, x))
+        white = white & ~_small(points, tetrahedra, white)
+        white |= _small(points, tetrahedra, ~white)
+        labels[white] = WHITE
+    if recipe.resection is not None:
+        side = recipe.resection
+        points, tetrahedra, labels, taken = cut(points, tetrahedra, labels, lambda x: anterior_temporal_lobe(x, side))
+        labels[taken & ~_small(points, tetrahedra, taken)] += RESECTED
+    points, tetrahedra = compact(points, tetrahedra)
+    if recipe.seed is not None:
+        points = individual_warp(recipe.seed, INDIVIDUAL_AMPLITUDE)(points)
+    return Cells(points, tetrahedra, labels)
+
+
+def _small(points: Any, tetrahedra: Any, region: Any, keep_largest: bool = False) -> Any:
+    """The tetrahedra of a region (m,) that belong to its small face-connected pieces: (m,) bool."""
+    members = np.flatnonzero(region)
+    piece = components(tetrahedra[members])
+    volume = np.bincount(piece, weights=signed_volumes(points, tetrahedra[members]))
+    small = np.arange(len(volume)) != volume.argmax() if keep_largest else volume < SMALLEST_PIECE
+    result = np.zeros(len(tetrahedra), dtype=bool)
+    result[members[small[piece]]] = True
+    return result
+
+
+def _opened_out(tetrahedra: Any, inside: Any) -> Any:
+    """Fill around the nodes where the surface touches itself, until it does so nowhere: (m,) bool."""
+    for _ in range(20):
+        touching = pinched_nodes(boundary_faces(tetrahedra[inside]))
+        if len(touching) == 0:
+            return inside
+        inside = inside | np.isin(tetrahedra, touching).any(axis=1)
+    raise BuildError("the surface of the brain touches itself, and filling there did not help")
+
+
+def _first_pass(cells: Cells) -> Cells:
+    made = remesh(cells, FIRST_EDGE)
+    if made is None:
+        raise BuildError("MMG could not mesh the cut lattice")
+    return made
+
+
+def _finish(cells: Cells) -> Cells | None:
+    """Open the sharp angles; None if the mesh is not good enough to ship."""
+    better = open_angles(cells, WANTED_DIHEDRAL)
+    quality = measure_arrays(better.points * 1e-3, better.tetrahedra.astype(np.int32), better.labels.astype(np.int32))
+    sound = (
+        quality.inverted == 0
+        and quality.components == 1
+        and quality.min_dihedral >= MIN_DIHEDRAL
+        and quality.first_percentile_dihedral >= FIRST_PERCENTILE
+        and len(split_boundary(better.points, better.tetrahedra)[1]) == 1
+        and len(pinched_nodes(boundary_faces(better.tetrahedra))) == 0
+    )
+    return better if sound else None
+
+
+def _to_mesh(cells: Cells, recipe: CaseRecipe) -> TetMesh:
+    """Scale to the wanted volume, name the sets, and number so that neighbours are near in memory."""
+    tetrahedra, resected = cells.tetrahedra, cells.labels >= RESECTED
+    sets = node_sets(cells.points, tetrahedra)
+    elements = {}
+    if recipe.resection is not None:
+        wall, gone = margin(tetrahedra, resected, len(cells.points))
+        sets["resection"] = wall
+        sets["fixed"] = sets["fixed"] & ~gone
+        elements["resection"] = resected
+    scale = (recipe.volume / signed_volumes(cells.points, tetrahedra).sum()) ** (1 / 3)
+    labels = (cells.labels % RESECTED).astype(np.int32)
+    return ordered(TetMesh(cells.points * scale, tetrahedra.astype(np.int32), labels, sets, elements))

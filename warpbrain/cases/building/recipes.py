@@ -1,0 +1,96 @@
+"""What each shipped mesh must be: volume, size, individual, resection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from warpbrain.cases.building.remeshing import Size
+
+
+@dataclass(frozen=True)
+class MeshRecipe:
+    """One mesh of a case.
+
+    Attributes
+    ----------
+    file : str
+        Name of the file, without its ending.
+    multi : bool
+        Grey and white matter with a conforming interface, instead of one tissue.
+    nodes : (int, int) or None
+        Wanted number of nodes, from - to.
+    finer_than : (str, float) or None
+        Instead: wanted number of tetrahedra as a multiple of another mesh of the case.
+    """
+
+    file: str
+    multi: bool
+    nodes: tuple[int, int] | None = None
+    finer_than: tuple[str, float] | None = None
+
+    def size(self, tetrahedra: dict[str, int]) -> Size:
+        """The wanted size, given the numbers of tetrahedra of the meshes already made."""
+        if self.nodes is not None:
+            return Size("nodes", *self.nodes)
+        assert self.finer_than is not None
+        exact = tetrahedra[self.finer_than[0]] * self.finer_than[1]
+        return Size("tetrahedra", int(exact) + 1, int(exact * TOLERANCE))
+
+
+@dataclass(frozen=True)
+class CaseRecipe:
+    """A case: one anatomy and its meshes.
+
+    Attributes
+    ----------
+    volume : float
+        Volume of the whole brain without its ventricles [m3]; meshes are scaled to it.
+    meshes : tuple of MeshRecipe
+        In the order of making.
+    seed : int or None
+        Seed of the individual deformation; None for the template itself.
+    resection : {"left", "right"} or None
+        Side of the anterior temporal lobe resection.
+    """
+
+    volume: float
+    meshes: tuple[MeshRecipe, ...]
+    seed: int | None = None
+    resection: str | None = None
+
+
+TOLERANCE = 1.03
+# root mean square displacement of the individual deformation [mm, template]
+INDIVIDUAL_AMPLITUDE = 3.0
+
+
+def _at_least(nodes: int) -> tuple[int, int]:
+    return nodes, int(nodes * TOLERANCE)
+
+
+def _about(nodes: int) -> tuple[int, int]:
+    return int(nodes * 0.98) + 1, int(nodes * 1.02)
+
+
+# Volumes: the published values for the phantom and for the clinical case. The fine meshes have as many more
+# tetrahedra than the coarse ones as the published fine assemblies took longer, scaled by node throughput.
+RECIPES: dict[str, CaseRecipe] = {
+    "phantom": CaseRecipe(
+        volume=1.6092e-3,
+        meshes=(
+            MeshRecipe("single-coarse", multi=False, nodes=_at_least(2677)),
+            MeshRecipe("multi-coarse", multi=True, nodes=_at_least(4169)),
+            MeshRecipe("single-fine", multi=False, finer_than=("single-coarse", 28.31 / 18.32)),
+            MeshRecipe("multi-fine", multi=True, finer_than=("multi-coarse", 136.8 / 55.43)),
+        ),
+    ),
+    "0529": CaseRecipe(
+        volume=1.1654e-3,
+        meshes=(
+            MeshRecipe("single", multi=False, nodes=_about(3619)),
+            MeshRecipe("multi", multi=True, nodes=_about(5060)),
+        ),
+        seed=529,
+        resection="left",
+    ),
+}

@@ -1,0 +1,47 @@
+"""The cases that ship with the package, by name; a path to a case folder works wherever a name does."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+from warpbrain.cases.case import Case
+from warpbrain.cases.reading import read_case
+from warpbrain.errors import InputError
+
+_DATA = Path(__file__).parent / "data"
+
+#: Files of each shipped case by tissue mode, relative to the data folder.
+SHIPPED = {
+    "0529": {"multi": "0529/case.toml", "single": "0529/case-single.toml"},
+    "phantom": {"multi": "phantom/case.toml", "single": "phantom/case-single.toml"},
+    "phantom-fine": {"multi": "phantom/case-fine.toml", "single": "phantom/case-single-fine.toml"},
+}
+
+
+def find_case(name: str, tissue: str = "multi") -> Case:
+    """Read a shipped case, or the case in a folder.
+
+    Parameters
+    ----------
+    name : str
+        Name of a shipped case, or path of a case folder or of a `case.toml`.
+    tissue : str
+        ``"single"`` or ``"multi"``. A shipped case has a mesh of its own for each. Of a folder, ``"single"`` reads
+        `case-single.toml`.
+
+    Raises
+    ------
+    InputError
+        If there is no such case, or it is wrong.
+    """
+    if name in SHIPPED:
+        return read_case(_DATA / SHIPPED[name][tissue])
+    path = Path(name)
+    if not path.exists():
+        near = difflib.get_close_matches(name, SHIPPED, 1)
+        hint = f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(SHIPPED)}"
+        raise InputError(f"--case {name}: no such case and no such folder ({hint})")
+    if path.is_dir() and tissue == "single":
+        path = path / "case-single.toml"
+    return read_case(path)
