@@ -10,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 
 
@@ -37,9 +38,9 @@ class AssemblyKernels:
 def assembly_kernels(precision: Precision) -> AssemblyKernels:
     """Make (once) the assembly kernels of a precision."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = f"warpbrain_assembly_{precision.name}"
+    module = compiled_module(f"assembly_{precision.name}")
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def gather_matrix(
         pairs: wp.array[wp.vec2i],
         first: wp.array[int],
@@ -69,7 +70,7 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
         if i != j:
             values[positions[p][1]] = wp.transpose(A)
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def gather_forces(
         first: wp.array[int],
         corners: wp.array[int],
@@ -82,7 +83,7 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
             f += element_forces[corners[c]]
         forces[i] = f
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def constrained_load(
         first: wp.array[int],
         corners: wp.array[int],

@@ -6,6 +6,7 @@ from typing import Any
 
 import warp as wp
 
+from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 
 
@@ -21,9 +22,9 @@ class DynamicsKernels:
 def dynamics_kernels(precision: Precision) -> DynamicsKernels:
     """Make (once) the kernels of a time step in a precision."""
     scalar, vec3 = precision.scalar, precision.vec3
-    module = f"warpbrain_dynamics_{precision.name}"
+    module = compiled_module(f"dynamics_{precision.name}")
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def right_hand_side(
         external: wp.array[vec3],
         internal: wp.array[vec3],
@@ -41,7 +42,7 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
         momentum = mass[i] * (v_start[i] + along_Mv * v[i])
         b[i] = wp.cw_mul(free[i], momentum + h * (external[i] - internal[i]) + along_Av * Av[i])
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def update(
         u_start: wp.array[vec3],
         dv: wp.array[vec3],

@@ -17,6 +17,7 @@ from typing import Any
 
 import warp as wp
 
+from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import ElementKernels, deformation_gradient, store_blocks, store_forces
 
@@ -44,7 +45,8 @@ def invariant_kernels(
     precision : Precision
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = f"warpbrain_{key}_{precision.name}"
+    module = compiled_module(f"{key}_{precision.name}")
+    pointwise = compiled_module(f"{key}_{precision.name}_pointwise")
 
     @wp.func
     def second_of(cof: mat33):
@@ -93,7 +95,7 @@ def invariant_kernels(
         K[2, 2] += isotropic
         return K
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def forces(
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
@@ -108,7 +110,7 @@ def invariant_kernels(
         F = deformation_gradient(u, nodes[e], G)
         store_forces(volume[e] * stress_of(F, parameters, e), G, element_forces, e)
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def forces_and_tangents(
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
@@ -163,7 +165,7 @@ def invariant_kernels(
         store_forces(VP, G, element_forces, e)
         store_blocks(K11, K12, K13, K22, K23, K33, element_blocks, e)
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def energy(
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
@@ -184,7 +186,7 @@ def invariant_kernels(
         if scalar(0.0) < J:
             element_energy[e] = volume[e] * energy_density(wp.ddot(F, F), second_of(cof), J, parameters, e)
 
-    @wp.kernel(enable_backward=False, module=module + "_pointwise")
+    @wp.kernel(module=pointwise)
     def stress(
         elements: wp.array[int],
         F: wp.array[mat33],
@@ -197,7 +199,7 @@ def invariant_kernels(
         density[e] = energy_density(wp.ddot(F[e], F[e]), second_of(cof), wp.dot(F[e][0], cof[0]), parameters, e)
         P[e] = stress_of(F[e], parameters, e)
 
-    @wp.kernel(enable_backward=False, module=module + "_pointwise")
+    @wp.kernel(module=pointwise)
     def moduli(
         elements: wp.array[int],
         F: wp.array[mat33],

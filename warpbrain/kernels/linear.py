@@ -1,23 +1,30 @@
 """The one door to linear algebra: preconditioned conjugate gradients on the assembled system.
 
-Nobody else calls `warp.optim.linear`. Two facts about Warp 1.19 are dealt with here and nowhere else:
+Nobody else calls `warp.optim.linear`. A solve is captured once in a graph, with its convergence test on the device, and
+replayed: on CUDA one launch instead of hundreds, on the CPU a loop in C++ instead of Python. Facts about Warp 1.19 that
+are dealt with here and nowhere else:
 
 - on the CPU its CG reduces every tile of a dot product once per absent GPU lane. Naming the one system as a batch of
   one (`batch_offsets = [0, n]`) takes the code path that does not;
-- its matrix-vector product of 3 x 3 blocks has one thread for a scalar row. Ours has one for a block row (see
-  `docs/benchmarks.md` for what that is worth);
+- its matrix-vector product of 3 x 3 blocks has one thread for a scalar row. Ours has one for a block row;
+- its CG leaves the loop to the device on CUDA only. `_conditional_loop` does the same for a graph of the CPU, where
+  Warp would unroll `max_iterations` of them into it;
 - its kernels are compiled ahead for arrays of scalars only; vectors of three would compile that module three times
   over. CG therefore sees scalar views of our arrays.
 """
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import warp as wp
+import warp._src.optim.linear as warp_linear_internals
 import warp.optim.linear as warp_linear
 from warp.sparse import BsrMatrix
 
+from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 
 #: Names of the preconditioners: inverse diagonal blocks, factorised sparse approximate inverse, none.
@@ -54,11 +61,14 @@ class LinearResult:
 
 @dataclass(frozen=True)
 class LinearKernels:
+    """Kernels of the linear solver in one precision."""
+
     multiply: Any
     invert_diagonal: Any
     apply_diagonal: Any
     partial_curvature: Any
     least_curvature: Any
+    test_convergence: Any
 
 
 #: Rows that one thread sums in the first stage of the curvature's reduction.
@@ -69,10 +79,10 @@ _CHUNK = 64
 def linear_kernels(precision: Precision) -> LinearKernels:
     """Make (once) the kernels of the linear solver in a precision."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = f"warpbrain_linear_{precision.name}"
+    module = compiled_module(f"linear_{precision.name}")
     chunk = wp.constant(_CHUNK)
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def multiply(
         offsets: wp.array[int],
         columns: wp.array[int],
@@ -93,12 +103,12 @@ def linear_kernels(precision: Precision) -> LinearKernels:
             s += beta * y[i]
         z[i] = s
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def invert_diagonal(diagonal: wp.array[int], values: wp.array[mat33], inverse: wp.array[mat33]):
         i = wp.tid()
         inverse[i] = wp.inverse(values[diagonal[i]])
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def apply_diagonal(
         inverse: wp.array[mat33], x: wp.array[vec3], y: wp.array[vec3], z: wp.array[vec3], alpha: scalar, beta: scalar
     ):
@@ -108,7 +118,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
             s += beta * y[i]
         z[i] = s
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def partial_curvature(p: wp.array[vec3], Ap: wp.array[vec3], partial: wp.array2d[scalar]):
         t = wp.tid()
         pAp = scalar(0.0)
@@ -119,7 +129,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         partial[t, 0] = pAp
         partial[t, 1] = pp
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def least_curvature(partial: wp.array2d[scalar], least: wp.array[scalar]):
         pAp = scalar(0.0)
         pp = scalar(0.0)
@@ -130,7 +140,59 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         if pp > scalar(0.0):
             least[0] = wp.min(least[0], pAp / pp)
 
-    return LinearKernels(multiply, invert_diagonal, apply_diagonal, partial_curvature, least_curvature)
+    @wp.kernel(module=module)
+    def test_convergence(
+        max_iterations: int,
+        residual_squared: wp.array[scalar],
+        tolerance_squared: wp.array[scalar],
+        iterations: wp.array[int],
+        go_on: wp.array[int],
+    ):
+        iterations[0] = iterations[0] + 1
+        go_on[0] = 1
+        # written so that a residual that is not a number ends the loop
+        if not (residual_squared[0] > tolerance_squared[0]) or iterations[0] >= max_iterations:
+            go_on[0] = 0
+
+    return LinearKernels(
+        multiply, invert_diagonal, apply_diagonal, partial_curvature, least_curvature, test_convergence
+    )
+
+
+@contextmanager
+def _conditional_loop(test_convergence: Any) -> Iterator[None]:
+    """While a graph of the CPU is being captured: let Warp's CG loop on the device until it has converged."""
+
+    def loop(
+        do_cycle: Callable[[], None],
+        cur_iter_and_condition: wp.array,
+        r_norm_sq: wp.array,
+        maxiter: int,
+        atol_sq: wp.array,
+        *_args: Any,
+        **_options: Any,
+    ) -> tuple[wp.array, wp.array, wp.array]:
+        iterations, go_on = cur_iter_and_condition[0:1], cur_iter_and_condition[1:2]
+
+        def test() -> None:
+            inputs = [maxiter, r_norm_sq, atol_sq, iterations, go_on]
+            wp.launch(test_convergence, dim=1, inputs=inputs, device=atol_sq.device)
+
+        def cycle() -> None:
+            do_cycle()
+            test()
+
+        iterations.fill_(-1)
+        test()
+        wp.capture_while(go_on, cycle)
+        return iterations, r_norm_sq, atol_sq
+
+    original = warp_linear_internals._run_capturable_loop
+    warp_linear_internals._run_capturable_loop = loop
+    try:
+        yield
+    finally:
+        warp_linear_internals._run_capturable_loop = original
 
 
 class ConjugateGradient:
@@ -152,9 +214,6 @@ class ConjugateGradient:
         One of `PRECONDITIONERS`.
     watch_curvature : bool
         Track the smallest curvature of the search directions, to tell an indefinite matrix.
-    check_every : int
-        Iterations between looks at the residual from the host; 0 leaves the loop on the device (needed for capture in
-        a CUDA graph, wasteful on the CPU, where it would run all `max_iterations`).
     """
 
     def __init__(
@@ -169,7 +228,6 @@ class ConjugateGradient:
         max_iterations: int,
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
-        check_every: int = 1,
     ) -> None:
         if preconditioner not in PRECONDITIONERS:
             raise ValueError(f"preconditioner {preconditioner!r}: expected one of {', '.join(PRECONDITIONERS)}")
@@ -203,9 +261,11 @@ class ConjugateGradient:
             atol=0.0,
             maxiter=max_iterations,
             M=self._preconditioner,
-            check_every=check_every,
+            check_every=0,
             use_cuda_graph=True,
         )
+        self._graph: Any = None
+        self._outcome: tuple[wp.array, wp.array, wp.array] | None = None
 
     def _scalars(self, x: wp.array) -> wp.array:
         """The scalars of an array of vectors, without a copy."""
@@ -280,18 +340,33 @@ class ConjugateGradient:
             else:
                 self._fsai.update(self._matrix)
 
-    def solve(self) -> Any:
-        """Run CG from the present content of the solution array; returns what Warp's solver returns."""
+    def solve(self) -> None:
+        """Run CG from the present content of the solution array.
+
+        Within the capture of a graph this only records; otherwise it replays a graph of its own.
+        """
+        if self._device.is_capturing:
+            self._record()
+            return
+        if self._graph is None:
+            with wp.ScopedCapture(device=self._device) as capture:
+                self._record()
+            self._graph = capture.graph
+        wp.capture_launch(self._graph)
+
+    def _record(self) -> None:
         if self._watch:
             self._least.fill_(float("inf"))
-        return self._solver(M=self._fsai)
+        if self._device.is_cpu:
+            with _conditional_loop(self._kernels.test_convergence):
+                self._outcome = self._solver(M=self._fsai)
+        else:
+            self._outcome = self._solver(M=self._fsai)
 
-    def result(self, outcome: Any) -> LinearResult:
-        """Read the outcome of `solve` on the host (this waits for the device)."""
-        iterations, residual, tolerance = outcome
-        if isinstance(iterations, wp.array):
-            iterations = int(iterations.numpy()[0])
-            residual = float(residual.numpy().ravel()[0]) ** 0.5
-            tolerance = float(tolerance.numpy().ravel()[0]) ** 0.5
+    def result(self) -> LinearResult:
+        """How the last solve ended (waits for the device)."""
+        if self._outcome is None:
+            raise RuntimeError("no solve has been run")
+        iterations, residual, tolerance = (float(values.numpy().ravel()[0]) for values in self._outcome)
         curvature = float(self._least.numpy()[0]) if self._watch else float("nan")
-        return LinearResult(int(iterations), float(residual), float(tolerance), curvature)
+        return LinearResult(int(iterations), residual**0.5, tolerance**0.5, curvature)

@@ -20,6 +20,7 @@ from typing import Any
 
 import warp as wp
 
+from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.svd import singular_value_decomposition
 from warpbrain.kernels.tetrahedron import ElementKernels, deformation_gradient, store_blocks, store_forces
@@ -38,7 +39,8 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
     precision : Precision
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = f"warpbrain_{key}_{precision.name}"
+    module = compiled_module(f"{key}_{precision.name}")
+    pointwise = compiled_module(f"{key}_{precision.name}_pointwise")
     small = wp.constant(scalar(precision.epsilon**2))
 
     @wp.func
@@ -70,7 +72,7 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
         T, _H, _m = derivatives(l, parameters, e)
         return U * wp.diag(T) * wp.transpose(V)
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def forces(
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
@@ -85,7 +87,7 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
         F = deformation_gradient(u, nodes[e], G)
         store_forces(volume[e] * stress_of(F, parameters, e), G, element_forces, e)
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def forces_and_tangents(
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
@@ -120,7 +122,7 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
             e,
         )
 
-    @wp.kernel(enable_backward=False, module=module)
+    @wp.kernel(module=module)
     def energy(
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
@@ -141,7 +143,7 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
             _U, l, _V = singular_value_decomposition(F, small)
             element_energy[e] = volume[e] * energy_density(l, parameters, e)
 
-    @wp.kernel(enable_backward=False, module=module + "_pointwise")
+    @wp.kernel(module=pointwise)
     def stress(
         elements: wp.array[int],
         F: wp.array[mat33],
@@ -154,7 +156,7 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
         density[e] = energy_density(l, parameters, e)
         P[e] = stress_of(F[e], parameters, e)
 
-    @wp.kernel(enable_backward=False, module=module + "_pointwise")
+    @wp.kernel(module=pointwise)
     def moduli(
         elements: wp.array[int],
         F: wp.array[mat33],

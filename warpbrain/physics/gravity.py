@@ -60,6 +60,13 @@ class Gravity(Load):
         if self.csf_level is not None and not np.isfinite(self.csf_level):
             raise InputError(f"gravity: csf_level = {self.csf_level}: expected a finite height")
 
+    def detail(self) -> str:
+        """What the sentence leaves open, for people to read."""
+        axis = ", ".join(f"{v:g}" for v in self.direction)
+        if self.csf_level is None:
+            return f" No fluid is left; gravity points along ({axis}) in RAS."
+        return f" Its level: {1000.0 * self.csf_level:g} mm above the lowest point; gravity along ({axis}) in RAS."
+
     def height(self, mesh: TetMesh) -> NDArray[np.float64]:
         """Height of each node [m] above the lowest one, against gravity, shape (n,)."""
         z = -mesh.points @ unit_vector("gravity_axis", self.direction)

@@ -1,9 +1,9 @@
 """Static equilibrium: Newton's method with an energy line search, inside load steps that adapt.
 
 The potential is `Pi(u) = stored energy - t f . u` at load fraction `t`. An iterate is accepted only with `J > 0` in
-every element and a sufficient decrease of `Pi` (Armijo). Prescribed displacements enter the first linear solve of a load
-step through `K d`: writing them into the state first would distort the elements along the boundary before the interior
-can follow. Linear systems are solved inexactly while far from the solution (Eisenstat and Walker 1996).
+every element and a sufficient decrease of `Pi` (Armijo). Prescribed displacements enter the first linear solve of a
+load step through `K d`: writing them into the state first would distort the elements along the boundary before the
+interior can follow. Linear systems are solved inexactly while far from the solution (Eisenstat and Walker 1996).
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.kernels.linear import ConjugateGradient, LinearResult
+from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
@@ -120,6 +121,11 @@ class EquilibriumSolver:
     options : EquilibriumOptions
     on_step : callable, optional
         Called with each `NewtonStep` as it is taken.
+
+    Attributes
+    ----------
+    clock : PhaseClock
+        Wall time by phase.
     """
 
     def __init__(
@@ -131,6 +137,7 @@ class EquilibriumSolver:
         self.system = system
         self.options = options or EquilibriumOptions()
         self._on_step = on_step
+        self.clock = PhaseClock(system.device)
         self._history: list[NewtonStep] = []
         self._free = 1.0 - system.model.constrained
         # residuals cannot fall below the rounding of the sums of element forces
@@ -188,9 +195,10 @@ class EquilibriumSolver:
         previous = np.inf
         forcing = options.cg_tolerance
         for iteration in range(1, options.max_newton + 1):
-            system.u.assign(u)
-            system.evaluate_tangents()
-            system.gather_forces()
+            with self.clock.phase("internal forces"):
+                system.u.assign(u)
+                system.evaluate_tangents()
+                system.gather_forces()
             internal = system.internal.numpy().astype(np.float64)
             r = self._free * (external - internal)
             scale = float(np.linalg.norm(internal) + np.linalg.norm(external))
@@ -211,7 +219,8 @@ class EquilibriumSolver:
                 eta = max(eta, 0.3 * self.tolerance / relative, 20.0 * system.precision.epsilon)
             forcing, previous = eta, np.inf if moving else norm
             d, linear = self._direction(r, prescribed, moving, min(eta, 0.5))
-            alpha, u, potential, min_J = self._line_search(u, d, r, external, potential, moving)
+            with self.clock.phase("line search"):
+                alpha, u, potential, min_J = self._line_search(u, d, r, external, potential, moving)
             record = NewtonStep(load, iteration, relative, linear.iterations, alpha, min_J)
             self._history.append(record)
             if self._on_step is not None:
@@ -223,12 +232,13 @@ class EquilibriumSolver:
 
     def _direction(self, r: Floats, prescribed: Floats, moving: bool, eta: float) -> tuple[Floats, LinearResult]:
         system = self.system
-        system.assemble(k=1.0, m=0.0)
-        system.load.assign(r)
-        if moving:
-            system.increment.assign(prescribed)
-            system.subtract_constrained_load(system.increment, 1.0)
-        system.solution.zero_()
+        with self.clock.phase("assemble system"):
+            system.assemble(k=1.0, m=0.0)
+            system.load.assign(r)
+            if moving:
+                system.increment.assign(prescribed)
+                system.subtract_constrained_load(system.increment, 1.0)
+            system.solution.zero_()
         cg = ConjugateGradient(
             system.matrix,
             system.diagonal,
@@ -239,10 +249,11 @@ class EquilibriumSolver:
             max_iterations=self.options.max_cg,
             preconditioner=self.options.preconditioner,
             watch_curvature=True,
-            check_every=5 if system.device.is_cpu else 25,
         )
-        cg.prepare()
-        linear = cg.result(cg.solve())
+        with self.clock.phase("solve system"):
+            cg.prepare()
+            cg.solve()
+        linear = cg.result()
         d = system.solution.numpy().astype(np.float64) * self._free + prescribed
         if linear.indefinite:
             raise _StepFailed(

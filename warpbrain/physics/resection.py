@@ -1,0 +1,48 @@
+"""Resection: tissue that the surgeon took out is no longer there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError
+from warpbrain.mesh import TetMesh
+
+
+@dataclass(frozen=True, kw_only=True)
+class Resection:
+    """Removes the elements of a set before anything is computed; the cavity stays empty and its wall free.
+
+    Parameters
+    ----------
+    elements : str
+        Name of the element set that was resected.
+    """
+
+    elements: str = "resection"
+    sentence: ClassVar[str] = "Tissue was taken out, and what it held moves into the cavity."
+
+    def detail(self) -> str:
+        """What the sentence leaves open, for people to read."""
+        return f" It is the element set '{self.elements}'; the wall of the cavity is free."
+
+    def remaining(self, mesh: TetMesh) -> tuple[TetMesh, NDArray[np.int32]]:
+        """The mesh that is left, and for each of its nodes the id in the whole mesh.
+
+        Raises
+        ------
+        InputError
+            If the mesh has no such set, or the set is empty or everything.
+        """
+        members = mesh.element_sets.get(self.elements)
+        if members is None:
+            known = ", ".join(sorted(mesh.element_sets)) or "none"
+            raise InputError(f"resection: the mesh has no element set '{self.elements}' (it has {known})")
+        if not members.any() or members.all():
+            count = int(members.sum())
+            raise InputError(f"resection: element set '{self.elements}' holds {count} of {len(members)} tetrahedra")
+        left, nodes, _ = mesh.without(members)
+        return left, nodes

@@ -1,0 +1,91 @@
+"""What a simulation says: displacement, strain and stress as plain named arrays with units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.mesh import TetMesh
+from warpbrain.simulation.system import System
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Size of the displacements of some nodes [m]."""
+
+    nodes: int
+    mean: float
+    root_mean_square: float
+    percentile_95: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Result:
+    """The state of a body.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+        The simulated mesh, undeformed.
+    u : (n, 3) array
+        Displacement [m].
+    J : (m,) array
+        Volume ratio of each element.
+    principal_stretches : (m, 3) array
+        Descending.
+    von_mises, pressure : (m,) array
+        Of the Cauchy stress [Pa]; pressure is positive in compression.
+    reactions : (n, 3) array
+        Internal forces on the constrained components [N], zero elsewhere.
+    """
+
+    mesh: TetMesh
+    u: Floats
+    J: Floats
+    principal_stretches: Floats
+    von_mises: Floats
+    pressure: Floats
+    reactions: Floats
+
+    def displacement_statistics(self) -> Mapping[str, Statistics]:
+        """Statistics of the displacement by node set, and of all nodes under ``"all nodes"``."""
+        sizes = np.linalg.norm(self.u, axis=1)
+        groups = {"all nodes": np.ones(len(sizes), dtype=bool), **self.mesh.node_sets}
+        return {name: _statistics(sizes[members]) for name, members in groups.items() if members.any()}
+
+
+def _statistics(sizes: Floats) -> Statistics:
+    return Statistics(
+        nodes=len(sizes),
+        mean=float(sizes.mean()),
+        root_mean_square=float(np.sqrt(np.mean(sizes**2))),
+        percentile_95=float(np.percentile(sizes, 95.0)),
+        largest=float(sizes.max()),
+    )
+
+
+def result_of(system: System) -> Result:
+    """Evaluate a system at its present displacement."""
+    system.evaluate_forces()
+    system.gather_forces()
+    F = system.deformation_gradients()
+    J = np.linalg.det(F)
+    cauchy = system.stresses() @ F.transpose(0, 2, 1) / J[:, None, None]
+    pressure = -np.trace(cauchy, axis1=1, axis2=2) / 3.0
+    deviator = cauchy + pressure[:, None, None] * np.eye(3)
+    internal = system.internal.numpy().astype(np.float64)
+    return Result(
+        mesh=system.model.mesh,
+        u=system.u.numpy().astype(np.float64),
+        J=J,
+        principal_stretches=np.asarray(np.linalg.svd(F, compute_uv=False), dtype=np.float64),
+        von_mises=np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2))),
+        pressure=pressure,
+        reactions=np.where(system.model.constrained, internal, 0.0),
+    )
