@@ -1,0 +1,5 @@
+"""python -m warpbrain"""
+
+from warpbrain.cli import main
+
+raise SystemExit(main())

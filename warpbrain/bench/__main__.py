@@ -1,0 +1,138 @@
+"""Command line of the bench."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import sys
+from pathlib import Path
+from typing import Any
+
+from warpbrain.errors import InputError, SolveError
+
+
+def main() -> int:
+    """Parse, measure, print; returns the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m warpbrain.bench",
+        description="Times each phase of a step on the phantom's meshes beside the paper's Table 3.",
+    )
+    add = parser.add_argument
+    add("--device", default=None, metavar="NAME", help="cpu, cuda:0, ... or all (default: the GPU if there is one)")
+    add("--rows", default=None, metavar="ROW,...", help="st/coarse, st/fine, mt/coarse, mt/fine (default: all)")
+    add("--steps", type=int, default=100, help="samples (default: 100)")
+    add("--warmup", type=int, default=10, help="steps before them (default: 10)")
+    add("--tol", type=float, default=1e-6, help="relative tolerance of the linear solves (default: 1e-6)")
+    add("--precision", choices=("double", "single"), default="double", help="default: double")
+    add("--json", type=Path, metavar="FILE", help="write every sample")
+    options = parser.parse_args()
+    try:
+        _bench(options)
+    except InputError as error:
+        print(f"warpbrain.bench: error: {error}", file=sys.stderr)
+        return 2
+    except SolveError as error:
+        print(f"warpbrain.bench: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("\nwarpbrain.bench: interrupted", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _bench(options: argparse.Namespace) -> None:
+    for name in ("steps", "warmup"):
+        if getattr(options, name) < 1:
+            raise InputError(f"--{name} {getattr(options, name)}: expected a whole number of at least 1")
+    if not 0.0 < options.tol < 1.0:
+        raise InputError(f"--tol {options.tol:g}: expected a number between 0 and 1")
+
+    from warpbrain.atomic import whole_file
+    from warpbrain.bench.measure import RESTART, measure_row
+    from warpbrain.bench.table3 import TABLE3
+    from warpbrain.cli.progress import Progress
+    from warpbrain.cli.quiet import start_warp_quietly
+    from warpbrain.report.summary import machine
+    from warpbrain.simulation.system import find_device
+
+    wp = start_warp_quietly()
+    names = options.rows.split(",") if options.rows else list(TABLE3)
+    for name in names:
+        if name not in TABLE3:
+            raise InputError(f"--rows {name}: expected some of {', '.join(TABLE3)}")
+    devices = [d.alias for d in wp.get_devices()] if options.device == "all" else [find_device(options.device).alias]
+    versions = machine()
+    results = []
+    for alias in devices:
+        device = wp.get_device(alias)
+        print(
+            f"{device.name} ({alias}), {options.precision} precision, CG to {options.tol:g}, h = 1 ms, "
+            f"from rest again every {RESTART} steps; warpbrain {versions['warpbrain']}, Warp {versions['warp-lang']}"
+        )
+        print(f"mean (sd) ms of {options.steps} steps after {options.warmup}; 'paper' and 'x faster' from its Table 3")
+        progress = Progress("bench")
+        for number, name in enumerate(names):
+            progress.show(number / len(names), f"{name} on {alias}")
+            measured = measure_row(TABLE3[name], alias, options.precision, options.steps, options.warmup, options.tol)
+            progress.clear()
+            results.append(measured)
+            print(*_lines(measured), sep="\n")
+    if options.json is not None:
+        with whole_file(options.json) as scratch:
+            scratch.write_text(json.dumps({"versions": versions, "rows": [_json(r) for r in results]}, indent=1) + "\n")
+        print(f"written to {options.json}")
+
+
+def _lines(measured: Any) -> list[str]:
+    from warpbrain.bench.table3 import MAIN_LOOP
+
+    row = measured.row
+    cg = statistics.median(measured.cg_iterations)
+    lines = [
+        "",
+        f"{row.name}: {measured.nodes} nodes, {measured.tetrahedra} tetrahedra, {measured.blocks} blocks of 3 x 3, "
+        f"{cg:g} CG iterations (median)",
+        f"  {'':<28}{'warpbrain':>18}{'paper':>18}{'x faster':>10}",
+    ]
+
+    def line(label: str, samples: list[float], paper: tuple[float, float | None]) -> str:
+        mean, sd = statistics.fmean(samples), statistics.pstdev(samples)
+        theirs = f"{paper[0]:.2f}" + ("" if paper[1] is None else f" ({paper[1]:.1f})")
+        return f"  {label:<28}{f'{mean:.3f} ({sd:.3f})':>18}{theirs:>18}{paper[0] / mean:>10.1f}"
+
+    lines.append(line("pre-processing", measured.preprocessing, (row.preprocessing, None)))
+    lines += [line(name, samples, row.phases[name]) for name, samples in measured.phases.items()]
+    lines.append(line("step without instruments", measured.step, row.phases[MAIN_LOOP]))
+    median = statistics.median(measured.step)
+    bandwidth = measured.bytes_per_step / median / 1e6
+    each = 1000.0 * median / measured.launches_per_step
+    lines.append(
+        f"  its median {median:.3f} ms; {measured.bytes_per_step / 1e6:.1f} MB moved and "
+        f"{measured.launches_per_step} launches a step: {bandwidth:.1f} GB/s, {each:.1f} us a launch"
+    )
+    return lines
+
+
+def _json(measured: Any) -> dict[str, Any]:
+    return {
+        "row": measured.row.name,
+        "device": measured.device,
+        "precision": measured.precision,
+        "tolerance": measured.tolerance,
+        "nodes": measured.nodes,
+        "tetrahedra": measured.tetrahedra,
+        "blocks": measured.blocks,
+        "cg_iterations": measured.cg_iterations,
+        "bytes_per_step": measured.bytes_per_step,
+        "launches_per_step": measured.launches_per_step,
+        "milliseconds": {
+            "pre-processing": measured.preprocessing,
+            **measured.phases,
+            "step without instruments": measured.step,
+        },
+        "paper_milliseconds": {"pre-processing": measured.row.preprocessing, **measured.row.phases},
+    }
+
+
+raise SystemExit(main())

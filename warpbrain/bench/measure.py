@@ -1,0 +1,146 @@
+"""Measures one row: pre-processing, the phases of a step one by one, and the step as users get it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import warp as wp
+
+from warpbrain.bench.table3 import MAIN_LOOP, Row
+from warpbrain.cases.shipped import find_case
+from warpbrain.errors import SolveError
+from warpbrain.simulation.dynamics import PHASES, Simulator
+from warpbrain.simulation.phase_clock import PhaseClock
+from warpbrain.simulation.system import System
+
+#: The motion starts again from rest after this many steps: the phantom's load crushes its softest mesh after 50 to
+#: 60 ms (it has no equilibrium, see docs/phantom.md), and timing inverted elements would be worthless.
+RESTART = 20
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Samples of one row on one device [ms], and what they were measured on."""
+
+    row: Row
+    device: str
+    precision: str
+    tolerance: float
+    nodes: int
+    tetrahedra: int
+    blocks: int
+    preprocessing: list[float]
+    phases: dict[str, list[float]]
+    step: list[float]
+    cg_iterations: list[int]
+    bytes_per_step: int
+    launches_per_step: int
+
+
+def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, tolerance: float) -> Measured:
+    """Measure a row.
+
+    Parameters
+    ----------
+    row : Row
+    device : str
+        Warp device.
+    precision : str
+    steps : int
+        Samples of each kind.
+    warmup : int
+        Steps before them, which also load every kernel.
+    tolerance : float
+        Relative tolerance of the linear solves.
+    """
+    model, _ = find_case(row.case, row.tissue).build()
+    # loads every kernel, so that pre-processing is measured as it is on any run but the first
+    simulator = Simulator(System(model, device, precision), tolerance=tolerance)
+    for _ in range(max(1, warmup)):
+        simulator.step()
+    wp.synchronize_device(device)
+    preprocessing = []
+    for _ in range(5):
+        start = time.perf_counter()
+        simulator = Simulator(System(model, device, precision), tolerance=tolerance)
+        wp.synchronize_device(device)
+        preprocessing.append(1000.0 * (time.perf_counter() - start))
+
+    phases: dict[str, list[float]] = {name: [] for name in (*PHASES, MAIN_LOOP)}
+    iterations = []
+    for sample in range(-warmup, steps):
+        if sample % RESTART == 0:
+            simulator.reset()
+        clock = PhaseClock(simulator.system.device)
+        simulator.timed_step(clock)
+        if sample >= 0:
+            for name in PHASES:
+                phases[name].append(1000.0 * clock.seconds[name])
+            phases[MAIN_LOOP].append(1000.0 * sum(clock.seconds.values()))
+            iterations.append(_checked(simulator))
+
+    simulator.capture()
+    step = []
+    for sample in range(-warmup, steps):
+        if sample % RESTART == 0:
+            simulator.reset()
+        wp.synchronize_device(device)
+        start = time.perf_counter()
+        simulator.step()
+        wp.synchronize_device(device)
+        if sample >= 0:
+            step.append(1000.0 * (time.perf_counter() - start))
+            _checked(simulator)
+
+    system = simulator.system
+    cg = sorted(iterations)[len(iterations) // 2]
+    moved, launches = count(system, cg)
+    return Measured(
+        row=row,
+        device=f"{system.device.name} ({system.device.alias})",
+        precision=precision,
+        tolerance=simulator.tolerance,
+        nodes=system.size,
+        tetrahedra=system.elements,
+        blocks=system.matrix.nnz,
+        preprocessing=preprocessing,
+        phases=phases,
+        step=step,
+        cg_iterations=iterations,
+        bytes_per_step=moved,
+        launches_per_step=launches,
+    )
+
+
+def _checked(simulator: Simulator) -> int:
+    """CG iterations of the last step, which must have converged with every element the right way round."""
+    simulator.check()
+    solve = simulator.last_solve()
+    if not solve.converged:
+        raise SolveError(f"conjugate gradients stopped at {solve.residual:.1e}, goal {solve.tolerance:.1e}")
+    return solve.iterations
+
+
+def count(system: System, cg_iterations: int) -> tuple[int, int]:
+    """Bytes that a step must move through memory, each array once a kernel, and kernel launches of a step.
+
+    Gathers count what they read, not what caches save; the vectors of CG count as Warp's kernels pass over them.
+    """
+    real = system.precision.numpy.itemsize
+    vector, block = 3 * real, 9 * real
+    n, m, nnz, pairs = system.size, system.elements, system.matrix.nnz, len(system.pairs)
+    elements = m * (4 + 16 + block + real + 2 * real + 4 * vector + 4 * vector + 10 * block)
+    gather_forces = m * 4 * (4 + vector) + n * vector
+    gather_matrix = m * 10 * (4 + block) + pairs * (8 + 4 + 8 + 2 * vector + real) + nnz * block
+    multiply = nnz * (4 + block) + nnz * vector + n * (4 + vector)
+    diagonal = n * 2 * block
+    right_hand_side = 8 * n * vector
+    update = 7 * n * vector
+    # a CG iteration: product, p.Ap, x and r, preconditioner, r.r and r.z, p
+    iteration = multiply + 2 * n * vector + 6 * n * vector + n * (block + 2 * vector) + 4 * n * vector + 3 * n * vector
+    total = elements + gather_forces + gather_matrix + multiply + diagonal + right_hand_side + update
+    total += 2 * n * vector + cg_iterations * iteration + iteration
+    # copies of the state, elements by group, two gathers, product, right-hand side, preconditioner, CG's start, update
+    launches = 2 + len(system.groups) + 5 + 12 + 9 * cg_iterations + 1
+    return int(total), launches

@@ -1,0 +1,28 @@
+"""`warpbrain cases build NAME`: remake a shipped mesh from the installed wheels."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    cases = commands.add_parser("cases", help="the cases that ship with the package")
+    actions = cases.add_subparsers(dest="action", required=True, metavar="ACTION")
+    parser = actions.add_parser(
+        "build",
+        help="remake a case's meshes from the MNI template in the nilearn wheel (needs warpbrain[build])",
+        description="Remakes the meshes of a shipped case from the installed wheels, to the same meshes on the same "
+        "versions. Needs the extra packages of `pip install warpbrain[build]`; downloads nothing.",
+    )
+    parser.add_argument("name", help="phantom or 0529")
+    parser.add_argument("--out", type=Path, default=Path("."), metavar="DIR", help="folder to write to (default: here)")
+    parser.set_defaults(call=_build)
+
+
+def _build(options: argparse.Namespace) -> None:
+    from warpbrain.atomic import output_folder
+    from warpbrain.cases.building import build
+
+    build(options.name, output_folder(options.out))

@@ -1,0 +1,52 @@
+"""Ctrl-C within a second, even while a kernel is being compiled.
+
+Python acts on a signal only between two of its own instructions, and compiling a kernel or a long launch is one. The
+signal itself is noticed at once through a wake-up descriptor: a thread waits on it and, if Python has not come to its
+senses shortly after, ends the process. Files are whole or not there at all (`warpbrain.atomic`), and what was being
+written under a temporary name is removed first.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from warpbrain.atomic import remove_unfinished
+
+#: Seconds that Python is given to stop by itself.
+_GRACE = 0.6
+
+
+@contextmanager
+def stop_promptly() -> Iterator[None]:
+    """Make Ctrl-C end the process within a second while the block runs; does nothing outside the main thread."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    finished = threading.Event()
+
+    def watch() -> None:
+        while data := reader.recv(1):
+            if data[0] == signal.SIGINT and not finished.wait(_GRACE):
+                remove_unfinished()
+                print("\nwarpbrain: interrupted; nothing half-written was left", file=sys.stderr, flush=True)
+                os._exit(130)
+
+    previous = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+    watcher = threading.Thread(target=watch, name="interrupt", daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        finished.set()
+        signal.set_wakeup_fd(previous)
+        writer.close()
+        watcher.join(timeout=1.0)
+        reader.close()

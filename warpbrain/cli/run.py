@@ -1,0 +1,288 @@
+"""`warpbrain run`: simulate a case, print what happened and write it."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from warpbrain.errors import InputError
+
+if TYPE_CHECKING:
+    from warpbrain.cases.case import Case
+    from warpbrain.simulation.system import System
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "run",
+        help="simulate a case",
+        description="Simulates a case and writes result.vtu, summary.json and deformation.png. Without --steps or "
+        "--to-rest it finds the static equilibrium.",
+    )
+    add = parser.add_argument
+    add("--case", required=True, metavar="NAME", help="0529, phantom, phantom-fine, or the path of a case folder")
+    add("--tissue", choices=("single", "multi"), default="multi", help="one tissue, or grey and white (default)")
+    add(
+        "--model",
+        choices=("neo-hookean", "mooney-rivlin", "ogden"),
+        help="law of every tissue, at the shear modulus that the case gives (default: the case's own law)",
+    )
+    add("--mu", nargs="+", metavar="PA", default=[], help="shear modulus [Pa] of every tissue, or LABEL=PA for one")
+    add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
+    add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
+    add("--precision", choices=("double", "single"), default="double", help="default: double")
+    motion = parser.add_mutually_exclusive_group()
+    motion.add_argument("--steps", type=int, metavar="N", help="follow the motion for N time steps of 1 ms")
+    motion.add_argument("--to-rest", action="store_true", help="follow the damped motion until it is at rest")
+    add(
+        "--tolerance",
+        type=float,
+        default=1e-8,
+        metavar="TOL",
+        help="out-of-balance force at equilibrium, relative to all nodal forces (default: 1e-8)",
+    )
+    add("--allow-unstable", action="store_true", help="accept a law that breaks the paper's stability conditions")
+    add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-CASE-TISSUE)")
+    add("--quiet", action="store_true", help="print nothing but errors")
+    parser.set_defaults(call=_run)
+
+
+def _run(options: argparse.Namespace) -> None:
+    start = time.perf_counter()
+    _check(options)
+    say: Callable[..., None] = _silent if options.quiet else print
+
+    from warpbrain.report import summary as tables
+
+    case = _case(options)
+    model, _ = case.build()
+    described = tables.describe_case(case, model)
+    say(*tables.case_lines(described), sep="\n")
+
+    from warpbrain.atomic import output_folder
+    from warpbrain.cli.quiet import start_warp_quietly
+    from warpbrain.simulation.system import System
+
+    start_warp_quietly()
+    system = System(model, options.device, options.precision)
+    out = output_folder(options.out or Path(f"warpbrain-{case.name}-{options.tissue}"))
+    say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
+    ready = time.perf_counter() - start
+
+    outcome, seconds, counts = _simulate(options, system, say)
+    seconds = {"pre-processing": system.seconds, **seconds}
+
+    from warpbrain.simulation.result import result_of
+
+    result = result_of(system)
+    said = tables.describe_result(result)
+    say("", *tables.displacement_lines(said), "", *tables.timing_lines(seconds, counts), sep="\n")
+
+    from warpbrain.report.files import write_result, write_summary
+    from warpbrain.report.picture import write_picture
+
+    write_result(out / "result.vtu", result)
+    names = {label: tissue.name for label, tissue in case.tissues.items()}
+    write_picture(out / "deformation.png", result, case.mesh, names, case.title, _subtitle(case, outcome))
+    summary = {
+        "case": described,
+        "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
+        "solution": outcome,
+        "result": said,
+        "seconds_by_phase": seconds,
+        "calls_by_phase": counts,
+        "seconds_to_first_step": ready,
+        "versions": tables.machine(),
+    }
+    write_summary(out / "summary.json", summary)
+    say("", f"written to {out}: result.vtu, summary.json, deformation.png", sep="\n")
+
+
+def _silent(*_values: object, **_options: object) -> None:
+    """Stands for `print` where nothing is to be said."""
+
+
+def _check(options: argparse.Namespace) -> None:
+    if options.steps is not None and options.steps < 1:
+        raise InputError(f"--steps {options.steps}: expected a whole number of at least 1")
+    if options.poisson is not None and not -1.0 < options.poisson < 0.5:
+        raise InputError(f"--poisson {options.poisson:g}: expected a number in the open interval (-1, 0.5)")
+    if not 0.0 < options.tolerance < 1.0:
+        raise InputError(f"--tolerance {options.tolerance:g}: expected a number between 0 and 1")
+    parse_moduli(options.mu)
+
+
+def _case(options: argparse.Namespace) -> Case:
+    """The case as the arguments change it."""
+    from warpbrain.cases.shipped import find_case
+    from warpbrain.physics.laws.stability import UnstableLawError, require_stable
+
+    case = find_case(options.case, options.tissue)
+    if options.model is not None:
+        case = case.with_law(options.model)
+    every, by_label = parse_moduli(options.mu)
+    moduli: Mapping[int, float] = by_label if every is None else dict.fromkeys(case.tissues, every)
+    case = case.with_shear_moduli(moduli)
+    if options.poisson is not None:
+        case = replace(case, poisson=options.poisson)
+    if not options.allow_unstable:
+        for label, tissue in sorted(case.tissues.items()):
+            try:
+                require_stable(tissue.law)
+            except UnstableLawError as error:
+                raise UnstableLawError(
+                    f"{case.path}: [tissue.{label}] {error}; --allow-unstable computes with it all the same"
+                ) from None
+    return case
+
+
+def parse_moduli(values: list[str]) -> tuple[float | None, dict[int, float]]:
+    """Read the values of ``--mu``: one number for every tissue, or LABEL=PA for some.
+
+    Raises
+    ------
+    InputError
+        If a value is neither, is not positive, or both ways are mixed.
+    """
+    every: float | None = None
+    by_label: dict[int, float] = {}
+    for value in values:
+        label, equals, number = value.rpartition("=")
+        try:
+            mu = float(number)
+            key = int(label) if equals else None
+        except ValueError:
+            raise InputError(f"--mu {value}: expected a number [Pa] or LABEL=PA") from None
+        if not (math.isfinite(mu) and mu > 0.0):
+            raise InputError(f"--mu {value}: the shear modulus must be a positive number [Pa]")
+        if key is not None:
+            by_label[key] = mu
+        elif every is None:
+            every = mu
+        else:
+            raise InputError(f"--mu {' '.join(values)}: expected one number for every tissue, or LABEL=PA for each")
+    if every is not None and by_label:
+        raise InputError(f"--mu {' '.join(values)}: give one number for every tissue or LABEL=PA for some, not both")
+    return every, by_label
+
+
+def _simulate(
+    options: argparse.Namespace, system: System, say: Any
+) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
+    """Find the state that the arguments ask for; returns what to report of it, and times and counts by phase."""
+    from warpbrain.cli.progress import Progress
+
+    if options.steps is not None:
+        return _follow(options, system, say, Progress("motion", options.quiet))
+    if options.to_rest:
+        return _relax(options, system, say, Progress("to rest", options.quiet))
+    return _balance(options, system, say, Progress("equilibrium", options.quiet))
+
+
+def _balance(
+    options: argparse.Namespace, system: System, say: Any, progress: Any
+) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
+    from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, NewtonStep
+
+    say("", "equilibrium   load   Newton   residual    CG   step   min J", sep="\n")
+
+    def on_step(step: NewtonStep) -> None:
+        progress.clear()
+        say(
+            f"            {100 * step.load:>5.1f} % {step.iteration:>6}   {step.residual:>8.1e} {step.cg_iterations:>5}"
+            f"  {step.step:>5.3g}   {step.min_J:>5.3f}"
+        )
+        progress.show(step.load, f"Newton {step.iteration}")
+
+    progress.show(0.0, "loading kernels (the first run compiles them)")
+    solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=options.tolerance), on_step)
+    try:
+        state = solver.solve()
+    finally:
+        progress.clear()
+    say(f"  converged: relative out-of-balance force {state.residual:.1e}, stored energy {1000 * state.energy:.4g} mJ")
+    outcome = {
+        "kind": "equilibrium",
+        "relative_residual": state.residual,
+        "stored_energy_J": state.energy,
+        "history": [vars(step) for step in state.history],
+    }
+    return outcome, solver.clock.seconds, solver.clock.counts
+
+
+def _relax(
+    options: argparse.Namespace, system: System, say: Any, progress: Any
+) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
+    from warpbrain.simulation.relaxation import RelaxationStep, relax_to_rest
+
+    say("", "to rest        time [s]  step [s]   residual    CG   min J", sep="\n")
+
+    def on_step(step: RelaxationStep) -> None:
+        progress.clear()
+        say(
+            f"            {step.time:>11.3g} {step.time_step:>9.3g}   {step.residual:>8.1e} {step.cg_iterations:>5}"
+            f"   {step.min_J:>5.3f}"
+        )
+        decades = math.log10(max(step.residual, 1e-300)) / math.log10(options.tolerance)
+        progress.show(min(1.0, max(0.0, decades)), f"{step.time:.3g} s")
+
+    progress.show(0.0, "loading kernels (the first run compiles them)")
+    start = time.perf_counter()
+    try:
+        state = relax_to_rest(system, tolerance=options.tolerance, on_step=on_step)
+    finally:
+        progress.clear()
+    say(f"  at rest: relative out-of-balance force {state.residual:.1e}")
+    outcome = {
+        "kind": "at rest",
+        "relative_residual": state.residual,
+        "history": [vars(step) for step in state.history],
+    }
+    return outcome, {"steps": time.perf_counter() - start}, {"steps": len(state.history)}
+
+
+def _follow(
+    options: argparse.Namespace, system: System, say: Any, progress: Any
+) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
+    from warpbrain.simulation.dynamics import Simulator
+    from warpbrain.simulation.phase_clock import PhaseClock
+
+    simulator = Simulator(system)
+    simulator.prescribe(system.model.prescribed)
+    clock = PhaseClock(system.device)
+    say("", "motion        time [ms]     CG   min J   kinetic energy [mJ]", sep="\n")
+    every = max(1, options.steps // 10)
+    history = []
+    progress.show(0.0, "loading kernels (the first run compiles them)")
+    try:
+        for step in range(1, options.steps + 1):
+            simulator.timed_step(clock)
+            if step == 1:
+                simulator.prescribe(system.model.prescribed)
+            if step % every == 0 or step == options.steps:
+                min_J, kinetic = simulator.check(), simulator.kinetic_energy()
+                iterations = simulator.last_solve().iterations
+                history.append(
+                    {"time_s": simulator.time, "cg_iterations": iterations, "min_J": min_J, "kinetic_J": kinetic}
+                )
+                progress.clear()
+                say(
+                    f"            {1000 * simulator.time:>11.4g} {iterations:>6}   {min_J:>5.3f}   {1000 * kinetic:.4g}"
+                )
+            progress.show(step / options.steps, f"{1000 * simulator.time:.0f} ms")
+    finally:
+        progress.clear()
+    return {"kind": "motion", "time_s": simulator.time, "history": history}, clock.seconds, clock.counts
+
+
+def _subtitle(case: Case, outcome: Mapping[str, Any]) -> str:
+    laws = ", ".join(f"{t.name} {t.law.name} {t.law.shear_modulus:g} Pa" for _, t in sorted(case.tissues.items()))
+    state = f"after {1000 * outcome['time_s']:.0f} ms" if outcome["kind"] == "motion" else outcome["kind"]
+    stand_in = "stand-in, not the patient's images; " if case.origin == "stand-in" else ""
+    return f"{stand_in}{laws}; {state}"

@@ -1,0 +1,1 @@
+"""What the user reads: files and figures made from results. Computes nothing."""

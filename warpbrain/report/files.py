@@ -1,0 +1,66 @@
+"""The files of a run: the deformed body for ParaView and 3D Slicer, and everything that was printed, with units."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpbrain.atomic import whole_file
+from warpbrain.simulation.result import Result
+
+#: Millimetres of one metre: lengths are converted where they leave the program, and nowhere else.
+MILLIMETRES = 1000.0
+
+
+def write_result(path: Path, result: Result) -> None:
+    """Write a result as compressed VTU, coordinates and displacement in mm.
+
+    Point arrays: ``displacement`` [mm], ``reaction`` [N] and the node sets. Cell arrays: ``tissue``, ``J``,
+    ``principal_stretches`` (descending), ``von_mises`` and ``pressure`` [Pa] of the Cauchy stress.
+    """
+    import meshio
+
+    mesh = result.mesh
+    file = meshio.Mesh(
+        mesh.points * MILLIMETRES,
+        [("tetra", mesh.tetrahedra)],
+        point_data={
+            "displacement": result.u * MILLIMETRES,
+            "reaction": result.reactions,
+            **{name: members.astype(np.uint8) for name, members in mesh.node_sets.items()},
+        },
+        cell_data={
+            "tissue": [mesh.tissue],
+            "J": [result.J],
+            "principal_stretches": [result.principal_stretches],
+            "von_mises": [result.von_mises],
+            "pressure": [result.pressure],
+        },
+    )
+    with whole_file(path) as temporary:
+        meshio.write(temporary, file, file_format="vtu", binary=True, compression="zlib")
+
+
+def write_summary(path: Path, summary: dict[str, Any]) -> None:
+    """Write a summary as JSON; numbers that are not finite become null."""
+    text = json.dumps(_plain(summary), indent=2, allow_nan=False)
+    with whole_file(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    """Dictionaries, lists and Python numbers of what may hold NumPy's."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value

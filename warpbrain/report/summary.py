@@ -1,0 +1,146 @@
+"""What a run prints and writes as JSON: one dictionary, from which the printed tables are made too."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+from warpbrain import __version__
+from warpbrain.cases.case import Case
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.result import Result
+
+#: How the node sets are called where users read them.
+SET_TITLES = {
+    "all nodes": "all nodes",
+    "ventricle": "ventricles",
+    "resection": "cavity margin",
+    "surface": "outer surface",
+    "superior": "superior cap",
+    "fixed": "skull base (fixed)",
+}
+
+#: What no model of this version holds, said with every run. The locking figures: docs/verification.md.
+LEFT_OUT = (
+    "contact with the skull away from the nodes that are fixed; falx and tentorium; pressure of fluid in ventricles "
+    "and cavity; flow of fluid through tissue; viscosity other than damping; direction of fibres",
+    "near-incompressible tissue is stiffer on linear tetrahedra than it is: at nu = 0.45 Cook's membrane loses 6 % of "
+    "its displacement at 32 elements a side and 36 % at 8",
+)
+
+
+def machine() -> dict[str, str]:
+    """Versions and the machine, for a result that can be traced."""
+    packages = ("warp-lang", "numpy", "scipy", "meshio")
+    return {
+        "warpbrain": __version__,
+        **{name: version(name) for name in packages},
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+    }
+
+
+def describe_case(case: Case, model: Model) -> dict[str, Any]:
+    """Anatomy and assumptions of a case, with units."""
+    return {
+        "name": case.name,
+        "title": case.title,
+        "origin": case.origin,
+        "file": str(case.path),
+        "nodes": len(model.mesh.points),
+        "tetrahedra": len(model.mesh.tetrahedra),
+        "volume_cm3": 1e6 * model.mesh.volume,
+        "volume_before_resection_cm3": 1e6 * case.mesh.volume,
+        "mass_kg": model.mass,
+        "density_kg_per_m3": model.density,
+        "poisson": case.poisson,
+        "tissues": {
+            str(label): {
+                "name": tissue.name,
+                "law": tissue.law.name,
+                "formulation": tissue.formulation,
+                "parameters": vars(tissue.law),
+                "shear_modulus_Pa": tissue.law.shear_modulus,
+            }
+            for label, tissue in sorted(case.tissues.items())
+        },
+        "assumptions": list(case.assumptions),
+        "left_out": list(LEFT_OUT),
+    }
+
+
+def describe_result(result: Result) -> dict[str, Any]:
+    """Displacements by node set and extremes of strain and stress, with units."""
+    return {
+        "displacement_mm": {
+            name: {
+                "nodes": s.nodes,
+                "mean": 1000.0 * s.mean,
+                "root_mean_square": 1000.0 * s.root_mean_square,
+                "percentile_95": 1000.0 * s.percentile_95,
+                "largest": 1000.0 * s.largest,
+            }
+            for name, s in result.displacement_statistics().items()
+        },
+        "volume_ratio_J": {"smallest": result.J.min(), "largest": result.J.max()},
+        "principal_stretch": {
+            "smallest": result.principal_stretches.min(),
+            "largest": result.principal_stretches.max(),
+        },
+        "von_mises_Pa": {"largest": result.von_mises.max()},
+        "pressure_Pa": {"smallest": result.pressure.min(), "largest": result.pressure.max()},
+        "reaction_N": result.reactions.sum(axis=0),
+    }
+
+
+def case_lines(summary: Mapping[str, Any]) -> list[str]:
+    """The anatomy and its assumptions, as printed."""
+    lines = [summary["title"]]
+    if summary["origin"] == "stand-in":
+        lines.append(
+            "  a stand-in: the MNI anatomy deformed and scaled to the paper's volume, not the patient's images"
+        )
+    lines.append(
+        f"  mesh      {summary['nodes']} nodes, {summary['tetrahedra']} tetrahedra, "
+        f"{summary['volume_cm3']:.1f} cm3, {summary['mass_kg']:.4f} kg"
+        + (
+            f" (before resection {summary['volume_before_resection_cm3']:.1f} cm3)"
+            if summary["volume_before_resection_cm3"] - summary["volume_cm3"] > 1e-6
+            else ""
+        )
+    )
+    for label, tissue in summary["tissues"].items():
+        lines.append(
+            f"  tissue {label}  {tissue['name']}: {tissue['law']} ({tissue['formulation']}), "
+            f"mu = {tissue['shear_modulus_Pa']:g} Pa, nu = {summary['poisson']:g}"
+        )
+    lines += [f"  assumed   {sentence}" for sentence in summary["assumptions"]]
+    lines += [f"  left out  {sentence}" for sentence in summary["left_out"]]
+    return lines
+
+
+def displacement_lines(summary: Mapping[str, Any]) -> list[str]:
+    """The table of displacements, as printed."""
+    lines = ["displacement [mm]        nodes     mean      RMS      95 %      max"]
+    for name, s in summary["displacement_mm"].items():
+        lines.append(
+            f"  {SET_TITLES.get(name, name):<20} {s['nodes']:>7} {s['mean']:>8.3f} {s['root_mean_square']:>8.3f} "
+            f"{s['percentile_95']:>9.3f} {s['largest']:>8.3f}"
+        )
+    J = summary["volume_ratio_J"]
+    lines.append(
+        f"  volume ratio J {J['smallest']:.3f} to {J['largest']:.3f}; largest von Mises stress "
+        f"{summary['von_mises_Pa']['largest']:.0f} Pa"
+    )
+    return lines
+
+
+def timing_lines(phases: Mapping[str, float], counts: Mapping[str, int]) -> list[str]:
+    """The table of wall times by phase, as printed."""
+    lines = ["time [ms]                 calls      each     total"]
+    for name, seconds in phases.items():
+        calls = counts.get(name, 1)
+        lines.append(f"  {name:<22} {calls:>6} {1000.0 * seconds / calls:>9.2f} {1000.0 * seconds:>9.1f}")
+    return lines
