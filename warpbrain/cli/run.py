@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from warpbrain.simulation.system import System
 
 
+#: Newton iterations that are printed one by one.
+_LONG_HISTORY = 16
+
+
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
@@ -192,12 +196,20 @@ def _balance(
 
     say("", "equilibrium   load   Newton   residual    CG   step   min J", sep="\n")
 
+    taken: list[NewtonStep] = []
+
     def on_step(step: NewtonStep) -> None:
-        progress.clear()
-        say(
-            f"            {100 * step.load:>5.1f} % {step.iteration:>6}   {step.residual:>8.1e} {step.cg_iterations:>5}"
-            f"  {step.step:>5.3g}   {step.min_J:>5.3f}"
-        )
+        taken.append(step)
+        # a long way is told by its load steps, not by every iteration
+        if len(taken) <= _LONG_HISTORY or step.iteration == 1:
+            progress.clear()
+            say(
+                f"            {100 * step.load:>5.1f} % {step.iteration:>6}   {step.residual:>8.1e} "
+                f"{step.cg_iterations:>5}  {step.step:>5.3g}   {step.min_J:>5.3f}"
+                + ("   indefinite tangent" if step.indefinite else "")
+            )
+        if len(taken) == _LONG_HISTORY:
+            say("            (from here on, the first iteration of each load step)")
         progress.show(step.load, f"Newton {step.iteration}")
 
     progress.show(0.0, "loading kernels (the first run compiles them)")
@@ -207,10 +219,16 @@ def _balance(
     finally:
         progress.clear()
     say(f"  converged: relative out-of-balance force {state.residual:.1e}, stored energy {1000 * state.energy:.4g} mJ")
+    if state.unstable_iterations:
+        say(
+            f"  note: the tangent was indefinite in {state.unstable_iterations} iterations; this may be another "
+            "equilibrium than the one that a slowly growing load reaches first"
+        )
     outcome = {
         "kind": "equilibrium",
         "relative_residual": state.residual,
         "stored_energy_J": state.energy,
+        "iterations_with_indefinite_tangent": state.unstable_iterations,
         "history": [vars(step) for step in state.history],
     }
     return outcome, solver.clock.seconds, solver.clock.counts

@@ -39,6 +39,8 @@ class NewtonStep:
         Length of the accepted step, 1 for a full one.
     min_J : float
         Smallest volume ratio after the step.
+    indefinite : bool
+        The tangent was not positive definite, and a multiple of the mass was added to it until it was.
     """
 
     load: float
@@ -47,6 +49,7 @@ class NewtonStep:
     cg_iterations: int
     step: float
     min_J: float
+    indefinite: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,8 @@ class EquilibriumOptions:
         all nodal forces, reactions included.
     max_newton : int
         Iterations in a load step before it is cut.
+    max_total_newton : int
+        Iterations in all before the solve gives up.
     min_load_step : float
         Smallest load step before the solve gives up.
     cg_tolerance : float
@@ -68,14 +73,20 @@ class EquilibriumOptions:
         Iterations of a linear solve.
     preconditioner : str
         See `warpbrain.kernels.linear.PRECONDITIONERS`.
+    pass_unstable : bool
+        What to do where the tangent is indefinite, at limit and branching points of the equilibrium path. True: go on
+        downhill to the next stable equilibrium, as the damped body would (snap-through), and say so in the history.
+        False: end there with an error that names it.
     """
 
     tolerance: float = 1e-8
-    max_newton: int = 25
+    max_newton: int = 30
+    max_total_newton: int = 150
     min_load_step: float = 1.0 / 1024.0
     cg_tolerance: float = 0.03
     max_cg: int = 10_000
     preconditioner: str = "block-jacobi"
+    pass_unstable: bool = True
 
     def __post_init__(self) -> None:
         for name in ("tolerance", "min_load_step", "cg_tolerance"):
@@ -106,6 +117,11 @@ class Equilibrium:
     energy: float
     residual: float
     history: tuple[NewtonStep, ...]
+
+    @property
+    def unstable_iterations(self) -> int:
+        """Newton iterations with an indefinite tangent: not 0 if the path passed unstable states."""
+        return sum(step.indefinite for step in self.history)
 
 
 class _StepFailed(Exception):
@@ -138,13 +154,15 @@ class EquilibriumSolver:
         self.options = options or EquilibriumOptions()
         self._on_step = on_step
         self.clock = PhaseClock(system.device)
+        self._reference_shift: float | None = None
         self._history: list[NewtonStep] = []
         self._free = 1.0 - system.model.constrained
         # residuals cannot fall below the rounding of the sums of element forces
         self.tolerance = max(self.options.tolerance, 50.0 * system.precision.epsilon)
-        # force of the order of rounding, so that a body without any load is in equilibrium
-        stiffest = max(material.law.shear_modulus for material in system.model.materials.values())
+        # force and energy of the order of rounding, so that a body without any load is in equilibrium
+        stiffest = max(m.law.shear_modulus + m.volumetric_modulus for m in system.model.materials.values())
         self._noise = system.precision.epsilon * stiffest * system.model.mesh.volume ** (2.0 / 3.0)
+        self._energy_noise = system.precision.epsilon * stiffest * system.model.mesh.volume
 
     def solve(self, external: Floats | None = None, start: Floats | None = None) -> Equilibrium:
         """Go from a start (rest by default) to equilibrium at full load.
@@ -178,14 +196,26 @@ class EquilibriumSolver:
                 reached, energy, residual = self._newton(u, load, load * full, target)
             except _StepFailed as failure:
                 step *= 0.5
-                if step < self.options.min_load_step:
-                    raise SolveError(
-                        f"no equilibrium found beyond {100.0 * done:.3g} % of the load "
-                        f"(load step cut to {100.0 * step:.2g} %): {failure}"
-                    ) from None
+                exhausted = len(self._history) >= self.options.max_total_newton
+                if exhausted or step < self.options.min_load_step:
+                    raise SolveError(self._no_equilibrium(done, step, str(failure))) from None
                 continue
             u, done, step = reached, load, 2.0 * step
         return Equilibrium(u, self.system.internal.numpy().astype(np.float64), energy, residual, tuple(self._history))
+
+    def _no_equilibrium(self, done: float, step: float, why: str) -> str:
+        """The last word on a load that found no equilibrium."""
+        text = (
+            f"no equilibrium found beyond {100.0 * done:.3g} % of the load, after {len(self._history)} Newton "
+            f"iterations and load steps down to {100.0 * step:.2g} %: {why}"
+        )
+        unstable = sum(record.indefinite for record in self._history)
+        if unstable:
+            text += (
+                f". The tangent stiffness was indefinite in {unstable} iterations: under this load the body passes "
+                "unstable states, as when part of it collapses"
+            )
+        return text
 
     def _newton(self, start: Floats, load: float, external: Floats, target: Floats) -> tuple[Floats, float, float]:
         """Newton's method at one load; returns displacement, stored energy and relative residual."""
@@ -194,6 +224,7 @@ class EquilibriumSolver:
         potential, _ = self._potential(u, external)
         previous = np.inf
         forcing = options.cg_tolerance
+        shift = 0.0
         for iteration in range(1, options.max_newton + 1):
             with self.clock.phase("internal forces"):
                 system.u.assign(u)
@@ -203,7 +234,8 @@ class EquilibriumSolver:
             r = self._free * (external - internal)
             scale = float(np.linalg.norm(internal) + np.linalg.norm(external))
             norm = float(np.linalg.norm(r))
-            relative = norm / (scale + self._noise)
+            # converged when norm <= tolerance * scale + noise
+            relative = norm / (scale + self._noise / self.tolerance)
             prescribed = np.where(system.model.constrained, target - u, 0.0)
             moving = bool(np.any(prescribed))
             if not np.isfinite(norm):
@@ -218,10 +250,17 @@ class EquilibriumSolver:
                 eta = min(options.cg_tolerance, max(0.9 * ratio**2, 0.9 * forcing**2 if forcing**2 > 0.1 else 0.0))
                 eta = max(eta, 0.3 * self.tolerance / relative, 20.0 * system.precision.epsilon)
             forcing, previous = eta, np.inf if moving else norm
-            d, linear = self._direction(r, prescribed, moving, min(eta, 0.5))
+            if len(self._history) >= options.max_total_newton:
+                raise _StepFailed(
+                    f"not in balance yet (relative residual {relative:.1e}, goal {self.tolerance:.1e})"
+                    f"{self._worst_element()}"
+                )
+            d, linear, shift = self._descent(r, prescribed, moving, min(eta, 0.5), shift)
             with self.clock.phase("line search"):
                 alpha, u, potential, min_J = self._line_search(u, d, r, external, potential, moving)
-            record = NewtonStep(load, iteration, relative, linear.iterations, alpha, min_J)
+            record = NewtonStep(load, iteration, relative, linear.iterations, alpha, min_J, shift > 0.0)
+            # try the tangent itself again soon: only that converges quadratically
+            shift = 0.1 * shift if shift > self._least_shift() else 0.0
             self._history.append(record)
             if self._on_step is not None:
                 self._on_step(record)
@@ -230,10 +269,46 @@ class EquilibriumSolver:
             f"(relative residual {relative:.1e}, goal {self.tolerance:.1e})"
         )
 
-    def _direction(self, r: Floats, prescribed: Floats, moving: bool, eta: float) -> tuple[Floats, LinearResult]:
+    def _least_shift(self) -> float:
+        """A multiple of the mass that is just felt beside the tangent: 0.1 % of its mean diagonal [1/s2]."""
+        if self._reference_shift is None:
+            diagonal = self.system.matrix.values.numpy()[self.system.diagonal.numpy()]
+            stiffness = float(np.mean(np.trace(diagonal, axis1=1, axis2=2))) / 3.0
+            self._reference_shift = 1e-3 * abs(stiffness) / float(np.mean(self.system.model.node_masses))
+        return self._reference_shift
+
+    def _descent(
+        self, r: Floats, prescribed: Floats, moving: bool, eta: float, shift: float
+    ) -> tuple[Floats, LinearResult, float]:
+        """Newton's direction, with as much of the mass added to the tangent as makes it positive definite."""
+        while True:
+            d, linear = self._direction(r, prescribed, moving, eta, shift)
+            if not linear.indefinite:
+                break
+            unstable = (
+                f"the tangent stiffness is indefinite (curvature {linear.curvature:.2e} N/m along a search direction): "
+                f"the equilibrium path turns or branches here{self._worst_element()}"
+            )
+            if not self.options.pass_unstable or shift > 1e6 * self._least_shift():
+                raise _StepFailed(unstable)
+            shift = max(10.0 * shift, self._least_shift())
+        if not np.all(np.isfinite(d)):
+            where = self._worst_element()
+            raise _StepFailed(f"conjugate gradients broke down after {linear.iterations} iterations{where}")
+        if not linear.converged:
+            raise _StepFailed(
+                f"conjugate gradients did not converge in {linear.iterations} iterations "
+                f"(residual {linear.residual:.1e}, goal {linear.tolerance:.1e})"
+            )
+        return d, linear, shift
+
+    def _direction(
+        self, r: Floats, prescribed: Floats, moving: bool, eta: float, shift: float
+    ) -> tuple[Floats, LinearResult]:
+        """Solve `(K + shift M) d = r`, with prescribed increments."""
         system = self.system
         with self.clock.phase("assemble system"):
-            system.assemble(k=1.0, m=0.0)
+            system.assemble(k=1.0, m=shift)
             system.load.assign(r)
             if moving:
                 system.increment.assign(prescribed)
@@ -254,22 +329,7 @@ class EquilibriumSolver:
             cg.prepare()
             cg.solve()
         linear = cg.result()
-        d = system.solution.numpy().astype(np.float64) * self._free + prescribed
-        if linear.indefinite:
-            raise _StepFailed(
-                f"the tangent stiffness is indefinite (curvature {linear.curvature:.2e} N/m along a search direction): "
-                f"the equilibrium path turns or branches here{self._worst_element()}"
-            )
-        if not np.all(np.isfinite(d)):
-            raise _StepFailed(
-                f"conjugate gradients broke down after {linear.iterations} iterations{self._worst_element()}"
-            )
-        if not linear.converged:
-            raise _StepFailed(
-                f"conjugate gradients did not converge in {linear.iterations} iterations "
-                f"(residual {linear.residual:.1e}, goal {linear.tolerance:.1e})"
-            )
-        return d, linear
+        return system.solution.numpy().astype(np.float64) * self._free + prescribed, linear
 
     def _potential(self, u: Floats, external: Floats) -> tuple[float, float]:
         self.system.u.assign(u)
@@ -282,6 +342,7 @@ class EquilibriumSolver:
         slope = -float(np.vdot(r, d))
         # below this a change of the potential is rounding
         noise = 100.0 * self.system.precision.epsilon * (abs(potential) + float(np.sum(np.abs(external * u))))
+        noise += self._energy_noise
         if not moving and slope > noise:
             raise _StepFailed("Newton's direction does not descend: the tangent stiffness is not positive definite")
         alpha = 1.0
