@@ -40,7 +40,7 @@ def test_arrays_are_copied_and_cannot_be_written():
     mesh = TetMesh(points, [[0, 1, 2, 3]])
     points[0] = 9
     assert mesh.points[0].tolist() == [0, 0, 0]
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="read-only"):
         mesh.points[0] = 9
 
 

@@ -281,8 +281,6 @@ def _follow(
     try:
         for step in range(1, options.steps + 1):
             simulator.timed_step(clock)
-            if step == 1:
-                simulator.prescribe(system.model.prescribed)
             if step % every == 0 or step == options.steps:
                 min_J, kinetic = simulator.check(), simulator.kinetic_energy()
                 iterations = simulator.last_solve().iterations

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import numpy as np
 import warp as wp
 import warp._src.optim.linear as warp_linear_internals
 import warp.optim.linear as warp_linear
@@ -52,10 +53,12 @@ class LinearResult:
 
     @property
     def converged(self) -> bool:
+        """The residual reached its goal (False if it is not a number)."""
         return self.residual <= self.tolerance
 
     @property
     def indefinite(self) -> bool:
+        """The matrix is known not to be positive definite."""
         return self.curvature <= 0.0
 
 
@@ -244,6 +247,7 @@ class ConjugateGradient:
         self._partial = wp.zeros((chunks, 2), dtype=precision.scalar, device=self._device)
         self._watch = watch_curvature
         self._fsai: Any = None
+        self._refused: float | None = None
         self._views: dict[int, wp.array] = {}
         batch = wp.array([0, 3 * self._size], dtype=int, device=self._device) if self._device.is_cpu else None
         shape = (3 * self._size, 3 * self._size)
@@ -335,16 +339,23 @@ class ConjugateGradient:
                 device=self._device,
             )
         elif self._kind == "fsai":
-            if self._fsai is None:
-                self._fsai = warp_linear.FSAI(self._matrix, reuse_pattern=True)
-            else:
+            if self._fsai is not None:
                 self._fsai.update(self._matrix)
+                return
+            try:
+                self._fsai = warp_linear.FSAI(self._matrix, reuse_pattern=True)
+            except ValueError:
+                # it refuses a diagonal that is not positive, which no positive definite matrix has
+                blocks = self._matrix.values.numpy()[self._diagonal.numpy()]
+                self._refused = float(np.min(np.diagonal(blocks, axis1=1, axis2=2)))
 
     def solve(self) -> None:
         """Run CG from the present content of the solution array.
 
         Within the capture of a graph this only records; otherwise it replays a graph of its own.
         """
+        if self._refused is not None:
+            return
         if self._device.is_capturing:
             self._record()
             return
@@ -365,6 +376,8 @@ class ConjugateGradient:
 
     def result(self) -> LinearResult:
         """How the last solve ended (waits for the device)."""
+        if self._refused is not None:
+            return LinearResult(0, float("nan"), 0.0, self._refused)
         if self._outcome is None:
             raise RuntimeError("no solve has been run")
         iterations, residual, tolerance = (float(values.numpy().ravel()[0]) for values in self._outcome)

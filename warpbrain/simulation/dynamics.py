@@ -87,14 +87,16 @@ class Simulator:
             preconditioner=preconditioner,
         )
         self._graph: object = None
+        self._graph_moves = False
         self._external_factor: tuple[float, ...] | None = None
         self.apply_loads()
 
     def set_time_step(self, time_step: float) -> None:
-        """Change `h` [s]; a captured graph keeps the step that it was captured with."""
+        """Change `h` [s]; a captured graph is dropped with the step that it was captured for."""
         if not (np.isfinite(time_step) and time_step > 0.0):
             raise InputError(f"time step = {time_step} s: expected a positive number")
         self._h = time_step
+        self._graph = None
 
     # -- what acts ------------------------------------------------------------------------------------------------
 
@@ -106,7 +108,7 @@ class Simulator:
             self._external_factor = factors
 
     def prescribe(self, displacement: NDArray[np.float64]) -> None:
-        """Move the constrained components to a displacement [m], shape (n, 3), within the coming step."""
+        """Move the constrained components to a displacement [m], shape (n, 3), in the coming step; then they rest."""
         velocity = (displacement - self.system.u.numpy()) / self._h
         velocity[~self.system.model.constrained] = 0.0
         self._v_prescribed.assign(velocity)
@@ -169,6 +171,12 @@ class Simulator:
         wp.copy(self._v_start, self.v)
         wp.copy(self._u_start, self.system.u)
 
+    def _finish(self) -> None:
+        self.time += self._h
+        if self._moving:
+            self._v_prescribed.zero_()
+            self._moving = False
+
     def _run_phases(self) -> None:
         self._begin()
         for iteration in range(self.newton):
@@ -180,11 +188,11 @@ class Simulator:
     def step(self) -> None:
         """Advance by one time step."""
         self.apply_loads()
-        if self._graph is None:
-            self._run_phases()
-        else:
+        if self._graph is not None and self._graph_moves == self._moving:
             wp.capture_launch(self._graph)
-        self.time += self._h
+        else:
+            self._run_phases()
+        self._finish()
 
     def timed_step(self, clock: PhaseClock) -> None:
         """Advance by one time step with the clock stopped between phases; slower than `step`."""
@@ -199,10 +207,11 @@ class Simulator:
                 self.solve_system()
             with clock.phase(PHASES[3]):
                 self.integrate()
-        self.time += self._h
+        self._finish()
 
     def capture(self) -> None:
         """Capture a step in a graph that later steps replay: one launch from the host instead of hundreds."""
+        self._graph_moves = self._moving
         # a step outside the capture loads every module
         u, v = wp.clone(self.system.u), wp.clone(self.v)
         self._run_phases()

@@ -7,7 +7,7 @@ Each law is written for the incompressible case by supplement eq. (2) of the pap
 - ``"uncoupled"``: `Psi = w(l1', l2', l3') + K/2 (J - 1)^2` with `l' = J^(-1/3) l` and
   `K = 2 mu0 (1 + nu) / (3 (1 - 2 nu))`.
 
-At rest both have the shear modulus `mu0` and the Poisson ratio `nu`.
+At rest both have the shear modulus `mu0` and the Poisson ratio `nu` (Mooney-Rivlin corrects `lam` for that, see there).
 """
 
 from __future__ import annotations

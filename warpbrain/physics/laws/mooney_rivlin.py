@@ -3,7 +3,8 @@
     coupled    Psi = C1 (I1 - 3) + C2 (I2 - 3) - (2 C1 + 4 C2) ln J + lam/2 (ln J)^2
     uncoupled  Psi = C1 (J^(-2/3) I1 - 3) + C2 (J^(-4/3) I2 - 3) + K/2 (J - 1)^2
 
-`I2 = (I1^2 - C : C) / 2`; the supplement's eq. (1) writes `C : C`.
+`I2 = (I1^2 - C : C) / 2`; the supplement's eq. (1) writes `C : C`. At rest `d2I2` adds `4 C2` to the first Lame modulus
+of the coupled form, so its `lam` is that much smaller than `2 mu0 nu / (1 - 2 nu)`: the Poisson ratio is the one given.
 """
 
 from dataclasses import dataclass
@@ -112,6 +113,10 @@ class MooneyRivlin(Law):
         I1 = np.sum(squares, axis=-1)
         I2 = squares[..., 0] * squares[..., 1] + squares[..., 1] * squares[..., 2] + squares[..., 2] * squares[..., 0]
         return self.C1 * (I1 - 3.0) + self.C2 * (I2 - 3.0)
+
+    def volumetric_modulus(self, poisson: float, formulation: str) -> float:
+        modulus = super().volumetric_modulus(poisson, formulation)
+        return modulus - 4.0 * self.C2 if formulation == "coupled" else modulus
 
     @classmethod
     def device_law(cls, formulation: str) -> InvariantLaw:
