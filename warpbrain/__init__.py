@@ -1,3 +1,102 @@
-"""Simulates the deformation of the brain, on CPU and GPU from one source, and says what it left out."""
+"""Simulates the deformation of the brain, on CPU and GPU from one source, and says what it left out.
+
+The public names are listed here once. They are imported when they are first used, so that `import warpbrain` itself
+loads nothing heavy.
+
+Examples
+--------
+>>> import warpbrain
+>>> model, _ = warpbrain.find_case("0529").build()
+>>> model.mesh.volume < 1.1654e-3  # the resected tissue is gone
+True
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "errors": ("InputError", "SolveError"),
+    "mesh": ("MeshError", "TetMesh", "read_mesh", "write_mesh"),
+    "physics.laws": ("Law", "MooneyRivlin", "NeoHookean", "Ogden"),
+    "physics.laws.stability": ("require_stable",),
+    "physics.force": ("NodalForce",),
+    "physics.gravity": ("Gravity",),
+    "physics.resection": ("Resection",),
+    "simulation.model": ("Damping", "Material", "Model"),
+    "simulation.system": ("System",),
+    "simulation.equilibrium": ("Equilibrium", "EquilibriumOptions", "EquilibriumSolver", "solve_equilibrium"),
+    "simulation.dynamics": ("Simulator",),
+    "simulation.relaxation": ("relax_to_rest",),
+    "simulation.result": ("Result", "result_of"),
+    "cases.case": ("Case",),
+    "cases.reading": ("read_case",),
+    "cases.shipped": ("find_case",),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "Case",
+    "Damping",
+    "Equilibrium",
+    "EquilibriumOptions",
+    "EquilibriumSolver",
+    "Gravity",
+    "InputError",
+    "Law",
+    "Material",
+    "MeshError",
+    "Model",
+    "MooneyRivlin",
+    "NeoHookean",
+    "NodalForce",
+    "Ogden",
+    "Resection",
+    "Result",
+    "Simulator",
+    "SolveError",
+    "System",
+    "TetMesh",
+    "find_case",
+    "read_case",
+    "read_mesh",
+    "relax_to_rest",
+    "require_stable",
+    "result_of",
+    "solve_equilibrium",
+    "write_mesh",
+]
+
+if TYPE_CHECKING:
+    from warpbrain.cases.case import Case
+    from warpbrain.cases.reading import read_case
+    from warpbrain.cases.shipped import find_case
+    from warpbrain.errors import InputError, SolveError
+    from warpbrain.mesh import MeshError, TetMesh, read_mesh, write_mesh
+    from warpbrain.physics.force import NodalForce
+    from warpbrain.physics.gravity import Gravity
+    from warpbrain.physics.laws import Law, MooneyRivlin, NeoHookean, Ogden
+    from warpbrain.physics.laws.stability import require_stable
+    from warpbrain.physics.resection import Resection
+    from warpbrain.simulation.dynamics import Simulator
+    from warpbrain.simulation.equilibrium import (
+        Equilibrium,
+        EquilibriumOptions,
+        EquilibriumSolver,
+        solve_equilibrium,
+    )
+    from warpbrain.simulation.model import Damping, Material, Model
+    from warpbrain.simulation.relaxation import relax_to_rest
+    from warpbrain.simulation.result import Result, result_of
+    from warpbrain.simulation.system import System
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'warpbrain' has no attribute '{name}'")
+    return getattr(import_module(f"warpbrain.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
