@@ -67,8 +67,8 @@ report(
     setup=setup,
     first_assembly=first,
     assembly=assembly,
-    solve=min(solves[1:]),
-    first_solve=solves[0],
+    solve=solves[0],
+    solve_again=min(solves[1:]),
     newton=len(state.history),
     reaction_error=abs(reaction / REACTION - 1.0),
 )

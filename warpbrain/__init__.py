@@ -6,7 +6,7 @@ loads nothing heavy.
 Examples
 --------
 >>> import warpbrain
->>> model, _ = warpbrain.find_case("0529").build()
+>>> model, _ = warpbrain.model_of(warpbrain.find_case("0529"))
 >>> model.mesh.volume < 1.1654e-3  # the resected tissue is gone
 True
 """
@@ -25,6 +25,7 @@ _HOMES = {
     "physics.gravity": ("Gravity",),
     "physics.resection": ("Resection",),
     "simulation.model": ("Damping", "Material", "Model"),
+    "simulation.of_case": ("model_of",),
     "simulation.system": ("System",),
     "simulation.equilibrium": ("Equilibrium", "EquilibriumOptions", "EquilibriumSolver", "solve_equilibrium"),
     "simulation.dynamics": ("Simulator",),
@@ -59,6 +60,7 @@ __all__ = [
     "System",
     "TetMesh",
     "find_case",
+    "model_of",
     "read_case",
     "read_mesh",
     "relax_to_rest",
@@ -87,6 +89,7 @@ if TYPE_CHECKING:
         solve_equilibrium,
     )
     from warpbrain.simulation.model import Damping, Material, Model
+    from warpbrain.simulation.of_case import model_of
     from warpbrain.simulation.relaxation import relax_to_rest
     from warpbrain.simulation.result import Result, result_of
     from warpbrain.simulation.system import System

@@ -25,6 +25,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     InputError
         If the folder cannot be written to.
     """
+    check_writable(path)
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
     except OSError as error:
@@ -44,6 +45,16 @@ def whole_file(path: Path) -> Iterator[Path]:
         _unfinished.discard(temporary)
 
 
+def check_writable(path: Path) -> None:
+    """`InputError` if a file cannot be written there: to know it before long work, not after."""
+    if path.is_dir():
+        raise InputError(f"{path}: cannot be written: there is a folder of that name")
+    if not path.parent.is_dir():
+        raise InputError(f"{path.parent}: cannot be written to: no such folder")
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise InputError(f"{path.parent}: cannot be written to")
+
+
 def remove_unfinished() -> None:
     """Remove what is half-written, before the process is ended from outside the block that writes it."""
     for temporary in list(_unfinished):
@@ -56,4 +67,7 @@ def output_folder(path: Path) -> Path:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{path}: cannot be made a folder for output: {error.strerror}") from None
+    # known now, not only when there is something to write
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: cannot be written to")
     return path

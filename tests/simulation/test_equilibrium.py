@@ -1,6 +1,7 @@
 """Static equilibrium: convergence, load steps, mixtures of tissues, and how a failure is told."""
 
 import re
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -9,14 +10,14 @@ from material_point import LAWS, MATERIALS, stress_at
 from scipy.optimize import brentq, minimize_scalar
 from shapes import box, cube, distorted
 
-from warpbrain.errors import SolveError
+from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.gravity import Gravity
 from warpbrain.physics.laws import NeoHookean, Ogden
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, NewtonStep, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
-from warpbrain.simulation.relaxation import relax_to_rest
+from warpbrain.simulation.relaxation import RelaxationOptions, relax_to_rest
 from warpbrain.simulation.system import System
 
 BRAIN = Material(LAWS["neo-hookean"])
@@ -144,7 +145,7 @@ def test_single_agrees_with_double(material: Material, device: str) -> None:
 def test_relaxation_finds_the_same(name: str, device: str) -> None:
     model = pushed(MATERIALS[name], -1.0)
     expected = solve_equilibrium(System(model, device), EquilibriumOptions(tolerance=1e-10))
-    found = relax_to_rest(System(model, device), tolerance=1e-9)
+    found = relax_to_rest(System(model, device), RelaxationOptions(tolerance=1e-9))
     assert np.abs(found.u - expected.u).max() <= 1e-6 * np.abs(expected.u).max()
     assert all(step.min_J > 0.0 for step in found.history)
 
@@ -152,8 +153,29 @@ def test_relaxation_finds_the_same(name: str, device: str) -> None:
 def test_relaxation_with_a_moved_boundary(device: str) -> None:
     model = stretched(BRAIN, 0.2, n=3)
     expected = solve_equilibrium(System(model, device), EquilibriumOptions(tolerance=1e-10))
-    found = relax_to_rest(System(model, device), tolerance=1e-9, time_step=0.01)
+    found = relax_to_rest(System(model, device), RelaxationOptions(tolerance=1e-9, time_step=0.01))
     assert np.abs(found.u - expected.u).max() <= 1e-6 * 0.2
+
+
+def test_relaxation_recovers_from_a_step_that_inverts_elements(device: str) -> None:
+    """Pressed by 30 %, in one step the elements of the top layer turn inside out: the displacement is then shared."""
+    model = stretched(BRAIN, -0.3, n=5)
+    expected = solve_equilibrium(System(model, device), EquilibriumOptions(tolerance=1e-10))
+    found = relax_to_rest(System(model, device), RelaxationOptions(tolerance=1e-9))
+    assert np.abs(found.u - expected.u).max() <= 1e-6 * 0.3
+
+
+@pytest.mark.parametrize("solve", [solve_equilibrium, relax_to_rest])
+@pytest.mark.parametrize("held", ["nothing", "one node", "one component"])
+def test_a_body_that_is_not_held(held: str, solve: Callable[[System], object]) -> None:
+    mesh = cube(2)
+    constrained = np.zeros(mesh.points.shape, dtype=bool)
+    if held == "one node":
+        constrained[0] = True
+    elif held == "one component":
+        constrained[:, 2] = mesh.points[:, 2] < 1e-12
+    with pytest.raises(InputError, match="not held"):
+        solve(System(model_of(mesh, BRAIN, constrained=constrained), "cpu"))
 
 
 # -- several tissues ----------------------------------------------------------------------------------------------

@@ -5,16 +5,16 @@ from __future__ import annotations
 import argparse
 import json
 import statistics
-import sys
 from pathlib import Path
 from typing import Any
 
-from warpbrain.errors import InputError, SolveError
+from warpbrain.errors import InputError
+from warpbrain.terminal.command import OneLineParser, exit_status
 
 
 def main() -> int:
     """Parse, measure, print; returns the exit status."""
-    parser = argparse.ArgumentParser(
+    parser = OneLineParser(
         prog="python -m warpbrain.bench",
         description="Times each phase of a step on the phantom's meshes beside the paper's Table 3.",
     )
@@ -27,18 +27,8 @@ def main() -> int:
     add("--precision", choices=("double", "single"), default="double", help="default: double")
     add("--json", type=Path, metavar="FILE", help="write every sample")
     options = parser.parse_args()
-    try:
-        _bench(options)
-    except InputError as error:
-        print(f"warpbrain.bench: error: {error}", file=sys.stderr)
-        return 2
-    except SolveError as error:
-        print(f"warpbrain.bench: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("\nwarpbrain.bench: interrupted", file=sys.stderr)
-        return 130
-    return 0
+
+    return exit_status(parser.prog, lambda: _bench(options))
 
 
 def _bench(options: argparse.Namespace) -> None:
@@ -48,29 +38,34 @@ def _bench(options: argparse.Namespace) -> None:
     if not 0.0 < options.tol < 1.0:
         raise InputError(f"--tol {options.tol:g}: expected a number between 0 and 1")
 
-    from warpbrain.atomic import whole_file
+    from warpbrain.atomic import check_writable, whole_file
     from warpbrain.bench.measure import RESTART, measure_row
     from warpbrain.bench.table3 import TABLE3
-    from warpbrain.cli.progress import Progress
-    from warpbrain.cli.quiet import start_warp_quietly
     from warpbrain.report.summary import machine
-    from warpbrain.simulation.system import find_device
+    from warpbrain.simulation.dynamics import finest_tolerance
+    from warpbrain.simulation.system import find_device, find_precision
+    from warpbrain.terminal.progress import Progress
+    from warpbrain.terminal.quiet import start_warp_quietly
 
-    wp = start_warp_quietly()
-    names = options.rows.split(",") if options.rows else list(TABLE3)
+    if options.json is not None:
+        check_writable(options.json)
+    names = list(TABLE3) if options.rows is None else options.rows.split(",")
     for name in names:
         if name not in TABLE3:
             raise InputError(f"--rows {name}: expected some of {', '.join(TABLE3)}")
+    wp = start_warp_quietly()
     devices = [d.alias for d in wp.get_devices()] if options.device == "all" else [find_device(options.device).alias]
     versions = machine()
     results = []
     for alias in devices:
         device = wp.get_device(alias)
+        tolerance = finest_tolerance(options.tol, find_precision(options.precision))
         print(
-            f"{device.name} ({alias}), {options.precision} precision, CG to {options.tol:g}, h = 1 ms, "
+            f"{device.name} ({alias}), {options.precision} precision, CG to {tolerance:.2g}, h = 1 ms, "
             f"from rest again every {RESTART} steps; warpbrain {versions['warpbrain']}, Warp {versions['warp-lang']}"
         )
-        print(f"mean (sd) ms of {options.steps} steps after {options.warmup}; 'paper' and 'x faster' from its Table 3")
+        print(f"mean (sd) ms of {options.steps} steps after {options.warmup}; 'paper' and 'x faster' from its Table 3;")
+        print("each linear solve starts from the change of velocity of the step before")
         progress = Progress("bench")
         for number, name in enumerate(names):
             progress.show(number / len(names), f"{name} on {alias}")
@@ -102,6 +97,10 @@ def _lines(measured: Any) -> list[str]:
         return f"  {label:<28}{f'{mean:.3f} ({sd:.3f})':>18}{theirs:>18}{paper[0] / mean:>10.1f}"
 
     lines.append(line("pre-processing", measured.preprocessing, (row.preprocessing, None)))
+    captured = statistics.fmean(measured.capture)
+    lines.append(
+        f"  {'capture of a step, once':<28}{f'{captured:.3f} ({statistics.pstdev(measured.capture):.3f})':>18}"
+    )
     lines += [line(name, samples, row.phases[name]) for name, samples in measured.phases.items()]
     lines.append(line("step without instruments", measured.step, row.phases[MAIN_LOOP]))
     median = statistics.median(measured.step)
@@ -128,6 +127,7 @@ def _json(measured: Any) -> dict[str, Any]:
         "launches_per_step": measured.launches_per_step,
         "milliseconds": {
             "pre-processing": measured.preprocessing,
+            "capture": measured.capture,
             **measured.phases,
             "step without instruments": measured.step,
         },

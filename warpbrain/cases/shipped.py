@@ -38,10 +38,16 @@ def find_case(name: str, tissue: str = "multi") -> Case:
     if name in SHIPPED:
         return read_case(_DATA / SHIPPED[name][tissue])
     path = Path(name)
-    if not path.exists():
+    try:
+        there = bool(name) and path.exists()
+    except (OSError, ValueError):  # a name that no file can have
+        there = False
+    if not there:
         near = difflib.get_close_matches(name, SHIPPED, 1)
         hint = f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(SHIPPED)}"
-        raise InputError(f"--case {name}: no such case and no such folder ({hint})")
-    if path.is_dir() and tissue == "single":
+        raise InputError(f"case '{name}': no such case and no such folder ({hint})")
+    if tissue == "single":
+        if not path.is_dir():
+            raise InputError(f"case '{name}': one tissue needs a case folder with a case-single.toml, this is a file")
         path = path / "case-single.toml"
     return read_case(path)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     """Add the command to the parser."""
     cases = commands.add_parser("cases", help="the cases that ship with the package")
     actions = cases.add_subparsers(dest="action", required=True, metavar="ACTION")
@@ -25,4 +26,5 @@ def _build(options: argparse.Namespace) -> None:
     from warpbrain.atomic import output_folder
     from warpbrain.cases.building import build
 
-    build(options.name, output_folder(options.out))
+    folder = build(options.name, output_folder(options.out), progress=print)
+    print(f"written to {folder}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 _LONG_HISTORY = 16
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "run",
@@ -34,8 +35,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     add("--tissue", choices=("single", "multi"), default="multi", help="one tissue, or grey and white (default)")
     add(
         "--model",
-        choices=("neo-hookean", "mooney-rivlin", "ogden"),
-        help="law of every tissue, at the shear modulus that the case gives (default: the case's own law)",
+        metavar="LAW",
+        help="neo-hookean, mooney-rivlin or ogden for every tissue, at the shear modulus that the case gives "
+        "(default: the case's own law)",
     )
     add("--mu", nargs="+", metavar="PA", default=[], help="shear modulus [Pa] of every tissue, or LABEL=PA for one")
     add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
@@ -62,24 +64,26 @@ def _run(options: argparse.Namespace) -> None:
     _check(options)
     say: Callable[..., None] = _silent if options.quiet else print
 
-    from warpbrain.report import summary as tables
-
-    case = _case(options)
-    model, _ = case.build()
-    described = tables.describe_case(case, model)
-    say(*tables.case_lines(described), sep="\n")
-
     from warpbrain.atomic import output_folder
-    from warpbrain.cli.quiet import start_warp_quietly
-    from warpbrain.simulation.system import System
+    from warpbrain.report import summary as tables
+    from warpbrain.simulation.of_case import model_of
+    from warpbrain.simulation.system import System, find_device
+    from warpbrain.terminal.quiet import start_warp_quietly
 
     start_warp_quietly()
+    find_device(options.device)
+    case = _case(options)
+    model, _ = model_of(case)
+    described = tables.describe_case(case, model)
+    say(*tables.case_lines(described), sep="\n")
     system = System(model, options.device, options.precision)
-    out = output_folder(options.out or Path(f"warpbrain-{case.name}-{options.tissue}"))
+    # the name is free text: it must not become a path
+    safe = re.sub(r"[^\w.-]+", "-", case.name)
+    out = output_folder(options.out or Path(f"warpbrain-{safe}-{options.tissue}"))
     say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
-    ready = time.perf_counter() - start
 
     outcome, seconds, counts = _simulate(options, system, say)
+    first_step = outcome.pop("first_step") - start
     seconds = {"pre-processing": system.seconds, **seconds}
 
     from warpbrain.simulation.result import result_of
@@ -101,7 +105,7 @@ def _run(options: argparse.Namespace) -> None:
         "result": said,
         "seconds_by_phase": seconds,
         "calls_by_phase": counts,
-        "seconds_to_first_step": ready,
+        "seconds_to_first_step": first_step,
         "versions": tables.machine(),
     }
     write_summary(out / "summary.json", summary)
@@ -138,7 +142,7 @@ def _case(options: argparse.Namespace) -> Case:
     if not options.allow_unstable:
         for label, tissue in sorted(case.tissues.items()):
             try:
-                require_stable(tissue.law)
+                require_stable(tissue.law, case.poisson, tissue.formulation)
             except UnstableLawError as error:
                 raise UnstableLawError(
                     f"{case.path}: [tissue.{label}] {error}; --allow-unstable computes with it all the same"
@@ -166,6 +170,8 @@ def parse_moduli(values: list[str]) -> tuple[float | None, dict[int, float]]:
         if not (math.isfinite(mu) and mu > 0.0):
             raise InputError(f"--mu {value}: the shear modulus must be a positive number [Pa]")
         if key is not None:
+            if key in by_label:
+                raise InputError(f"--mu {' '.join(values)}: tissue {key} is given twice")
             by_label[key] = mu
         elif every is None:
             every = mu
@@ -180,7 +186,7 @@ def _simulate(
     options: argparse.Namespace, system: System, say: Any
 ) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
     """Find the state that the arguments ask for; returns what to report of it, and times and counts by phase."""
-    from warpbrain.cli.progress import Progress
+    from warpbrain.terminal.progress import Progress
 
     if options.steps is not None:
         return _follow(options, system, say, Progress("motion", options.quiet))
@@ -197,9 +203,11 @@ def _balance(
     say("", "equilibrium   load   Newton   residual    CG   step   min J", sep="\n")
 
     taken: list[NewtonStep] = []
+    first: list[float] = []
 
     def on_step(step: NewtonStep) -> None:
         taken.append(step)
+        first.append(time.perf_counter())
         # a long way is told by its load steps, not by every iteration
         if len(taken) <= _LONG_HISTORY or step.iteration == 1:
             progress.clear()
@@ -218,7 +226,12 @@ def _balance(
         state = solver.solve()
     finally:
         progress.clear()
-    say(f"  converged: relative out-of-balance force {state.residual:.1e}, stored energy {1000 * state.energy:.4g} mJ")
+    if not first:
+        first.append(time.perf_counter())
+    say(
+        f"  converged: relative out-of-balance force {state.residual:.1e} (goal {solver.tolerance:.1e}), "
+        f"stored energy {1000 * state.energy:.4g} mJ"
+    )
     if state.unstable_iterations:
         say(
             f"  note: the tangent was indefinite in {state.unstable_iterations} iterations; this may be another "
@@ -226,6 +239,8 @@ def _balance(
         )
     outcome = {
         "kind": "equilibrium",
+        "first_step": first[0],
+        "tolerance": solver.tolerance,
         "relative_residual": state.residual,
         "stored_energy_J": state.energy,
         "iterations_with_indefinite_tangent": state.unstable_iterations,
@@ -237,11 +252,14 @@ def _balance(
 def _relax(
     options: argparse.Namespace, system: System, say: Any, progress: Any
 ) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
-    from warpbrain.simulation.relaxation import RelaxationStep, relax_to_rest
+    from warpbrain.simulation.phase_clock import PhaseClock
+    from warpbrain.simulation.relaxation import RelaxationOptions, RelaxationStep, relax_to_rest
 
     say("", "to rest        time [s]  step [s]   residual    CG   min J", sep="\n")
+    first: list[float] = []
 
     def on_step(step: RelaxationStep) -> None:
+        first.append(time.perf_counter())
         progress.clear()
         say(
             f"            {step.time:>11.3g} {step.time_step:>9.3g}   {step.residual:>8.1e} {step.cg_iterations:>5}"
@@ -251,18 +269,20 @@ def _relax(
         progress.show(min(1.0, max(0.0, decades)), f"{step.time:.3g} s")
 
     progress.show(0.0, "loading kernels (the first run compiles them)")
-    start = time.perf_counter()
+    clock = PhaseClock(system.device)
     try:
-        state = relax_to_rest(system, tolerance=options.tolerance, on_step=on_step)
+        state = relax_to_rest(system, RelaxationOptions(tolerance=options.tolerance), on_step, clock)
     finally:
         progress.clear()
     say(f"  at rest: relative out-of-balance force {state.residual:.1e}")
     outcome = {
         "kind": "at rest",
+        "first_step": first[0],
+        "tolerance": options.tolerance,
         "relative_residual": state.residual,
         "history": [vars(step) for step in state.history],
     }
-    return outcome, {"steps": time.perf_counter() - start}, {"steps": len(state.history)}
+    return outcome, clock.seconds, clock.counts
 
 
 def _follow(
@@ -272,29 +292,42 @@ def _follow(
     from warpbrain.simulation.phase_clock import PhaseClock
 
     simulator = Simulator(system)
-    simulator.prescribe(system.model.prescribed)
     clock = PhaseClock(system.device)
     say("", "motion        time [ms]     CG   min J   kinetic energy [mJ]", sep="\n")
     every = max(1, options.steps // 10)
     history = []
+    first: list[float] = []
     progress.show(0.0, "loading kernels (the first run compiles them)")
     try:
         for step in range(1, options.steps + 1):
+            # a prescribed displacement without a history of its own is reached evenly over the run
+            simulator.prescribe(step / options.steps * system.model.prescribed)
             simulator.timed_step(clock)
+            min_J = simulator.check()
+            first.append(time.perf_counter())
             if step % every == 0 or step == options.steps:
-                min_J, kinetic = simulator.check(), simulator.kinetic_energy()
-                iterations = simulator.last_solve().iterations
+                kinetic, solve = simulator.kinetic_energy(), simulator.last_solve()
                 history.append(
-                    {"time_s": simulator.time, "cg_iterations": iterations, "min_J": min_J, "kinetic_J": kinetic}
+                    {"time_s": simulator.time, "cg_iterations": solve.iterations, "min_J": min_J, "kinetic_J": kinetic}
                 )
                 progress.clear()
                 say(
-                    f"            {1000 * simulator.time:>11.4g} {iterations:>6}   {min_J:>5.3f}   {1000 * kinetic:.4g}"
+                    f"            {1000 * simulator.time:>11.4g} {solve.iterations:>6}   {min_J:>5.3f}"
+                    f"   {1000 * kinetic:.4g}"
                 )
             progress.show(step / options.steps, f"{1000 * simulator.time:.0f} ms")
     finally:
         progress.clear()
-    return {"kind": "motion", "time_s": simulator.time, "history": history}, clock.seconds, clock.counts
+    outcome = {
+        "kind": "motion",
+        "first_step": first[0],
+        "time_s": simulator.time,
+        "time_step_s": simulator.time / options.steps,
+        "damping": vars(system.model.damping),
+        "cg_tolerance": simulator.tolerance,
+        "history": history,
+    }
+    return outcome, clock.seconds, clock.counts
 
 
 def _subtitle(case: Case, outcome: Mapping[str, Any]) -> str:

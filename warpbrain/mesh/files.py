@@ -93,9 +93,11 @@ def _members(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArr
         flag = np.asarray(data)
         if flag.ndim == 2 and flag.shape[1] == 1:
             flag = flag[:, 0]
-        counts = np.issubdtype(flag.dtype, np.integer) or flag.dtype == bool
-        if name.startswith(prefix) and flag.ndim == 1 and counts:
-            sets[name.removeprefix(prefix)] = flag != 0
+        if not name.startswith(prefix) or flag.ndim != 1 or flag.dtype.kind not in "biuf":
+            continue
+        if not np.all(np.isfinite(flag)):
+            raise MeshError(f"array '{name}' holds {np.count_nonzero(~np.isfinite(flag))} values that are not finite")
+        sets[name.removeprefix(prefix)] = flag != 0
     return sets
 
 

@@ -40,8 +40,10 @@ class Gravity(Load):
     density : float
         Density of the tissue [kg/m3].
     csf_level : float or None
-        Height of the fluid's surface [m] against `direction`, above the lowest point of the undeformed mesh. None: no
-        fluid at all and a reference free of gravity, so that the full weight acts.
+        Height of the fluid's surface [m] against `direction`, above `lowest`. None: there never was any fluid, and the
+        reference is free of gravity, as a gel phantom on the bench: the full weight acts.
+    lowest : float or None
+        Height [m] of the point that levels are counted from, ``-x . direction``; None: the lowest node of the mesh.
     imaged_direction : tuple of three floats or None
         Where 'down' was while the reference was imaged; None: the same as `direction`.
     """
@@ -49,6 +51,7 @@ class Gravity(Load):
     direction: tuple[float, float, float]
     density: float
     csf_level: float | None = None
+    lowest: float | None = None
     imaged_direction: tuple[float, float, float] | None = None
     sentence: ClassVar[str] = "Cerebrospinal fluid drained, and the brain sinks under the weight it no longer carries."
 
@@ -62,15 +65,15 @@ class Gravity(Load):
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
-        axis = ", ".join(f"{v:g}" for v in self.direction)
         if self.csf_level is None:
-            return f" No fluid is left; gravity points along ({axis}) in RAS."
+            return ""
+        axis = ", ".join(f"{v:g}" for v in self.direction)
         return f" Its level: {1000.0 * self.csf_level:g} mm above the lowest point; gravity along ({axis}) in RAS."
 
     def height(self, mesh: TetMesh) -> NDArray[np.float64]:
-        """Height of each node [m] above the lowest one, against gravity, shape (n,)."""
+        """Height of each node [m] above the point that levels are counted from, against gravity, shape (n,)."""
         z = -mesh.points @ unit_vector("gravity_axis", self.direction)
-        return z - z.min()
+        return z - (z.min() if self.lowest is None else self.lowest)
 
     def nodal_forces(self, mesh: TetMesh) -> NDArray[np.float64]:
         down = unit_vector("gravity_axis", self.direction)

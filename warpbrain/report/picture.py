@@ -7,6 +7,7 @@ the right of the picture.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -78,8 +79,11 @@ def write_picture(path: Path, result: Result, whole: TetMesh, names: dict[int, s
     bar = figure.colorbar(shown, ax=axes[1, :], location="bottom", shrink=0.6, aspect=40, pad=0.02)
     bar.set_label("displacement [mm]   (dashed: where the surfaces were before)")
     _legend(axes[0, 2], names, whole)
-    figure.suptitle(f"{title}\n{subtitle}", fontsize=13)
-    with whole_file(path) as temporary:
+    # titles and names are the user's free text, in which a dollar sign begins no formula
+    figure.suptitle(f"{title}\n{subtitle}", fontsize=13, parse_math=False)
+    with whole_file(path) as temporary, warnings.catch_warnings():
+        # a title in a script that the font lacks is no reason to print anything
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
         figure.savefig(temporary, dpi=110, format="png")
     plt.close(figure)
 
@@ -174,4 +178,5 @@ def _legend(axes: Any, names: dict[int, str], mesh: TetMesh) -> None:
     ]
     if mesh.element_sets.get("resection", np.zeros(1, dtype=bool)).any():
         entries.append(Patch(facecolor=_RESECTED, label="resected"))
-    axes.legend(handles=entries, loc="lower right", fontsize=8, frameon=False)
+    for text in axes.legend(handles=entries, loc="lower right", fontsize=8, frameon=False).get_texts():
+        text.set_parse_math(False)

@@ -68,6 +68,7 @@ def describe_case(case: Case, model: Model) -> dict[str, Any]:
         },
         "assumptions": list(case.assumptions),
         "left_out": list(LEFT_OUT),
+        "unread_recordings": case.unread_recordings,
     }
 
 
@@ -117,6 +118,8 @@ def case_lines(summary: Mapping[str, Any]) -> list[str]:
             f"mu = {tissue['shear_modulus_Pa']:g} Pa, nu = {summary['poisson']:g}"
         )
     lines += [f"  assumed   {sentence}" for sentence in summary["assumptions"]]
+    if summary["unread_recordings"]:
+        lines.append(f"  not used  {summary['unread_recordings']} recordings: this version does not compare with them")
     lines += [f"  left out  {sentence}" for sentence in summary["left_out"]]
     return lines
 

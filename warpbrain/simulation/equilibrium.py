@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.kernels.linear import ConjugateGradient, LinearResult
+from warpbrain.simulation.held import require_held
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 
@@ -40,7 +41,7 @@ class NewtonStep:
     min_J : float
         Smallest volume ratio after the step.
     indefinite : bool
-        The tangent was not positive definite, and a multiple of the mass was added to it until it was.
+        The tangent was seen not to be positive definite, and a multiple of the mass was added to it until it was.
     """
 
     load: float
@@ -75,8 +76,8 @@ class EquilibriumOptions:
         See `warpbrain.kernels.linear.PRECONDITIONERS`.
     pass_unstable : bool
         What to do where the tangent is indefinite, at limit and branching points of the equilibrium path. True: go on
-        downhill to the next stable equilibrium, as the damped body would (snap-through), and say so in the history.
-        False: end there with an error that names it.
+        downhill, as the damped body would (snap-through), and say so in the history. False: end there with an error
+        that names it. Negative curvature is seen only along the search directions of CG, not in every direction.
     """
 
     tolerance: float = 1e-8
@@ -120,7 +121,7 @@ class Equilibrium:
 
     @property
     def unstable_iterations(self) -> int:
-        """Newton iterations with an indefinite tangent: not 0 if the path passed unstable states."""
+        """Newton iterations in which the tangent was seen to be indefinite, those of load steps cut since included."""
         return sum(step.indefinite for step in self.history)
 
 
@@ -160,7 +161,7 @@ class EquilibriumSolver:
         # residuals cannot fall below the rounding of the sums of element forces
         self.tolerance = max(self.options.tolerance, 50.0 * system.precision.epsilon)
         # force and energy of the order of rounding, so that a body without any load is in equilibrium
-        stiffest = max(m.law.shear_modulus + m.volumetric_modulus for m in system.model.materials.values())
+        stiffest = max(m.law.shear_modulus + abs(m.volumetric_modulus) for m in system.model.materials.values())
         self._noise = system.precision.epsilon * stiffest * system.model.mesh.volume ** (2.0 / 3.0)
         self._energy_noise = system.precision.epsilon * stiffest * system.model.mesh.volume
 
@@ -180,10 +181,13 @@ class EquilibriumSolver:
 
         Raises
         ------
+        InputError
+            If nothing holds the body, or a part of it.
         SolveError
             If no equilibrium is found: at what load fraction, where and why.
         """
         model = self.system.model
+        require_held(model)
         full = model.external_forces() if external is None else external
         u = np.zeros_like(full) if start is None else np.array(start, dtype=np.float64)
         origin = np.where(model.constrained, u, 0.0)
@@ -195,10 +199,10 @@ class EquilibriumSolver:
             try:
                 reached, energy, residual = self._newton(u, load, load * full, target)
             except _StepFailed as failure:
-                step *= 0.5
+                tried, step = step, 0.5 * step
                 exhausted = len(self._history) >= self.options.max_total_newton
                 if exhausted or step < self.options.min_load_step:
-                    raise SolveError(self._no_equilibrium(done, step, str(failure))) from None
+                    raise SolveError(self._no_equilibrium(done, tried, str(failure))) from None
                 continue
             u, done, step = reached, load, 2.0 * step
         return Equilibrium(u, self.system.internal.numpy().astype(np.float64), energy, residual, tuple(self._history))
@@ -255,10 +259,10 @@ class EquilibriumSolver:
                     f"not in balance yet (relative residual {relative:.1e}, goal {self.tolerance:.1e})"
                     f"{self._worst_element()}"
                 )
-            d, linear, shift = self._descent(r, prescribed, moving, min(eta, 0.5), shift)
+            d, linear, shift, indefinite = self._descent(r, prescribed, moving, min(eta, 0.5), shift)
             with self.clock.phase("line search"):
                 alpha, u, potential, min_J = self._line_search(u, d, r, external, potential, moving)
-            record = NewtonStep(load, iteration, relative, linear.iterations, alpha, min_J, shift > 0.0)
+            record = NewtonStep(load, iteration, relative, linear.iterations, alpha, min_J, indefinite)
             # try the tangent itself again soon: only that converges quadratically
             shift = 0.1 * shift if shift > self._least_shift() else 0.0
             self._history.append(record)
@@ -279,12 +283,17 @@ class EquilibriumSolver:
 
     def _descent(
         self, r: Floats, prescribed: Floats, moving: bool, eta: float, shift: float
-    ) -> tuple[Floats, LinearResult, float]:
-        """Newton's direction, with as much of the mass added to the tangent as makes it positive definite."""
+    ) -> tuple[Floats, LinearResult, float, bool]:
+        """Newton's direction, with as much of the mass added to the tangent as makes it positive definite.
+
+        Returns the direction, how CG ended, the multiple of the mass, and whether an indefinite tangent was seen.
+        """
+        indefinite = False
         while True:
             d, linear = self._direction(r, prescribed, moving, eta, shift)
             if not linear.indefinite:
                 break
+            indefinite = True
             unstable = (
                 f"the tangent stiffness is indefinite (curvature {linear.curvature:.2e} N/m along a search direction): "
                 f"the equilibrium path turns or branches here{self._worst_element()}"
@@ -300,7 +309,7 @@ class EquilibriumSolver:
                 f"conjugate gradients did not converge in {linear.iterations} iterations "
                 f"(residual {linear.residual:.1e}, goal {linear.tolerance:.1e})"
             )
-        return d, linear, shift
+        return d, linear, shift, indefinite
 
     def _direction(
         self, r: Floats, prescribed: Floats, moving: bool, eta: float, shift: float

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import SolveError
 from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.held import require_held
+from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 
 
@@ -49,20 +51,12 @@ class Relaxed:
     history: tuple[RelaxationStep, ...]
 
 
-def relax_to_rest(
-    system: System,
-    *,
-    tolerance: float = 1e-8,
-    time_step: float = 0.001,
-    largest_step: float = 1e4,
-    max_steps: int = 400,
-    on_step: Callable[[RelaxationStep], None] | None = None,
-) -> Relaxed:
-    """Follow the damped motion from rest until nothing moves.
+@dataclass(frozen=True)
+class RelaxationOptions:
+    """How to come to rest.
 
-    Parameters
+    Attributes
     ----------
-    system : System
     tolerance : float
         At rest when ``|f_ext - f_int| <= tolerance (|f_int| + |f_ext|)`` on the free components.
     time_step : float
@@ -70,53 +64,87 @@ def relax_to_rest(
     largest_step : float
         [s]
     max_steps : int
+        Steps before giving up.
+    """
+
+    tolerance: float = 1e-8
+    time_step: float = 0.001
+    largest_step: float = 1e4
+    max_steps: int = 400
+
+
+def relax_to_rest(
+    system: System,
+    options: RelaxationOptions | None = None,
+    on_step: Callable[[RelaxationStep], None] | None = None,
+    clock: PhaseClock | None = None,
+) -> Relaxed:
+    """Follow the damped motion from rest until nothing moves.
+
+    Prescribed displacements are reached in the first step, or in as many as the elements bear.
+
+    Parameters
+    ----------
+    system : System
+    options : RelaxationOptions
     on_step : callable, optional
         Called with each `RelaxationStep`.
+    clock : PhaseClock, optional
+        Adds up the wall time by phase.
 
     Raises
     ------
+    InputError
+        If nothing holds the body, or a part of it.
     SolveError
         If the motion does not come to rest: when, where and why.
     """
-    goal = max(tolerance, 50.0 * system.precision.epsilon)
-    free = 1.0 - system.model.constrained
-    external = system.model.external_forces()
-    external_norm = float(np.linalg.norm(external))
+    options = options or RelaxationOptions()
+    clock = clock or PhaseClock(system.device)
+    model = system.model
+    require_held(model)
+    goal = max(options.tolerance, 50.0 * system.precision.epsilon)
+    free = 1.0 - model.constrained
+    external = model.external_forces()
+    simulator = Simulator(system, time_step=options.time_step, tolerance=1e-8)
+    simulator.reset()
     u, v = np.zeros_like(external), np.zeros_like(external)
-    system.u.assign(u)
-    simulator = Simulator(system, time_step=time_step, tolerance=1e-8)
-    simulator.prescribe(system.model.prescribed)
     history: list[RelaxationStep] = []
-    h = time_step
-    while len(history) < max_steps:
+    h, moved, share = options.time_step, 0.0, 1.0
+    while len(history) < options.max_steps:
         simulator.set_time_step(h)
-        simulator.prescribe(system.model.prescribed)
+        simulator.prescribe(min(1.0, moved + share) * model.prescribed)
         start = simulator.time
-        simulator.step()
+        simulator.timed_step(clock)
         try:
             min_J = simulator.check()
         except SolveError as failure:
-            if h < 1e-3 * time_step:
+            # a prescribed displacement that distorts too much is shared among more steps, not hurried
+            if moved < 1.0 and np.any(model.prescribed):
+                share *= 0.5
+            else:
+                h *= 0.25
+            if h < 1e-3 * options.time_step or share < 1e-3:
                 raise SolveError(f"the motion does not come to rest: {failure}") from None
-            h *= 0.25
-            system.u.assign(u)
-            simulator.v.assign(v)
-            simulator.time = start
+            simulator.restore(u, v, start)
             continue
+        moved = min(1.0, moved + share)
         system.evaluate_forces()
         system.gather_forces()
         internal = system.internal.numpy().astype(np.float64)
         residual = float(np.linalg.norm(free * (external - internal)))
-        residual /= max(float(np.linalg.norm(internal)) + external_norm, np.finfo(float).tiny)
+        scale = float(np.linalg.norm(internal) + np.linalg.norm(external))
+        residual /= max(scale, np.finfo(float).tiny)
         record = RelaxationStep(simulator.time, h, residual, simulator.last_solve().iterations, min_J)
         history.append(record)
         if on_step is not None:
             on_step(record)
-        u, v = system.u.numpy(), simulator.v.numpy()
-        if residual <= goal:
+        # copies: on the CPU these arrays are the live ones
+        u, v = system.u.numpy().copy(), simulator.v.numpy().copy()
+        if residual <= goal and moved >= 1.0:
             return Relaxed(u.astype(np.float64), internal, residual, tuple(history))
-        h = min(2.0 * h, largest_step)
+        h = min(2.0 * h, options.largest_step)
     raise SolveError(
-        f"not at rest after {max_steps} steps, {history[-1].time:.3g} s: relative out-of-balance force "
+        f"not at rest after {options.max_steps} steps, {history[-1].time:.3g} s: relative out-of-balance force "
         f"{history[-1].residual:.1e}, goal {goal:.1e}"
     )

@@ -15,7 +15,7 @@ from warpbrain.errors import InputError
 from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.precision import PRECISIONS, Precision
 from warpbrain.kernels.tetrahedron import PAIRS, ElementKernels
-from warpbrain.physics.laws import Law, Ogden
+from warpbrain.physics.laws import Law
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.pattern import build_pattern
 
@@ -142,10 +142,10 @@ class System:
             by_code.setdefault((type(material.law), material.formulation), {})[label] = material
         groups = []
         for (law_type, formulation), materials in by_code.items():
-            rows = _parameter_rows(materials)
-            parameters = np.zeros((self.elements, len(next(iter(rows.values())))))
-            for label, row in rows.items():
-                parameters[labels == label] = row
+            rows = law_type.parameter_rows([material.law for material in materials.values()])
+            parameters = np.zeros((self.elements, 1 + len(rows[0])))
+            for (label, material), row in zip(materials.items(), rows, strict=True):
+                parameters[labels == label] = (material.volumetric_modulus, *row)
             members = np.flatnonzero(np.isin(labels, list(materials)))
             kernels = law_type.device_law(formulation).kernels(p)
             groups.append(ElementGroup(kernels, self._array(members, int), self._array(parameters, p.scalar)))
@@ -254,14 +254,3 @@ class System:
         for g in self.groups:
             self._launch(g.kernels.stress, len(g.elements), g.elements, F, g.parameters, density, P)
         return P.numpy().astype(np.float64)
-
-
-def _parameter_rows(materials: dict[int, Material]) -> dict[int, tuple[float, ...]]:
-    """Device parameters by tissue: the volumetric modulus, then those of the law, as many for every tissue."""
-    laws = {label: material.law for label, material in materials.items()}
-    terms = max((len(law.mu) for law in laws.values() if isinstance(law, Ogden)), default=0)
-    rows = {}
-    for label, law in laws.items():
-        padded = law.with_terms(terms) if isinstance(law, Ogden) else law
-        rows[label] = (materials[label].volumetric_modulus, *padded.parameters())
-    return rows

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import abc
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
@@ -34,15 +35,27 @@ class Law(abc.ABC):
 
     #: Name in `case.toml` and on the command line.
     name: ClassVar[str]
+    #: Its keys in a tissue's table of `case.toml`, the fields of the class: one number, or a list of numbers.
+    keys: ClassVar[Mapping[str, type]]
 
     @property
     @abc.abstractmethod
     def shear_modulus(self) -> float:
         """Shear modulus at rest `mu0` [Pa]."""
 
+    @classmethod
+    @abc.abstractmethod
+    def of_shear_modulus(cls, mu: float) -> Law:
+        """The law of a shear modulus [Pa] in its usual shape: what `--model` puts in the place of another law."""
+
     @abc.abstractmethod
     def parameters(self) -> tuple[float, ...]:
         """Parameters in the order of the device code, without the volumetric one."""
+
+    @classmethod
+    def parameter_rows(cls, laws: Sequence[Law]) -> list[tuple[float, ...]]:
+        """Parameters of several laws of this class, as many for each: what one launch takes for several tissues."""
+        return [law.parameters() for law in laws]
 
     @abc.abstractmethod
     def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:

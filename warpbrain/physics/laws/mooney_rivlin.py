@@ -7,6 +7,7 @@
 of the coupled form, so its `lam` is that much smaller than `2 mu0 nu / (1 - 2 nu)`: the Poisson ratio is the one given.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -93,6 +94,7 @@ class MooneyRivlin(Law):
     C1: float
     C2: float
     name: ClassVar[str] = "mooney-rivlin"
+    keys: ClassVar[Mapping[str, type]] = {"C1": float, "C2": float}
 
     def __post_init__(self) -> None:
         require_finite(self.name, "C1, C2", self.C1, self.C2)
@@ -104,6 +106,11 @@ class MooneyRivlin(Law):
     @property
     def shear_modulus(self) -> float:
         return 2.0 * (self.C1 + self.C2)
+
+    @classmethod
+    def of_shear_modulus(cls, mu: float) -> "MooneyRivlin":
+        """Equal coefficients."""
+        return cls(0.25 * mu, 0.25 * mu)
 
     def parameters(self) -> tuple[float, ...]:
         return (self.C1, self.C2)

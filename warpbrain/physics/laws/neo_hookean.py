@@ -4,6 +4,7 @@ coupled    Psi = mu/2 (I1 - 3) - mu ln J + lam/2 (ln J)^2
 uncoupled  Psi = mu/2 (J^(-2/3) I1 - 3) + K/2 (J - 1)^2
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -85,6 +86,7 @@ class NeoHookean(Law):
 
     mu: float
     name: ClassVar[str] = "neo-hookean"
+    keys: ClassVar[Mapping[str, type]] = {"mu": float}
 
     def __post_init__(self) -> None:
         require_finite(self.name, "mu", self.mu)
@@ -94,6 +96,10 @@ class NeoHookean(Law):
     @property
     def shear_modulus(self) -> float:
         return self.mu
+
+    @classmethod
+    def of_shear_modulus(cls, mu: float) -> "NeoHookean":
+        return cls(mu)
 
     def parameters(self) -> tuple[float, ...]:
         return (self.mu,)

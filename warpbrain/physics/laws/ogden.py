@@ -7,6 +7,7 @@ Convention: `mu_p/alpha_p`, so `mu0 = 1/2 sum_p mu_p alpha_p`. Abaqus, FEBio and
 `Ogden.from_abaqus` converts.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -163,6 +164,7 @@ class Ogden(Law):
     mu: tuple[float, ...]
     alpha: tuple[float, ...]
     name: ClassVar[str] = "ogden"
+    keys: ClassVar[Mapping[str, type]] = {"mu": list, "alpha": list}
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mu", tuple(float(v) for v in self.mu))
@@ -190,8 +192,24 @@ class Ogden(Law):
     def shear_modulus(self) -> float:
         return 0.5 * sum(m * a for m, a in zip(self.mu, self.alpha, strict=True))
 
+    @classmethod
+    def of_shear_modulus(cls, mu: float) -> "Ogden":
+        """One term with the exponent -4.7 of brain in compression and tension (Miller and Chinzei 2002)."""
+        return cls((2.0 * mu / -4.7,), (-4.7,))
+
     def parameters(self) -> tuple[float, ...]:
         return self.mu + self.alpha
+
+    @classmethod
+    def parameter_rows(cls, laws: Sequence[Law]) -> list[tuple[float, ...]]:
+        """Laws with fewer terms than another get terms of no weight."""
+        terms = max(len(law.parameters()) // 2 for law in laws)
+        rows = []
+        for law in laws:
+            own = len(law.parameters()) // 2
+            mu, alpha = law.parameters()[:own], law.parameters()[own:]
+            rows.append(mu + (0.0,) * (terms - own) + alpha + (2.0,) * (terms - own))
+        return rows
 
     def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
         logs = np.log(stretches)
@@ -205,8 +223,3 @@ class Ogden(Law):
     def scaled_to(self, shear_modulus: float) -> "Ogden":
         factor = shear_modulus / self.shear_modulus
         return Ogden(tuple(factor * m for m in self.mu), self.alpha)
-
-    def with_terms(self, terms: int) -> "Ogden":
-        """The same law written with more terms, the new ones zero: tissues of one model share one number of terms."""
-        extra = terms - len(self.mu)
-        return Ogden(self.mu + (0.0,) * extra, self.alpha + (2.0,) * extra)

@@ -26,7 +26,7 @@ class UnstableLawError(InputError):
     """Parameters whose law softens or lacks a barrier; the message says at which stretch."""
 
 
-def require_stable(law: Law) -> None:
+def require_stable(law: Law, poisson: float = 0.45, formulation: str = "coupled") -> None:
     """Raise `UnstableLawError` if the law breaks a condition of the supplement's Table 2.
 
     Examples
@@ -34,6 +34,12 @@ def require_stable(law: Law) -> None:
     >>> from warpbrain.physics.laws import MooneyRivlin
     >>> require_stable(MooneyRivlin(300.0, 200.0))
     """
+    volumetric = law.volumetric_modulus(poisson, formulation)
+    if formulation == "coupled" and volumetric < 0.0:
+        raise UnstableLawError(
+            f"{_describe(law)}, coupled, at the Poisson ratio {poisson:g} has lam = {volumetric:.3g} Pa: its energy "
+            "falls without bound as J -> 0 (supplement Table 2); the uncoupled formulation does not"
+        )
     logs = np.log(_STRETCHES)
     slope, curvature = _derivatives(law, logs)
     scale = law.shear_modulus

@@ -9,17 +9,30 @@ written under a temporary name is removed first.
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import socket
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from warpbrain.atomic import remove_unfinished
 
 #: Seconds that Python is given to stop by itself.
 _GRACE = 0.6
+
+
+def clear_up() -> None:
+    """Remove what an interrupted process leaves half-written: our own files, and folders of half-built kernels."""
+    remove_unfinished()
+    warp = sys.modules.get("warp")
+    cache = warp.config.kernel_cache_dir if warp else None
+    if cache:
+        # Warp builds a kernel in a folder that carries the process id, and moves it when it is done
+        for unfinished in Path(cache).glob(f"*_p{os.getpid()}_t*"):
+            shutil.rmtree(unfinished, ignore_errors=True)
 
 
 @contextmanager
@@ -35,7 +48,7 @@ def stop_promptly() -> Iterator[None]:
     def watch() -> None:
         while data := reader.recv(1):
             if data[0] == signal.SIGINT and not finished.wait(_GRACE):
-                remove_unfinished()
+                clear_up()
                 print("\nwarpbrain: interrupted; nothing half-written was left", file=sys.stderr, flush=True)
                 os._exit(130)
 

@@ -1,0 +1,403 @@
+"""A `case.toml` is read as written, whatever its units and axes; what is wrong in it is named."""
+
+import re
+
+import meshio
+import numpy as np
+import pytest
+from folders import CASE, SIDE, block, changed, write_folder
+
+from warpbrain.cases.reading import read_case
+from warpbrain.cases.shipped import SHIPPED, find_case
+from warpbrain.errors import InputError
+from warpbrain.mesh import TetMesh, write_mesh
+from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
+from warpbrain.simulation.of_case import model_of
+
+FORCE = 'kind = "force"\ntotal = [0.01, 0.02, -0.05]'
+SECOND_LAW = "mu = 3000.0"
+GRAVITY = '[[mechanism]]\nkind = "gravity"\n'
+
+
+def refusal(folder, *changes, mesh: TetMesh | None = None) -> str:
+    """The message with which a case is refused: one line that begins with the file."""
+    write_folder(folder, *changes, mesh=mesh)
+    return refused(folder)
+
+
+def refused(folder) -> str:
+    with pytest.raises(InputError) as caught:
+        read_case(folder)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith(str(folder))
+    return message.removeprefix(f"{folder}/")
+
+
+def test_everything_is_read(tmp_path):
+    case = read_case(write_folder(tmp_path))
+    assert (case.name, case.title, case.origin) == ("block", "A block of gel", "synthetic")
+    assert (case.density, case.poisson) == (1000.0, 0.45)
+    assert case.path == tmp_path / "case.toml"
+    assert case.mesh.volume == pytest.approx(SIDE**3)
+    assert {label: (t.name, t.law, t.formulation) for label, t in case.tissues.items()} == {
+        1: ("soft", NeoHookean(1000.0), "coupled"),
+        2: ("stiff", NeoHookean(3000.0), "coupled"),
+    }
+    [(name, members)] = case.fixed
+    assert name == "table"
+    np.testing.assert_array_equal(members, case.mesh.points[:, 2] == 0.0)
+    [force] = case.loads
+    np.testing.assert_allclose(force.nodal_forces(case.mesh).sum(axis=0), [0.01, 0.02, -0.05])
+    assert case.assumptions == (
+        "The table does not move.",
+        "A force of 0.0548 N in all, shared evenly by the nodes of the press.",
+    )
+    # the file itself may be named, too
+    assert read_case(tmp_path / "case.toml").name == "block"
+
+
+def test_what_may_be_left_out(tmp_path):
+    write_folder(
+        tmp_path,
+        ('title = "A block of gel"\n', ""),
+        ('units = "mm"\naxes = "RAS"\n', ""),
+        ('name = "soft"\nmodel = "neo-hookean"\n', ""),
+        ("[body]\ndensity = 1000.0\npoisson = 0.45\n", ""),
+        ('name = "table"\n', ""),
+    )
+    case = read_case(tmp_path)
+    assert case.title == "block"
+    assert (case.density, case.poisson) == (1211.5, 0.45)
+    assert case.mesh.volume == pytest.approx(SIDE**3)
+    assert case.tissues[1].name == "tissue 1"
+    assert case.fixed[0][0] == "bottom"
+
+
+@pytest.mark.parametrize(
+    ("keys", "law"),
+    [
+        ("mu = 7", NeoHookean(7.0)),
+        ('model = "mooney-rivlin"\nC1 = 300.0\nC2 = 200', MooneyRivlin(300.0, 200.0)),
+        ('model = "ogden"\nmu = [100.0, -50]\nalpha = [2, -4.7]', Ogden((100.0, -50.0), (2.0, -4.7))),
+    ],
+)
+@pytest.mark.parametrize("formulation", ["coupled", "uncoupled"])
+def test_laws(tmp_path, keys, law, formulation):
+    tissue = read_case(write_folder(tmp_path, (SECOND_LAW, f'{keys}\nformulation = "{formulation}"'))).tissues[2]
+    assert tissue.law == law
+    assert tissue.formulation == formulation
+
+
+def test_a_byte_order_mark_is_not_part_of_the_text(tmp_path):
+    write_folder(tmp_path)
+    (tmp_path / "case.toml").write_bytes(b"\xef\xbb\xbf" + CASE.replace("\n", "\r\n").encode())
+    assert read_case(tmp_path).title == "A block of gel"
+
+
+def test_units_and_axes_change_nothing_else(tmp_path):
+    """The same body in mm and RAS, and in m and LPS: one model."""
+    displaced = 'kind = "displacement"\nvalue = [0.1, 0.2, -0.3]'
+    more = '[[boundary]]\nname = "pull"\nnodes = "top"\nkind = "force"\ntotal = [1.0, 2.0, 3.0]\n' + GRAVITY
+    one = write_folder(
+        tmp_path / "mm",
+        (FORCE, f"{displaced}\n{more}csf_level = 12.0"),
+        ('axes = "RAS"', 'axes = "RAS"\ngravity_axis = [3, -4, 1]'),
+    )
+    turned = [-1.0, -1.0, 1.0]
+    other = write_folder(
+        tmp_path / "m",
+        (FORCE, f"{displaced}\n{more}csf_level = 12.0"),
+        ('"mm"', '"m"'),
+        ('"RAS"', '"LPS"\ngravity_axis = [-3, 4, 1]'),
+        ("[0.1, 0.2, -0.3]", "[-0.0001, -0.0002, -0.0003]"),
+        ("[1.0, 2.0, 3.0]", "[-1, -2, 3]"),
+    )
+    mesh = block()
+    as_lps = TetMesh(mesh.points * turned, mesh.tetrahedra, mesh.tissue, mesh.node_sets, mesh.element_sets)
+    write_mesh(other / "mesh.vtu", as_lps, unit="m")
+    a, b = (model_of(read_case(folder))[0] for folder in (one, other))
+    np.testing.assert_allclose(b.mesh.points, a.mesh.points, rtol=0, atol=1e-16)
+    np.testing.assert_array_equal(b.mesh.tetrahedra, a.mesh.tetrahedra)
+    np.testing.assert_array_equal(b.constrained, a.constrained)
+    np.testing.assert_allclose(b.prescribed, a.prescribed, rtol=0, atol=1e-16)
+    assert np.unique(a.prescribed, axis=0).tolist() == [[0.0, 0.0, 0.0], [0.0001, 0.0002, -0.0003]]
+    np.testing.assert_allclose(b.external_forces(), a.external_forces(), rtol=1e-12, atol=1e-15)
+    assert b.mass == pytest.approx(a.mass)
+
+
+def test_a_ramp_is_read(tmp_path):
+    case = read_case(write_folder(tmp_path, ("-0.05]", "-0.05]\nramp = [[0, 0], [0.05, 1.0]]")))
+    assert case.loads[0].factor(0.025) == pytest.approx(0.5)
+
+
+def test_resected_tissue_is_gone_from_the_model(tmp_path):
+    case = read_case(write_folder(tmp_path, (FORCE, FORCE + '\n[[mechanism]]\nkind = "resection"\nelements="corner"')))
+    model, nodes = model_of(case)
+    corner = case.mesh.element_sets["corner"]
+    assert 0 < corner.sum() < len(corner)
+    assert len(model.mesh.tetrahedra) == (~corner).sum()
+    np.testing.assert_array_equal(model.mesh.points, case.mesh.points[nodes])
+    assert "set 'corner'" in case.assumptions[-1]
+
+
+NUMBERS = ("nan", "inf", "-inf", '"10"', "true", "[1.0]", "1" + "0" * 400)
+
+
+@pytest.mark.parametrize("value", NUMBERS)
+@pytest.mark.parametrize("key", ["density = 1000.0", "poisson = 0.45", "mu = 1000.0"])
+def test_numbers_must_be_finite_numbers(tmp_path, key, value):
+    name = key.split(" = ")[0]
+    message = refusal(tmp_path, (key, f"{name} = {value}"))
+    assert f"] {name}: expected a finite number, found " in message
+    assert len(message) < 200
+
+
+@pytest.mark.parametrize("value", [*NUMBERS, "[1.0, 2.0]", "[1.0, 2.0, nan]", "[1.0, 2.0, inf]", '[1.0, 2.0, "3"]'])
+@pytest.mark.parametrize("key", ["value", "total"])
+def test_vectors_must_be_three_finite_numbers(tmp_path, key, value):
+    kind = {"value": "displacement", "total": "force"}[key]
+    message = refusal(tmp_path, (FORCE, f'kind = "{kind}"\n{key} = {value}'))
+    assert message.startswith(f"case.toml: [boundary 2] {key}: expected 3 finite numbers, found ")
+
+
+WRONG = {
+    # keys: misspelt, of no meaning here, missing
+    "top level": (("[body]", "[bodies]"), r"case.toml: bodies: unknown key \(did you mean 'body'\?\)"),
+    "head": (("title", "titel"), r"\[case\] titel: unknown key \(did you mean 'title'\?\)"),
+    "mesh": (("file =", "files ="), r"\[mesh\] files: unknown key \(did you mean 'file'\?\)"),
+    "tissue": (("mu = 1000", "m = 1000"), r"\[tissue.1\] m: unknown key"),
+    "body": (("poisson", "poison"), r"\[body\] poison: unknown key \(did you mean 'poisson'\?\)"),
+    "boundary": (("total", "totl"), r"\[boundary 2\] totl: unknown key \(did you mean 'total'\?\)"),
+    "mechanism": (("[body]", GRAVITY + "level = 3\n[body]"), r"\[mechanism 1\] level: unknown key \(.*csf_level"),
+    "law": ((SECOND_LAW, "mu = 3.0\nC1 = 1.0"), r"\[tissue.2\] C1: means nothing with model 'neo-hookean'"),
+    "law 2": ((SECOND_LAW, 'model = "mooney-rivlin"\nmu = 3.0'), r"\[tissue.2\] mu: means nothing with .*C1, C2"),
+    "fixed": (('"fixed"', '"fixed"\nvalue = [0, 0, 1]'), r"\[boundary 1\] value: means nothing with kind 'fixed'"),
+    "moved": ((FORCE, 'kind = "displacement"\nvalue = [0, 0, 1]\nramp = []'), r"\[boundary 2\] ramp: means nothing"),
+    "no head": (("[case]", "[case.x]"), r"\[case\] x: unknown key"),
+    "no name": (('name = "block"\n', ""), r"\[case\] name: missing"),
+    "no origin": (('origin = "synthetic"\n', ""), r"\[case\] origin: missing"),
+    "no file": (('file = "mesh.vtu"\n', ""), r"\[mesh\] file: missing"),
+    "no mu": (("mu = 1000.0\n", ""), r"\[tissue.1\] mu: missing"),
+    "no alpha": ((SECOND_LAW, 'model = "ogden"\nmu = [1.0]'), r"\[tissue.2\] alpha: missing"),
+    "no C2": ((SECOND_LAW, 'model = "mooney-rivlin"\nC1 = 1.0'), r"\[tissue.2\] C2: missing"),
+    "no nodes": (('nodes = "top"\n', ""), r"\[boundary 2\] nodes: missing"),
+    "no kind": (('kind = "fixed"\n', ""), r"\[boundary 1\] kind: missing"),
+    "no total": (("\ntotal = [0.01, 0.02, -0.05]", ""), r"\[boundary 2\] total: missing"),
+    "no axis": (("[body]", GRAVITY + "[body]"), r"\[case\] gravity_axis: missing, but \[\[mechanism\]\] gravity"),
+    # values: of the wrong type or outside their range
+    "name": (('"block"', "529"), r"\[case\] name: expected text, found 529"),
+    "units": (('"mm"', '"cm"'), r"\[case\] units: found 'cm', expected one of m, mm"),
+    "axes": (('"RAS"', '"RAI"'), r"\[case\] axes: found 'RAI', expected one of RAS, LPS"),
+    "origin": (('"synthetic"', '"made up"'), r"\[case\] origin: found 'made up', expected one of measured, stand-in"),
+    "zero axis": (('"RAS"', '"RAS"\ngravity_axis = [0, 0, 0]'), r"\[case\] gravity_axis: .* not all zero, found \[0.0"),
+    "axis": (('"RAS"', '"RAS"\ngravity_axis = "down"'), r"\[case\] gravity_axis: expected 3 finite numbers"),
+    "model": (('"neo-hookean"', '"fung"'), r"\[tissue.1\] model: found 'fung', expected one of neo-hookean"),
+    "formulation": ((SECOND_LAW, 'mu = 1.0\nformulation = "mixed"'), r"\[tissue.2\] formulation: found 'mixed'"),
+    "zero mu": (("mu = 1000.0", "mu = 0"), r"\[tissue.1\] .*mu = 0"),
+    "negative mu": (("mu = 1000.0", "mu = -5.0"), r"\[tissue.1\] .*mu = -5"),
+    "prior": (("mu = 1000.0", 'mu = "prior"'), r"\[tissue.1\] mu: the generative model is not available yet"),
+    "ogden": ((SECOND_LAW, 'model = "ogden"\nmu = 1.0\nalpha = 2.0'), r"\[tissue.2\] mu: expected a list of finite"),
+    "ogden terms": ((SECOND_LAW, 'model = "ogden"\nmu = [1.0, 2.0]\nalpha = [2.0]'), r"\[tissue.2\] .*2 values of mu"),
+    "density": (("density = 1000.0", "density = 0"), r"\[body\] density: found 0, expected a positive number"),
+    "nu": (("poisson = 0.45", "poisson = 0.5"), r"\[body\] poisson: found 0.5, expected .*open interval \(-1, 0.5\)"),
+    "low nu": (("poisson = 0.45", "poisson = -1"), r"\[body\] poisson: found -1, expected"),
+    "table": (("[body]\ndensity = 1000.0\npoisson = 0.45", "[[body]]\ndensity = 1"), r"\[body\]: expected a table"),
+    "list": (('[[boundary]]\nname = "table"', '[boundary]\nname = "table"'), r"TOML"),
+    "mechanism list": (("[body]", '[mechanism]\nkind = "gravity"\n[body]'), r"\[\[mechanism\]\]: expected a list"),
+    "ramp": (("-0.05]", "-0.05]\nramp = 5"), r"\[boundary 2\] ramp: expected \[time, factor\] pairs"),
+    "ramp text": (("-0.05]", '-0.05]\nramp = [["0", 1]]'), r"\[boundary 2\] ramp: expected \[time, factor\] pairs"),
+    "ramp nan": (("-0.05]", "-0.05]\nramp = [[0, nan]]"), r"\[boundary 2\] ramp: expected .*finite"),
+    "ramp back": (("-0.05]", "-0.05]\nramp = [[1, 0], [0, 1]]"), r"\[boundary 2\] ramp.*times must increase"),
+    # labels and sets, both ways
+    "tissue missing": (('[tissue.2]\nname = "stiff"\nmu = 3000.0\n', ""), r"\[tissue.2\]: missing, but the mesh has"),
+    "tissue unused": ((SECOND_LAW, "mu = 3.0\n[tissue.7]\nmu = 1.0"), r"\[tissue.7\]: the mesh has no tissue 7"),
+    "tissue word": (("[tissue.2]", "[tissue.grey]"), r"\[tissue.grey\]: tissue labels are whole numbers"),
+    "tissue 02": (("[tissue.2]", "[tissue.02]"), r"\[tissue.02\]: tissue labels are whole numbers"),
+    "tissue huge": (("[tissue.2]", f"[tissue.{'2' * 5000}]"), r"\[tissue.2+\]: tissue labels are whole numbers"),
+    "tissue squared": (("[tissue.2]", '[tissue."²"]'), r"\[tissue.²\]: tissue labels are whole numbers"),
+    "tissue value": (
+        ('[tissue.2]\nname = "stiff"\nmu', "[tissue]\n2"),
+        r"\[tissue.2\]: expected a table, found 3000.0",
+    ),
+    "labels": (('"mesh.vtu"', '"mesh.vtu"\ntissue = "organ"'), r"no cell array 'organ' .*found .*tissue"),
+    "set": (('"top"', '"roof"'), r"\[boundary 2\] nodes: .*no node set 'roof' \(it has bottom, nobody, top\)"),
+    "empty set": (('"top"', '"nobody"'), r"\[boundary 2\] nodes: node set 'nobody' is empty"),
+    "empty fixed": (('"bottom"', '"nobody"'), r"\[boundary 1\] nodes: node set 'nobody' is empty"),
+    "elements": (("[body]", '[[mechanism]]\nkind = "resection"\n[body]'), r"\[mechanism 1\] elements: .*'resection'"),
+    "both": (
+        (FORCE, FORCE + '\n[[boundary]]\nname = "lift"\nnodes = "bottom"\nkind = "displacement"\nvalue = [0, 0, 1]'),
+        r"\[\[boundary\]\] 'table' fixes 9 nodes that 'lift' displaces",
+    ),
+    "twice": (
+        ("[body]", 2 * '[[mechanism]]\nkind = "resection"\nelements = "corner"\n' + "[body]"),
+        r"\[mechanism 2\] kind: a second 'resection'",
+    ),
+    # what is not there yet
+    "sliding": (('"force"', '"sliding"'), r"\[boundary 2\] kind: 'sliding' cannot be simulated yet"),
+    "pressure": (('"force"', '"pressure"'), r"\[boundary 2\] kind: 'pressure' cannot be simulated yet"),
+    "contact": (('"force"', '"contact"'), r"\[boundary 2\] kind: 'contact' cannot be simulated yet"),
+    "kind": (('"force"', '"farce"'), r"\[boundary 2\] kind: found 'farce', expected one of fixed, sliding"),
+    "falx": (("[body]", '[[mechanism]]\nkind = "falx"\n[body]'), r"\[mechanism 1\] kind: 'falx' cannot be simulated"),
+    "specimen": (("[body]", '[specimen]\nshape = "block"\n[body]'), r"\[specimen\]: .*cannot be simulated yet"),
+    # files
+    "no mesh": (('"mesh.vtu"', '"other.vtu"'), r"\[mesh\] file: no such file: .*other.vtu"),
+    "outside": (('"mesh.vtu"', '"../mesh.vtu"'), r"\[mesh\] file: '../mesh.vtu' leaves the case folder"),
+    "absolute": (('"mesh.vtu"', '"/etc/passwd"'), r"\[mesh\] file: '/etc/passwd' leaves the case folder"),
+    "null": (('"mesh.vtu"', r'"a\u0000b"'), r"\[mesh\] file: expected the name of a file"),
+    "a folder": (('"mesh.vtu"', '"."'), r"\[mesh\] file: no such file"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_wrong_is_named(tmp_path, name):
+    change, expected = WRONG[name]
+
+    message = refusal(tmp_path, change)
+    assert re.search(expected, message), message
+
+
+def test_the_level_of_the_fluid_must_be_a_number(tmp_path):
+    gravity = ("[body]", GRAVITY + "csf_level = nan\n[body]")
+    message = refusal(tmp_path, gravity, ('"RAS"', '"RAS"\ngravity_axis = [0, 0, -1]'))
+    assert message == "case.toml: [mechanism 1] csf_level: expected a finite number, found nan"
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", "case.toml: [case]: missing"),
+        (b"[case", "case.toml: not valid TOML: "),
+        (CASE[:-8].encode(), "case.toml: not valid TOML: "),
+        (CASE.replace("A block", "Ein Stück").encode("latin-1"), "case.toml: not UTF-8 text (byte "),
+        (b"a = " + b"1" * 5000, "case.toml: not valid TOML: "),
+        (b"a = " + b"[" * 5000, "case.toml: not valid TOML: "),
+        (b"\x00\x01\x02", "case.toml: not valid TOML: "),
+    ],
+)
+def test_text_that_is_not_a_case(tmp_path, content, expected):
+    write_folder(tmp_path)
+    (tmp_path / "case.toml").write_bytes(content)
+    assert refused(tmp_path).startswith(expected)
+
+
+def test_no_case_in_the_folder(tmp_path):
+    assert refused(tmp_path) == "case.toml: no such file"
+    (tmp_path / "case.toml").mkdir()
+    assert refused(tmp_path).startswith("case.toml: cannot be read: ")
+
+
+def damaged(change):
+    """The block's mesh as meshio holds it, changed."""
+    mesh = block()
+    raw = meshio.Mesh(
+        1000.0 * mesh.points,
+        [("tetra", mesh.tetrahedra.copy())],
+        point_data={name: members.astype(np.uint8) for name, members in mesh.node_sets.items()},
+        cell_data={"tissue": [mesh.tissue.astype(float)]},
+    )
+    change(raw)
+    return raw
+
+
+def invert(raw):
+    raw.cells[0].data[5, [0, 1]] = raw.cells[0].data[5, [1, 0]]
+
+
+def flatten(raw):
+    raw.points[:, 2] = 0.0
+
+
+def add_unused(raw):
+    raw.points = np.vstack([raw.points, [[1.0, 2.0, 3.0]]])
+    raw.point_data = {name: np.append(data, 0) for name, data in raw.point_data.items()}
+
+
+def repeat(raw):
+    raw.cells[0].data[5, 1] = raw.cells[0].data[5, 0]
+
+
+def spoil_point(raw):
+    raw.points[7, 1] = np.nan
+
+
+def spoil_label(raw):
+    raw.cell_data["tissue"][0][3] = np.nan
+
+
+def make_hexahedra(raw):
+    raw.cells = [meshio.CellBlock("hexahedron", np.arange(8)[None])]
+    raw.cell_data = {}
+
+
+def make_triangles(raw):
+    raw.cells = [meshio.CellBlock("triangle", raw.cells[0].data[:, :3])]
+
+
+@pytest.mark.parametrize("ending", ["vtu", "msh"])
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (invert, "1 tetrahedra are inverted (negative volume): tetrahedron 5"),
+        (flatten, "48 tetrahedra have zero volume"),
+        (add_unused, "1 node(s) belong to no tetrahedron: node 27"),
+        (repeat, "1 tetrahedra name a node twice: tetrahedron 5"),
+        (spoil_point, "1 node(s) with a coordinate that is not finite: node 7"),
+        (spoil_label, "tissue labels must be whole numbers that fit 32 bits, found nan"),
+        (make_hexahedra, "found volume cells of type hexahedron; expected four-node tetrahedra only"),
+        (make_triangles, "found no tetrahedra (cells: triangle)"),
+    ],
+)
+def test_a_mesh_that_is_wrong(tmp_path, ending, change, expected):
+    write_folder(tmp_path, ("mesh.vtu", f"mesh.{ending}"))
+    options = {"file_format": "gmsh"} if ending == "msh" else {}
+    meshio.write(tmp_path / f"mesh.{ending}", damaged(change), **options)
+    assert refused(tmp_path).startswith(f"mesh.{ending}: {expected}")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"), [("mesh.vtu", b""), ("mesh.msh", b""), ("mesh.vtu", None), ("mesh", b"x")]
+)
+def test_a_file_that_is_no_mesh(tmp_path, capfd, name, content):
+    write_folder(tmp_path, ("mesh.vtu", name))
+    if content is None:
+        content = (tmp_path / "mesh.vtu").read_bytes()[:800]
+    (tmp_path / name).write_bytes(content)
+    assert refused(tmp_path).startswith(f"{name}: not a mesh that meshio can read")
+    # nobody else has anything to say about it
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("tissue", ["single", "multi"])
+def test_shipped_cases(name, tissue):
+    case = find_case(name, tissue)
+    assert sorted(case.tissues) == ([1] if tissue == "single" else [1, 2])
+    assert case.origin == ("stand-in" if name == "0529" else "synthetic")
+    assert (case.resection is not None) == (name == "0529")
+
+
+def test_single_tissue_of_a_folder_is_a_file_of_its_own(tmp_path):
+    write_folder(tmp_path)
+    with pytest.raises(InputError, match=r"case-single\.toml: no such file"):
+        find_case(str(tmp_path), "single")
+    (tmp_path / "case-single.toml").write_text(changed(CASE, ('"block"', '"one"')))
+    assert find_case(str(tmp_path), "single").name == "one"
+    assert find_case(str(tmp_path), "multi").name == "block"
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("0528", "did you mean '0529'?"),
+        ("phantom_fine", "did you mean 'phantom-fine'?"),
+        ("brain", "there are: 0529, phantom, phantom-fine"),
+        ("", "there are: "),
+        ("a" * 5000, "there are: "),
+        ("a\0b", "there are: "),
+    ],
+)
+def test_a_case_that_is_not_there(name, hint):
+    with pytest.raises(InputError) as caught:
+        find_case(name)
+    assert str(caught.value).startswith(f"case '{name}': no such case and no such folder ({hint}")
