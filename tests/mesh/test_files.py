@@ -71,6 +71,16 @@ def test_real_valued_arrays_are_not_sets(tmp_path):
     assert mesh.tissue.tolist() == [1, 2]
 
 
+def test_a_set_of_real_zeros_and_ones(tmp_path):
+    cap = np.array([0.0, 1.0, 0.0, 1.0, 0.0])
+    meshio.write(tmp_path / "a.vtu", meshio.Mesh(POINTS, [("tetra", TETS)], point_data={"cap": cap}))
+    assert read_mesh(tmp_path / "a.vtu").node_sets["cap"].tolist() == [False, True, False, True, False]
+    cap[2] = np.nan
+    meshio.write(tmp_path / "a.vtu", meshio.Mesh(POINTS, [("tetra", TETS)], point_data={"cap": cap}))
+    with pytest.raises(MeshError, match="'cap' holds 1 values that are not finite"):
+        read_mesh(tmp_path / "a.vtu")
+
+
 def test_errors_name_the_file(tmp_path):
     with pytest.raises(MeshError, match=r"gone\.vtu: no such file"):
         read_mesh(tmp_path / "gone.vtu")

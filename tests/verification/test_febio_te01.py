@@ -1,6 +1,7 @@
 """B1: FEBio's test problem te01, with its own law - which shows that a new law is one file of device functions."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -54,10 +55,15 @@ class LogarithmicNeoHookean(Law):
     c1: float
     K: float
     name: ClassVar[str] = "logarithmic neo-hookean"
+    keys: ClassVar[Mapping[str, type]] = {"c1": float, "K": float}
 
     @property
     def shear_modulus(self) -> float:
         return 2.0 * self.c1
+
+    @classmethod
+    def of_shear_modulus(cls, mu: float) -> "LogarithmicNeoHookean":
+        return cls(0.5 * mu, 10.0 * mu)
 
     def parameters(self) -> tuple[float, ...]:
         return (self.c1,)

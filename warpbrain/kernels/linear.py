@@ -13,6 +13,7 @@ are dealt with here and nowhere else:
   over. CG therefore sees scalar views of our arrays.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -164,7 +165,10 @@ def linear_kernels(precision: Precision) -> LinearKernels:
 
 @contextmanager
 def _conditional_loop(test_convergence: Any) -> Iterator[None]:
-    """While a graph of the CPU is being captured: let Warp's CG loop on the device until it has converged."""
+    """While a graph of the CPU is being captured: let Warp's CG loop on the device until it has converged.
+
+    Replaces a function of Warp for that moment, in the whole process: not for captures in several threads at once.
+    """
 
     def loop(
         do_cycle: Callable[[], None],
@@ -211,7 +215,7 @@ class ConjugateGradient:
         `b`, and `x`: the first guess and the result.
     precision : Precision
     tolerance : float
-        Relative: CG ends when ``|b - A x| <= tolerance |b|``.
+        Relative: CG ends when ``|b - A x| <= tolerance |b|``. What `solve` takes if it is given no other.
     max_iterations : int
     preconditioner : str
         One of `PRECONDITIONERS`.
@@ -257,19 +261,30 @@ class ConjugateGradient:
             self._preconditioner = warp_linear.LinearOperator(
                 shape, precision.mat33, self._device, self._apply_diagonal
             )
-        self._solver = warp_linear.CG(
-            operator,
-            self._scalars(right_hand_side),
-            self._scalars(solution),
-            tol=tolerance,
-            atol=0.0,
-            maxiter=max_iterations,
-            M=self._preconditioner,
-            check_every=0,
-            use_cuda_graph=True,
-        )
-        self._graph: Any = None
+        self._operator = operator
+        self._b, self._x = right_hand_side, solution
+        self._tolerance = tolerance
+        self._max_iterations = max_iterations
+        self._graphs: dict[float, Any] = {}
+        self._solvers: dict[float, warp_linear.CG] = {}
         self._outcome: tuple[wp.array, wp.array, wp.array] | None = None
+        self._outcomes: dict[float, tuple[wp.array, wp.array, wp.array]] = {}
+
+    def _solver(self, tolerance: float) -> Any:
+        """Warp's solver for a tolerance, which it keeps for life; made when it is first asked for."""
+        if tolerance not in self._solvers:
+            self._solvers[tolerance] = warp_linear.CG(
+                self._operator,
+                self._scalars(self._b),
+                self._scalars(self._x),
+                tol=tolerance,
+                atol=0.0,
+                maxiter=self._max_iterations,
+                M=self._preconditioner,
+                check_every=0,
+                use_cuda_graph=True,
+            )
+        return self._solvers[tolerance]
 
     def _scalars(self, x: wp.array) -> wp.array:
         """The scalars of an array of vectors, without a copy."""
@@ -339,6 +354,7 @@ class ConjugateGradient:
                 device=self._device,
             )
         elif self._kind == "fsai":
+            self._refused = None
             if self._fsai is not None:
                 self._fsai.update(self._matrix)
                 return
@@ -349,30 +365,35 @@ class ConjugateGradient:
                 blocks = self._matrix.values.numpy()[self._diagonal.numpy()]
                 self._refused = float(np.min(np.diagonal(blocks, axis1=1, axis2=2)))
 
-    def solve(self) -> None:
+    def solve(self, tolerance: float | None = None) -> None:
         """Run CG from the present content of the solution array.
 
-        Within the capture of a graph this only records; otherwise it replays a graph of its own.
+        Within the capture of a graph this only records; otherwise it replays a graph of its own. A tolerance other than
+        that of the constructor is rounded down to a quarter of a decade, so that few graphs serve all.
         """
         if self._refused is not None:
             return
+        wanted = self._tolerance if tolerance is None else 10.0 ** (math.floor(4.0 * math.log10(tolerance)) / 4.0)
         if self._device.is_capturing:
-            self._record()
+            self._record(wanted)
             return
-        if self._graph is None:
+        if wanted not in self._graphs:
             with wp.ScopedCapture(device=self._device) as capture:
-                self._record()
-            self._graph = capture.graph
-        wp.capture_launch(self._graph)
+                self._record(wanted)
+            self._graphs[wanted] = capture.graph
+        wp.capture_launch(self._graphs[wanted])
+        self._outcome = self._outcomes[wanted]
 
-    def _record(self) -> None:
+    def _record(self, tolerance: float) -> None:
+        solver = self._solver(tolerance)
         if self._watch:
             self._least.fill_(float("inf"))
         if self._device.is_cpu:
             with _conditional_loop(self._kernels.test_convergence):
-                self._outcome = self._solver(M=self._fsai)
+                self._outcome = solver(M=self._fsai)
         else:
-            self._outcome = self._solver(M=self._fsai)
+            self._outcome = solver(M=self._fsai)
+        self._outcomes[tolerance] = self._outcome
 
     def result(self) -> LinearResult:
         """How the last solve ended (waits for the device)."""

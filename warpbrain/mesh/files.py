@@ -2,8 +2,9 @@
 
 Conventions of the files
     * tissue labels: an integer cell array, ``tissue`` unless the caller says otherwise;
-    * node sets: every integer or boolean point array of one column, non-zero = member;
-    * element sets: every integer or boolean cell array whose name starts with ``set_``; the set's name is the rest.
+    * node sets: every point array of one column that is integer, boolean, or real with no values but 0 and 1; non-zero
+      = member;
+    * element sets: every such cell array whose name starts with ``set_``; the set's name is the rest.
 """
 
 from __future__ import annotations
@@ -95,8 +96,13 @@ def _members(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArr
             flag = flag[:, 0]
         if not name.startswith(prefix) or flag.ndim != 1 or flag.dtype.kind not in "biuf":
             continue
-        if not np.all(np.isfinite(flag)):
-            raise MeshError(f"array '{name}' holds {np.count_nonzero(~np.isfinite(flag))} values that are not finite")
+        if flag.dtype.kind == "f":
+            # a set that was saved as real numbers, and not a field such as a temperature
+            finite = np.isfinite(flag)
+            if not np.all(np.isin(flag[finite], (0.0, 1.0))) or not finite.any():
+                continue
+            if not finite.all():
+                raise MeshError(f"array '{name}' holds {np.count_nonzero(~finite)} values that are not finite")
         sets[name.removeprefix(prefix)] = flag != 0
     return sets
 

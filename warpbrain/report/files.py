@@ -28,9 +28,10 @@ def write_result(path: Path, result: Result) -> None:
         mesh.points * MILLIMETRES,
         [("tetra", mesh.tetrahedra)],
         point_data={
+            # sets first: one of the same name must not replace a result
+            **{name: members.astype(np.uint8) for name, members in mesh.node_sets.items()},
             "displacement": result.u * MILLIMETRES,
             "reaction": result.reactions,
-            **{name: members.astype(np.uint8) for name, members in mesh.node_sets.items()},
         },
         cell_data={
             "tissue": [mesh.tissue],

@@ -66,8 +66,9 @@ class EquilibriumOptions:
         Iterations in a load step before it is cut.
     max_total_newton : int
         Iterations in all before the solve gives up.
-    min_load_step : float
-        Smallest load step before the solve gives up.
+    max_load_step, min_load_step : float
+        Largest load step, and the smallest before the solve gives up. A small largest step follows the path of a
+        slowly growing load; with the default of 1 Newton's method may land on another branch beyond a limit point.
     cg_tolerance : float
         Loosest relative tolerance of a linear solve; tightened as Newton converges.
     max_cg : int
@@ -83,6 +84,7 @@ class EquilibriumOptions:
     tolerance: float = 1e-8
     max_newton: int = 30
     max_total_newton: int = 150
+    max_load_step: float = 1.0
     min_load_step: float = 1.0 / 1024.0
     cg_tolerance: float = 0.03
     max_cg: int = 10_000
@@ -94,6 +96,8 @@ class EquilibriumOptions:
             value = getattr(self, name)
             if not 0.0 < value < 1.0:
                 raise InputError(f"equilibrium: {name} = {value}: expected a number between 0 and 1")
+        if not self.min_load_step <= self.max_load_step <= 1.0:
+            raise InputError(f"equilibrium: max_load_step = {self.max_load_step}: expected min_load_step to 1")
 
 
 @dataclass(frozen=True)
@@ -156,6 +160,17 @@ class EquilibriumSolver:
         self._on_step = on_step
         self.clock = PhaseClock(system.device)
         self._reference_shift: float | None = None
+        self._cg = ConjugateGradient(
+            system.matrix,
+            system.diagonal,
+            system.load,
+            system.solution,
+            system.precision,
+            tolerance=self.options.cg_tolerance,
+            max_iterations=self.options.max_cg,
+            preconditioner=self.options.preconditioner,
+            watch_curvature=True,
+        )
         self._history: list[NewtonStep] = []
         self._free = 1.0 - system.model.constrained
         # residuals cannot fall below the rounding of the sums of element forces
@@ -192,7 +207,7 @@ class EquilibriumSolver:
         u = np.zeros_like(full) if start is None else np.array(start, dtype=np.float64)
         origin = np.where(model.constrained, u, 0.0)
         self._history = []
-        done, step = 0.0, 1.0
+        done, step = 0.0, self.options.max_load_step
         while done < 1.0:
             load = min(1.0, done + step)
             target = origin + load * (model.prescribed - origin * model.constrained)
@@ -204,7 +219,7 @@ class EquilibriumSolver:
                 if exhausted or step < self.options.min_load_step:
                     raise SolveError(self._no_equilibrium(done, tried, str(failure))) from None
                 continue
-            u, done, step = reached, load, 2.0 * step
+            u, done, step = reached, load, min(2.0 * step, self.options.max_load_step)
         return Equilibrium(u, self.system.internal.numpy().astype(np.float64), energy, residual, tuple(self._history))
 
     def _no_equilibrium(self, done: float, step: float, why: str) -> str:
@@ -270,7 +285,7 @@ class EquilibriumSolver:
                 self._on_step(record)
         raise _StepFailed(
             f"Newton's method did not converge in {options.max_newton} iterations "
-            f"(relative residual {relative:.1e}, goal {self.tolerance:.1e})"
+            f"(relative residual {relative:.1e}, goal {self.tolerance:.1e}){self._worst_element()}"
         )
 
     def _least_shift(self) -> float:
@@ -323,21 +338,10 @@ class EquilibriumSolver:
                 system.increment.assign(prescribed)
                 system.subtract_constrained_load(system.increment, 1.0)
             system.solution.zero_()
-        cg = ConjugateGradient(
-            system.matrix,
-            system.diagonal,
-            system.load,
-            system.solution,
-            system.precision,
-            tolerance=eta,
-            max_iterations=self.options.max_cg,
-            preconditioner=self.options.preconditioner,
-            watch_curvature=True,
-        )
         with self.clock.phase("solve system"):
-            cg.prepare()
-            cg.solve()
-        linear = cg.result()
+            self._cg.prepare()
+            self._cg.solve(eta)
+        linear = self._cg.result()
         return system.solution.numpy().astype(np.float64) * self._free + prescribed, linear
 
     def _potential(self, u: Floats, external: Floats) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Callable
 from typing import NoReturn
@@ -25,7 +26,7 @@ def exit_status(program: str, call: Callable[[], None]) -> int:
     Returns
     -------
     int
-        0 done, 1 no answer found or no place to write it, 2 bad input, 130 interrupted.
+        0 done, 1 no answer found or no place to write it, 2 bad input, 130 interrupted, 141 nobody reads the output.
     """
     try:
         with stop_promptly():
@@ -38,9 +39,9 @@ def exit_status(program: str, call: Callable[[], None]) -> int:
         print(f"{program}: {error}", file=sys.stderr)
         return 1
     except BrokenPipeError:
-        # whoever read our output has enough; what Python still holds has nowhere to go
+        # whoever read our output left before the work was done: end as the shell's own tools do
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return 128 + signal.SIGPIPE
     except OSError as error:
         print(f"{program}: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
         return 1
