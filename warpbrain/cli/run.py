@@ -274,11 +274,11 @@ def _relax(
         state = relax_to_rest(system, RelaxationOptions(tolerance=options.tolerance), on_step, clock)
     finally:
         progress.clear()
-    say(f"  at rest: relative out-of-balance force {state.residual:.1e}")
+    say(f"  at rest: relative out-of-balance force {state.residual:.1e} (goal {state.tolerance:.1e})")
     outcome = {
         "kind": "at rest",
         "first_step": first[0],
-        "tolerance": options.tolerance,
+        "tolerance": state.tolerance,
         "relative_residual": state.residual,
         "history": [vars(step) for step in state.history],
     }

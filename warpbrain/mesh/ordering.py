@@ -11,7 +11,7 @@ def ordered(mesh: TetMesh) -> TetMesh:
     """The same mesh with nodes in reverse Cuthill-McKee order and tetrahedra sorted by their nodes.
 
     Meshers number as they go. In this order the entries that an element or a matrix row touches lie close together,
-    which more than halves the time of assembly on the CPU (`docs/benchmarks.md`).
+    which saves a fifth of the time of assembly (`docs/benchmarks.md`).
     """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import reverse_cuthill_mckee

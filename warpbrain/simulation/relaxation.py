@@ -43,11 +43,21 @@ class RelaxationStep:
 
 @dataclass(frozen=True)
 class Relaxed:
-    """A state at rest; `u` (n, 3) [m], `internal` (n, 3) [N], relative out-of-balance force and history."""
+    """A state at rest.
+
+    Attributes
+    ----------
+    u, internal : (n, 3) array
+        Displacement [m] and internal forces [N].
+    residual, tolerance : float
+        Relative out-of-balance force that was reached, and that was to be reached in this precision.
+    history : tuple of RelaxationStep
+    """
 
     u: NDArray[np.float64]
     internal: NDArray[np.float64]
     residual: float
+    tolerance: float
     history: tuple[RelaxationStep, ...]
 
 
@@ -143,7 +153,7 @@ def relax_to_rest(
         # copies: on the CPU these arrays are the live ones
         u, v = system.u.numpy().copy(), simulator.v.numpy().copy()
         if residual <= goal and moved >= 1.0:
-            return Relaxed(u.astype(np.float64), internal, residual, tuple(history))
+            return Relaxed(u.astype(np.float64), internal, residual, goal, tuple(history))
         h = min(2.0 * h, options.largest_step)
     raise SolveError(
         f"not at rest after {options.max_steps} steps, {history[-1].time:.3g} s: relative out-of-balance force "
