@@ -19,7 +19,13 @@ import warp as wp
 
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
-from warpbrain.kernels.tetrahedron import ElementKernels, deformation_gradient, store_blocks, store_forces
+from warpbrain.kernels.tetrahedron import (
+    ElementKernels,
+    deformation_gradient,
+    simple_kernels,
+    store_blocks,
+    store_forces,
+)
 
 
 @wp.func
@@ -68,6 +74,11 @@ def invariant_kernels(
         return P
 
     @wp.func
+    def energy_of(F: mat33, parameters: wp.array2d[scalar], e: int):
+        cof = cofactor(F)
+        return energy_density(wp.ddot(F, F), second_of(cof), wp.dot(F[0], cof[0]), parameters, e)
+
+    @wp.func
     def first_block(
         fa: vec3, fb: vec3, ca: vec3, cb: vec3, isotropic: scalar, M11: scalar, M1J: scalar, MJJ: scalar, mJ: scalar
     ):
@@ -94,21 +105,6 @@ def invariant_kernels(
         K[1, 1] += isotropic
         K[2, 2] += isotropic
         return K
-
-    @wp.kernel(module=module)
-    def forces(
-        elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        parameters: wp.array2d[scalar],
-        u: wp.array[vec3],
-        element_forces: wp.array2d[vec3],
-    ):
-        e = elements[wp.tid()]
-        G = inverse_edges[e]
-        F = deformation_gradient(u, nodes[e], G)
-        store_forces(volume[e] * stress_of(F, parameters, e), G, element_forces, e)
 
     @wp.kernel(module=module)
     def forces_and_tangents(
@@ -165,40 +161,6 @@ def invariant_kernels(
         store_forces(VP, G, element_forces, e)
         store_blocks(K11, K12, K13, K22, K23, K33, element_blocks, e)
 
-    @wp.kernel(module=module)
-    def energy(
-        elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        parameters: wp.array2d[scalar],
-        u: wp.array[vec3],
-        element_energy: wp.array[scalar],
-        element_J: wp.array[scalar],
-    ):
-        e = elements[wp.tid()]
-        F = deformation_gradient(u, nodes[e], inverse_edges[e])
-        cof = cofactor(F)
-        J = wp.dot(F[0], cof[0])
-        element_J[e] = J
-        # An inverted element has no energy: the caller rejects the state by its J.
-        element_energy[e] = scalar(0.0)
-        if scalar(0.0) < J:
-            element_energy[e] = volume[e] * energy_density(wp.ddot(F, F), second_of(cof), J, parameters, e)
-
-    @wp.kernel(module=pointwise)
-    def stress(
-        elements: wp.array[int],
-        F: wp.array[mat33],
-        parameters: wp.array2d[scalar],
-        density: wp.array[scalar],
-        P: wp.array[mat33],
-    ):
-        e = elements[wp.tid()]
-        cof = cofactor(F[e])
-        density[e] = energy_density(wp.ddot(F[e], F[e]), second_of(cof), wp.dot(F[e][0], cof[0]), parameters, e)
-        P[e] = stress_of(F[e], parameters, e)
-
     @wp.kernel(module=pointwise)
     def moduli(
         elements: wp.array[int],
@@ -228,4 +190,5 @@ def invariant_kernels(
             )
         blocks[e, j, k] = K
 
+    forces, energy, stress = simple_kernels(stress_of, energy_of, precision, module, pointwise)
     return ElementKernels(forces, forces_and_tangents, energy, stress, moduli)

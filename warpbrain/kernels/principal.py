@@ -23,7 +23,13 @@ import warp as wp
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.svd import singular_value_decomposition
-from warpbrain.kernels.tetrahedron import ElementKernels, deformation_gradient, store_blocks, store_forces
+from warpbrain.kernels.tetrahedron import (
+    ElementKernels,
+    deformation_gradient,
+    simple_kernels,
+    store_blocks,
+    store_forces,
+)
 
 
 @cache
@@ -72,20 +78,10 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
         T, _H, _m = derivatives(l, parameters, e)
         return U * wp.diag(T) * wp.transpose(V)
 
-    @wp.kernel(module=module)
-    def forces(
-        elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        parameters: wp.array2d[scalar],
-        u: wp.array[vec3],
-        element_forces: wp.array2d[vec3],
-    ):
-        e = elements[wp.tid()]
-        G = inverse_edges[e]
-        F = deformation_gradient(u, nodes[e], G)
-        store_forces(volume[e] * stress_of(F, parameters, e), G, element_forces, e)
+    @wp.func
+    def energy_of(F: mat33, parameters: wp.array2d[scalar], e: int):
+        _U, l, _V = singular_value_decomposition(F, small)
+        return energy_density(l, parameters, e)
 
     @wp.kernel(module=module)
     def forces_and_tangents(
@@ -122,40 +118,6 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
             e,
         )
 
-    @wp.kernel(module=module)
-    def energy(
-        elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        parameters: wp.array2d[scalar],
-        u: wp.array[vec3],
-        element_energy: wp.array[scalar],
-        element_J: wp.array[scalar],
-    ):
-        e = elements[wp.tid()]
-        F = deformation_gradient(u, nodes[e], inverse_edges[e])
-        J = wp.determinant(F)
-        element_J[e] = J
-        # An inverted element has no energy: the caller rejects the state by its J.
-        element_energy[e] = scalar(0.0)
-        if scalar(0.0) < J:
-            _U, l, _V = singular_value_decomposition(F, small)
-            element_energy[e] = volume[e] * energy_density(l, parameters, e)
-
-    @wp.kernel(module=pointwise)
-    def stress(
-        elements: wp.array[int],
-        F: wp.array[mat33],
-        parameters: wp.array2d[scalar],
-        density: wp.array[scalar],
-        P: wp.array[mat33],
-    ):
-        e = elements[wp.tid()]
-        _U, l, _V = singular_value_decomposition(F[e], small)
-        density[e] = energy_density(l, parameters, e)
-        P[e] = stress_of(F[e], parameters, e)
-
     @wp.kernel(module=pointwise)
     def moduli(
         elements: wp.array[int],
@@ -171,4 +133,5 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
         # row j of V is V^T e_j
         blocks[e, j, k] = block(V[j], V[k], H, same, swap, U)
 
+    forces, energy, stress = simple_kernels(stress_of, energy_of, precision, module, pointwise)
     return ElementKernels(forces, forces_and_tangents, energy, stress, moduli)

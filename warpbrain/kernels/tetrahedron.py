@@ -94,3 +94,68 @@ def store_blocks(K11: Any, K12: Any, K13: Any, K22: Any, K23: Any, K33: Any, ele
     element_blocks[e, 7] = K22
     element_blocks[e, 8] = K23
     element_blocks[e, 9] = K33
+
+
+def simple_kernels(
+    stress_of: Any, energy_of: Any, precision: Precision, module: Any, pointwise: Any
+) -> tuple[Any, Any, Any]:
+    """Make the kernels that need no tangent, whatever shape the law has: forces, energy and stress of `ElementKernels`.
+
+    Parameters
+    ----------
+    stress_of, energy_of : wp.func
+        ``stress_of(F, parameters, e) -> P`` and ``energy_of(F, parameters, e) -> Psi``.
+    precision : Precision
+    module, pointwise : Module
+        Where the kernels over a mesh, and those at given deformation gradients, are compiled.
+    """
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+
+    @wp.kernel(module=module)
+    def forces(
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        parameters: wp.array2d[scalar],
+        u: wp.array[vec3],
+        element_forces: wp.array2d[vec3],
+    ):
+        e = elements[wp.tid()]
+        G = inverse_edges[e]
+        F = deformation_gradient(u, nodes[e], G)
+        store_forces(volume[e] * stress_of(F, parameters, e), G, element_forces, e)
+
+    @wp.kernel(module=module)
+    def energy(
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        parameters: wp.array2d[scalar],
+        u: wp.array[vec3],
+        element_energy: wp.array[scalar],
+        element_J: wp.array[scalar],
+    ):
+        e = elements[wp.tid()]
+        F = deformation_gradient(u, nodes[e], inverse_edges[e])
+        J = wp.determinant(F)
+        element_J[e] = J
+        # An inverted element has no energy: the caller rejects the state by its J.
+        element_energy[e] = scalar(0.0)
+        if J > scalar(0.0):  # noqa: SIM300  (a scalar of the device, not a constant)
+            element_energy[e] = volume[e] * energy_of(F, parameters, e)
+
+    @wp.kernel(module=pointwise)
+    def stress(
+        elements: wp.array[int],
+        F: wp.array[mat33],
+        parameters: wp.array2d[scalar],
+        density: wp.array[scalar],
+        P: wp.array[mat33],
+    ):
+        e = elements[wp.tid()]
+        density[e] = energy_of(F[e], parameters, e)
+        P[e] = stress_of(F[e], parameters, e)
+
+    return forces, energy, stress
