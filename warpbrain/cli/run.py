@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpbrain.errors import InputError
+from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
@@ -82,9 +83,13 @@ def _run(options: argparse.Namespace) -> None:
     out = output_folder(options.out or Path(f"warpbrain-{safe}-{options.tissue}"))
     say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
 
+    loading = Progress("kernels", options.quiet)
+    loading.show(0.0, "the first run on a machine compiles them")
+    loaded = system.load_kernels()
+    loading.clear()
     outcome, seconds, counts = _simulate(options, system, say)
     first_step = outcome.pop("first_step") - start
-    seconds = {"pre-processing": system.seconds, **seconds}
+    seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **seconds}
 
     from warpbrain.simulation.result import result_of
 
@@ -186,8 +191,6 @@ def _simulate(
     options: argparse.Namespace, system: System, say: Any
 ) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
     """Find the state that the arguments ask for; returns what to report of it, and times and counts by phase."""
-    from warpbrain.terminal.progress import Progress
-
     if options.steps is not None:
         return _follow(options, system, say, Progress("motion", options.quiet))
     if options.to_rest:
@@ -220,7 +223,6 @@ def _balance(
             say("            (from here on, the first iteration of each load step)")
         progress.show(step.load, f"Newton {step.iteration}")
 
-    progress.show(0.0, "loading kernels (the first run compiles them)")
     solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=options.tolerance), on_step)
     try:
         state = solver.solve()
@@ -268,7 +270,6 @@ def _relax(
         decades = math.log10(max(step.residual, 1e-300)) / math.log10(options.tolerance)
         progress.show(min(1.0, max(0.0, decades)), f"{step.time:.3g} s")
 
-    progress.show(0.0, "loading kernels (the first run compiles them)")
     clock = PhaseClock(system.device)
     try:
         state = relax_to_rest(system, RelaxationOptions(tolerance=options.tolerance), on_step, clock)
@@ -297,7 +298,6 @@ def _follow(
     every = max(1, options.steps // 10)
     history = []
     first: list[float] = []
-    progress.show(0.0, "loading kernels (the first run compiles them)")
     try:
         for step in range(1, options.steps + 1):
             # a prescribed displacement without a history of its own is reached evenly over the run

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.kernels.dynamics import dynamics_kernels
-from warpbrain.kernels.linear import ConjugateGradient, LinearResult
+from warpbrain.kernels.linear import LinearResult
 from warpbrain.kernels.precision import Precision
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
@@ -82,12 +82,7 @@ class Simulator:
         self._u_start = wp.zeros_like(self.v)
         self._v_prescribed = wp.zeros_like(self.v)
         self._moving = False
-        self._cg = ConjugateGradient(
-            system.matrix,
-            system.diagonal,
-            system.load,
-            system.solution,
-            system.precision,
+        self._cg = system.linear_solver(
             tolerance=self.tolerance,
             max_iterations=max_cg,
             preconditioner=preconditioner,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
-from warpbrain.kernels.linear import ConjugateGradient, LinearResult
+from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.held import require_held
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
@@ -160,12 +160,7 @@ class EquilibriumSolver:
         self._on_step = on_step
         self.clock = PhaseClock(system.device)
         self._reference_shift: float | None = None
-        self._cg = ConjugateGradient(
-            system.matrix,
-            system.diagonal,
-            system.load,
-            system.solution,
-            system.precision,
+        self._cg = system.linear_solver(
             tolerance=self.options.cg_tolerance,
             max_iterations=self.options.max_cg,
             preconditioner=self.options.preconditioner,

@@ -13,6 +13,7 @@ from warp.sparse import BsrMatrix, bsr_zeros
 
 from warpbrain.errors import InputError
 from warpbrain.kernels.assembly import assembly_kernels
+from warpbrain.kernels.linear import ConjugateGradient
 from warpbrain.kernels.precision import PRECISIONS, Precision
 from warpbrain.kernels.tetrahedron import PAIRS, ElementKernels
 from warpbrain.physics.laws import Law
@@ -230,6 +231,43 @@ class System:
             self.precision.scalar(k),
             self.load,
         )
+
+    def linear_solver(
+        self,
+        *,
+        tolerance: float,
+        max_iterations: int,
+        preconditioner: str = "block-jacobi",
+        watch_curvature: bool = False,
+    ) -> ConjugateGradient:
+        """Conjugate gradients for ``matrix solution = load``; see `warpbrain.kernels.linear`."""
+        return ConjugateGradient(
+            self.matrix,
+            self.diagonal,
+            self.load,
+            self.solution,
+            self.precision,
+            tolerance=tolerance,
+            max_iterations=max_iterations,
+            preconditioner=preconditioner,
+            watch_curvature=watch_curvature,
+        )
+
+    def load_kernels(self) -> float:
+        """Compile what a run needs, or find it in Warp's cache, at the present state; returns the seconds it took."""
+        start = time.perf_counter()
+        self.evaluate_forces()
+        self.evaluate_tangents()
+        self.gather_forces()
+        self.assemble(k=1.0, m=1.0)
+        self.load.zero_()
+        self.solution.zero_()
+        solver = self.linear_solver(tolerance=0.5, max_iterations=1, watch_curvature=True)
+        solver.prepare()
+        solver.solve()
+        self.energy()
+        wp.synchronize_device(self.device)
+        return time.perf_counter() - start
 
     def energy(self) -> tuple[float, float]:
         """Stored energy [J] at `u`, and the smallest `J` of an element (not positive: the energy means nothing)."""
