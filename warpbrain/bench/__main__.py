@@ -73,6 +73,7 @@ def _bench(options: argparse.Namespace) -> None:
             progress.clear()
             results.append(measured)
             print(*_lines(measured), sep="\n")
+        print("", *_table(results[-len(names) :]), sep="\n")
     if options.json is not None:
         with whole_file(options.json) as scratch:
             scratch.write_text(json.dumps({"versions": versions, "rows": [_json(r) for r in results]}, indent=1) + "\n")
@@ -110,6 +111,36 @@ def _lines(measured: Any) -> list[str]:
         f"  its median {median:.3f} ms; {measured.bytes_per_step / 1e6:.1f} MB moved and "
         f"{measured.launches_per_step} launches a step: {bandwidth:.1f} GB/s, {each:.1f} us a launch"
     )
+    return lines
+
+
+def _table(results: list[Any]) -> list[str]:
+    """The paper's table again: a line for each row, each cell our mean (sd) | the paper's mean = how often faster."""
+    from warpbrain.bench.table3 import MAIN_LOOP
+
+    heads = {
+        "pre-processing": "pre-processing",
+        **{name: name for name in results[0].phases},
+        "step": "without instruments",
+    }
+    lines = [
+        f"{'row':<10} {'nodes':>6} {'tets':>6} {'CG':>5}  "
+        + "  ".join(f"{head:<30}" for head in heads.values()).rstrip()
+    ]
+    for measured in results:
+        row = measured.row
+        columns = [(measured.preprocessing, row.preprocessing)]
+        columns += [(samples, row.phases[name][0]) for name, samples in measured.phases.items()]
+        columns.append((measured.step, row.phases[MAIN_LOOP][0]))
+        cells = []
+        for samples, paper in columns:
+            mean = statistics.fmean(samples)
+            cell = f"{mean:.3g} ({statistics.pstdev(samples):.2g}) | {paper:g} = {paper / mean:.3g}x"
+            cells.append(f"{cell:<30}")
+        cg = statistics.median(measured.cg_iterations)
+        lines.append(
+            f"{row.name:<10} {measured.nodes:>6} {measured.tetrahedra:>6} {cg:>5g}  " + "  ".join(cells).rstrip()
+        )
     return lines
 
 

@@ -78,7 +78,7 @@ def write_picture(path: Path, result: Result, whole: TetMesh, names: dict[int, s
     axes[1, 0].set_ylabel("after", fontsize=13)
     bar = figure.colorbar(shown, ax=axes[1, :], location="bottom", shrink=0.6, aspect=40, pad=0.02)
     bar.set_label("displacement [mm]   (dashed: where the surfaces were before)")
-    _legend(axes[0, 2], names, whole)
+    _legend(figure, names, whole)
     # titles and names are the user's free text, in which a dollar sign begins no formula
     figure.suptitle(f"{title}\n{subtitle}", fontsize=13, parse_math=False)
     with whole_file(path) as temporary, warnings.catch_warnings():
@@ -166,7 +166,7 @@ def _frame(axes: Any, mesh: TetMesh, view: _View) -> None:
     axes.text(low[0] + 14.0, low[1] + 6.0, "20 mm", fontsize=8, ha="center", color="#333333")
 
 
-def _legend(axes: Any, names: dict[int, str], mesh: TetMesh) -> None:
+def _legend(figure: Any, names: dict[int, str], mesh: TetMesh) -> None:
     from matplotlib.patches import Patch
 
     labels = np.unique(mesh.tissue).tolist()
@@ -178,5 +178,5 @@ def _legend(axes: Any, names: dict[int, str], mesh: TetMesh) -> None:
     ]
     if mesh.element_sets.get("resection", np.zeros(1, dtype=bool)).any():
         entries.append(Patch(facecolor=_RESECTED, label="resected"))
-    for text in axes.legend(handles=entries, loc="lower right", fontsize=8, frameon=False).get_texts():
+    for text in figure.legend(handles=entries, loc="upper right", fontsize=9, frameon=False).get_texts():
         text.set_parse_math(False)
