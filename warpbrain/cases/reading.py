@@ -21,15 +21,13 @@ from numpy.typing import NDArray
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh, read_mesh
-from warpbrain.mesh.tet_mesh import MeshError
+from warpbrain.mesh.files import METRES
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.gravity import Gravity
 from warpbrain.physics.laws import LAWS, Law
 from warpbrain.physics.load import Load
 from warpbrain.physics.resection import Resection
 
-#: Metres of one unit of length of a case.
-_UNITS = {"m": 1.0, "mm": 0.001}
 #: Signs that turn a case's axes into RAS.
 _AXES = {"RAS": (1.0, 1.0, 1.0), "LPS": (-1.0, -1.0, 1.0)}
 _ORIGINS = ("measured", "stand-in", "synthetic")
@@ -143,11 +141,11 @@ def read_case(path: Path) -> Case:
         raise InputError(f"{file}: [specimen]: laboratory specimens cannot be simulated yet")
     head = root.table("case")
     head.known("name", "title", "origin", "units", "axes", "gravity_axis")
-    scale = _UNITS[head.text("units", "mm", tuple(_UNITS))]
+    unit = head.text("units", "mm", tuple(METRES))
     signs = np.array(_AXES[head.text("axes", "RAS", tuple(_AXES))])
     if head.has("gravity_axis") and not any(axis := head.numbers("gravity_axis", 3)):
         raise head.error("gravity_axis", f"expected three numbers that are not all zero, found {list(axis)}")
-    mesh = _read_mesh(root.table("mesh"), scale, signs)
+    mesh = _read_mesh(root.table("mesh"), unit, signs)
     body = root.table("body") if root.has("body") else _Table(file, "body", {})
     body.known("density", "poisson")
     density, poisson = body.number("density", 1211.5), body.number("poisson", 0.45)
@@ -156,7 +154,7 @@ def read_case(path: Path) -> Case:
     if not -1.0 < poisson < 0.5:
         raise body.error("poisson", f"found {poisson:g}, expected a number in the open interval (-1, 0.5)")
     recordings = root.tables("recording")
-    fixed, displaced, loads, assumptions = _boundaries(root, mesh, scale, signs)
+    fixed, displaced, loads, assumptions = _boundaries(root, mesh, METRES[unit], signs)
     resection = None
     kinds: set[str] = set()
     for mechanism in root.tables("mechanism"):
@@ -202,7 +200,7 @@ def _parse(file: Path) -> dict[str, Any]:
         raise InputError(f"{file}: not valid TOML: {error}") from None
 
 
-def _read_mesh(table: _Table, scale: float, signs: NDArray[np.float64]) -> TetMesh:
+def _read_mesh(table: _Table, unit: str, signs: NDArray[np.float64]) -> TetMesh:
     table.known("file", "tissue")
     name = table.text("file")
     if "\0" in name:
@@ -212,13 +210,9 @@ def _read_mesh(table: _Table, scale: float, signs: NDArray[np.float64]) -> TetMe
         raise table.error("file", f"'{name}' leaves the case folder")
     if not file.is_file():
         raise table.error("file", f"no such file: {file}")
-    try:
-        # meshio prints lines of its own where it gives up; the error says it
-        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            mesh = read_mesh(file, "mm" if scale == _UNITS["mm"] else "m", table.text("tissue", "tissue"))
-    except MeshError as error:
-        message = str(error)
-        raise InputError(message if str(file) in message else f"{file}: {message}") from None
+    # meshio prints lines of its own where it gives up; the error says it
+    with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+        mesh = read_mesh(file, unit, table.text("tissue", "tissue"))
     if np.all(signs > 0):
         return mesh
     # both axes conventions are right-handed: turning two axes keeps the orientation of the elements
@@ -255,10 +249,7 @@ def _law(entry: _Table) -> Law:
     try:
         return law(**values)
     except InputError as error:
-        message = str(error)
-        raise InputError(
-            message if str(entry.file) in message else f"{entry.file}: [{entry.where}] {message}"
-        ) from None
+        raise InputError(f"{entry.file}: [{entry.where}] {error}") from None
 
 
 def _members(table: _Table, mesh: TetMesh) -> NDArray[np.bool_]:

@@ -122,13 +122,14 @@ def _silent(*_values: object, **_options: object) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
+    """Refuse bad numbers before anything heavy is imported; reads the moduli."""
     if options.steps is not None and options.steps < 1:
         raise InputError(f"--steps {options.steps}: expected a whole number of at least 1")
     if options.poisson is not None and not -1.0 < options.poisson < 0.5:
         raise InputError(f"--poisson {options.poisson:g}: expected a number in the open interval (-1, 0.5)")
     if not 0.0 < options.tolerance < 1.0:
         raise InputError(f"--tolerance {options.tolerance:g}: expected a number between 0 and 1")
-    parse_moduli(options.mu)
+    options.moduli = parse_moduli(options.mu)
 
 
 def _case(options: argparse.Namespace) -> Case:
@@ -139,7 +140,7 @@ def _case(options: argparse.Namespace) -> Case:
     case = find_case(options.case, options.tissue)
     if options.model is not None:
         case = case.with_law(options.model)
-    every, by_label = parse_moduli(options.mu)
+    every, by_label = options.moduli
     moduli: Mapping[int, float] = by_label if every is None else dict.fromkeys(case.tissues, every)
     case = case.with_shear_moduli(moduli)
     if options.poisson is not None:

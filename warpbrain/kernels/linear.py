@@ -255,13 +255,14 @@ class ConjugateGradient:
         self._views: dict[int, wp.array] = {}
         batch = wp.array([0, 3 * self._size], dtype=int, device=self._device) if self._device.is_cpu else None
         shape = (3 * self._size, 3 * self._size)
-        operator = warp_linear.LinearOperator(shape, precision.mat33, self._device, self._multiply, batch_offsets=batch)
+        self._operator = warp_linear.LinearOperator(
+            shape, precision.mat33, self._device, self._multiply, batch_offsets=batch
+        )
         self._preconditioner: Any = None
         if preconditioner == "block-jacobi":
             self._preconditioner = warp_linear.LinearOperator(
                 shape, precision.mat33, self._device, self._apply_diagonal
             )
-        self._operator = operator
         self._b, self._x = right_hand_side, solution
         self._tolerance = tolerance
         self._max_iterations = max_iterations
@@ -299,15 +300,8 @@ class ConjugateGradient:
         return view
 
     def _multiply(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
-        A = self._matrix
-        scalar = self._precision.scalar
         x, y, z = self._vectors(x), self._vectors(y), self._vectors(z)
-        wp.launch(
-            self._kernels.multiply,
-            dim=self._size,
-            inputs=[A.offsets, A.columns, A.values, x, y, z, scalar(alpha), scalar(beta)],
-            device=self._device,
-        )
+        self._launch_product(x, y, z, alpha, beta)
         if self._watch and beta == 0.0:
             wp.launch(
                 self._kernels.partial_curvature,
@@ -316,6 +310,16 @@ class ConjugateGradient:
                 device=self._device,
             )
             wp.launch(self._kernels.least_curvature, dim=1, inputs=[self._partial, self._least], device=self._device)
+
+    def _launch_product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
+        """`z = alpha A x + beta y`."""
+        A, scalar = self._matrix, self._precision.scalar
+        wp.launch(
+            self._kernels.multiply,
+            dim=self._size,
+            inputs=[A.offsets, A.columns, A.values, x, y, z, scalar(alpha), scalar(beta)],
+            device=self._device,
+        )
 
     def _apply_diagonal(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         scalar = self._precision.scalar
@@ -335,14 +339,7 @@ class ConjugateGradient:
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
         """`z = A x`."""
-        A = self._matrix
-        scalar = self._precision.scalar
-        wp.launch(
-            self._kernels.multiply,
-            dim=self._size,
-            inputs=[A.offsets, A.columns, A.values, x, z, z, scalar(1.0), scalar(0.0)],
-            device=self._device,
-        )
+        self._launch_product(x, z, z, 1.0, 0.0)
 
     def prepare(self) -> None:
         """Renew the preconditioner after the values of the matrix changed; its pattern is kept."""

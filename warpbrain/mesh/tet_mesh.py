@@ -139,6 +139,13 @@ class TetMesh:
         """Volume of the body [m3]."""
         return float(self.volumes.sum())
 
+    @property
+    def node_volumes(self) -> Floats:
+        """Volume lumped to each node [m3], a quarter of each of its tetrahedra, shape (n,)."""
+        quarters = np.repeat(self.volumes / 4.0, 4)
+        lumped = np.bincount(self.tetrahedra.ravel(), weights=quarters, minlength=len(self.points))
+        return lumped.astype(np.float64)
+
     def without(self, elements: ArrayLike) -> tuple[TetMesh, Ints, Ints]:
         """The mesh that is left when some tetrahedra are removed.
 

@@ -77,17 +77,15 @@ class Gravity(Load):
 
     def nodal_forces(self, mesh: TetMesh) -> NDArray[np.float64]:
         down = unit_vector("gravity_axis", self.direction)
-        quarter = np.repeat(mesh.volumes / 4.0, 4)
-        node_volume = np.bincount(mesh.tetrahedra.ravel(), weights=quarter, minlength=len(mesh.points))
         if self.csf_level is None:
-            return self.density * STANDARD_GRAVITY * node_volume[:, None] * down
+            return self.density * STANDARD_GRAVITY * mesh.node_volumes[:, None] * down
         # nodal quadrature: exact for a constant density, and without an element that is half in the fluid
         drained = 0.5 * (1.0 + np.tanh(2.0 * (self.height(mesh) - self.csf_level) / SURFACE_WIDTH))
         force = CSF_DENSITY * STANDARD_GRAVITY * drained[:, None] * down
         if self.imaged_direction is not None:
             turned = down - unit_vector("imaged gravity axis", self.imaged_direction)
             force = force + (self.density - CSF_DENSITY) * STANDARD_GRAVITY * turned
-        return node_volume[:, None] * force
+        return mesh.node_volumes[:, None] * force
 
 
 def unit_vector(name: str, direction: tuple[float, float, float]) -> NDArray[np.float64]:

@@ -17,30 +17,30 @@ from numpy.typing import NDArray
 
 from warpbrain.atomic import whole_file
 from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.slices import cut, outline
 from warpbrain.simulation.result import Result
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
 
 _TISSUE_COLOURS = ("#b9aea6", "#efe8df", "#d3b8a8", "#c9d3c0", "#c5c3d8", "#d9cfa8")
 _RESECTED = "#d9483b"
-_MM = 1000.0
 
 
 @dataclass(frozen=True)
 class _View:
-    """A cut: its name, the axis it is normal to, whether its horizontal axis is turned, the letters at its edges."""
+    """A cut: its name, the axis it is normal to, and the letters at its edges."""
 
     name: str
     axis: int
-    flip: bool
     letters: tuple[str, str, str, str]  # left, right, bottom, top of the picture
 
 
 _VIEWS = (
-    _View("axial", 2, True, ("R", "L", "P", "A")),
-    _View("coronal", 1, True, ("R", "L", "I", "S")),
-    _View("sagittal", 0, True, ("A", "P", "I", "S")),
+    _View("axial", 2, ("R", "L", "P", "A")),
+    _View("coronal", 1, ("R", "L", "I", "S")),
+    _View("sagittal", 0, ("A", "P", "I", "S")),
 )
 
 
@@ -63,17 +63,18 @@ def write_picture(path: Path, result: Result, whole: TetMesh, names: dict[int, s
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    sizes = np.linalg.norm(result.u, axis=1) * _MM
+    sizes = np.linalg.norm(result.u, axis=1) * MILLIMETRES
     top = max(float(np.percentile(sizes, 99.5)), 1e-3)
     figure, axes = plt.subplots(2, 3, figsize=(13.5, 9.4), constrained_layout=True)
     places = _places(whole)
+    before, after = boundary_faces(whole.tetrahedra), boundary_faces(result.mesh.tetrahedra)
     for column, (view, place) in enumerate(zip(_VIEWS, places, strict=True)):
-        _draw_before(axes[0, column], whole, view, place)
-        shown = _draw_after(axes[1, column], result, view, place, top)
+        _draw_before(axes[0, column], whole, before, view, place)
+        shown = _draw_after(axes[1, column], result, after, sizes, view, place, top)
         for row in (0, 1):
             _frame(axes[row, column], whole, view)
         coordinate = "xyz"[view.axis]
-        axes[0, column].set_title(f"{view.name}, {coordinate} = {place * _MM:.0f} mm", fontsize=11)
+        axes[0, column].set_title(f"{view.name}, {coordinate} = {place * MILLIMETRES:.0f} mm", fontsize=11)
     axes[0, 0].set_ylabel("before", fontsize=13)
     axes[1, 0].set_ylabel("after", fontsize=13)
     bar = figure.colorbar(shown, ax=axes[1, :], location="bottom", shrink=0.6, aspect=40, pad=0.02)
@@ -101,15 +102,12 @@ def _places(mesh: TetMesh) -> tuple[float, float, float]:
     return float(centre[2]), float(centre[1]), beside
 
 
-def _in_view(view: _View, coordinates: Floats) -> Floats:
-    """Picture coordinates [mm] of in-plane coordinates [m]."""
-    turned = np.array(coordinates) * _MM
-    if view.flip:
-        turned[..., 0] *= -1.0
-    return turned
+def _in_view(coordinates: Floats) -> Floats:
+    """Picture coordinates [mm] of in-plane coordinates [m]: the horizontal axis is turned, as radiologists hold it."""
+    return np.array(coordinates) * (-MILLIMETRES, MILLIMETRES)
 
 
-def _draw_before(axes: Any, mesh: TetMesh, view: _View, place: float) -> None:
+def _draw_before(axes: Any, mesh: TetMesh, faces: Ints, view: _View, place: float) -> None:
     from matplotlib.collections import PolyCollection
 
     section = cut(mesh.points, mesh.tetrahedra, np.zeros(len(mesh.points)), view.axis, place)
@@ -117,36 +115,35 @@ def _draw_before(axes: Any, mesh: TetMesh, view: _View, place: float) -> None:
     colour = {int(label): _TISSUE_COLOURS[i % len(_TISSUE_COLOURS)] for i, label in enumerate(labels)}
     resected = mesh.element_sets.get("resection", np.zeros(len(mesh.tetrahedra), dtype=bool))
     colours = [_RESECTED if resected[e] else colour[int(mesh.tissue[e])] for e in section.elements]
-    polygons = [_in_view(view, p) for p in section.polygons]
+    polygons = [_in_view(p) for p in section.polygons]
     axes.add_collection(PolyCollection(polygons, facecolors=colours, edgecolors=colours, linewidths=0.4))
-    _draw_outline(axes, mesh, mesh.points, view, place, "-", "#4d4640")
+    _draw_outline(axes, faces, mesh.points, view, place, "-", "#4d4640")
 
 
-def _draw_after(axes: Any, result: Result, view: _View, place: float, top: float) -> Any:
+def _draw_after(axes: Any, result: Result, faces: Ints, sizes: Floats, view: _View, place: float, top: float) -> Any:
     from matplotlib.collections import PolyCollection
 
-    mesh = result.mesh
-    sizes = np.linalg.norm(result.u, axis=1) * _MM
-    section = cut(mesh.points + result.u, mesh.tetrahedra, sizes, view.axis, place)
-    polygons = [_in_view(view, p) for p in section.polygons]
+    mesh, moved = result.mesh, result.mesh.points + result.u
+    section = cut(moved, mesh.tetrahedra, sizes, view.axis, place)
+    polygons = [_in_view(p) for p in section.polygons]
     shown = PolyCollection(polygons, array=section.values, cmap="viridis", edgecolors="face", linewidths=0.4)
     shown.set_clim(0.0, top)
     axes.add_collection(shown)
-    _draw_outline(axes, mesh, mesh.points + result.u, view, place, "-", "#1d1d1d")
-    _draw_outline(axes, mesh, mesh.points, view, place, (0, (3, 2)), "#c0392b")
+    _draw_outline(axes, faces, moved, view, place, "-", "#1d1d1d")
+    _draw_outline(axes, faces, mesh.points, view, place, (0, (3, 2)), "#c0392b")
     return shown
 
 
-def _draw_outline(axes: Any, mesh: TetMesh, points: Floats, view: _View, place: float, style: Any, colour: str) -> None:
+def _draw_outline(axes: Any, faces: Ints, points: Floats, view: _View, place: float, style: Any, colour: str) -> None:
     from matplotlib.collections import LineCollection
 
-    segments = _in_view(view, outline(points, boundary_faces(mesh.tetrahedra), view.axis, place))
+    segments = _in_view(outline(points, faces, view.axis, place))
     axes.add_collection(LineCollection(list(segments), colors=colour, linestyles=[style], linewidths=0.9))
 
 
 def _frame(axes: Any, mesh: TetMesh, view: _View) -> None:
     plane = [k for k in range(3) if k != view.axis]
-    corners = _in_view(view, np.array([mesh.points.min(axis=0)[plane], mesh.points.max(axis=0)[plane]]))
+    corners = _in_view(np.array([mesh.points.min(axis=0)[plane], mesh.points.max(axis=0)[plane]]))
     low, high = corners.min(axis=0) - 8.0, corners.max(axis=0) + 8.0
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])

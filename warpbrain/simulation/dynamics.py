@@ -90,7 +90,6 @@ class Simulator:
         self._graph: object = None
         self._graph_moves = False
         system.solution.zero_()
-        self._unit_loads = [load.nodal_forces(system.model.mesh) for load in system.model.loads]
         self._external_factor: tuple[float, ...] | None = None
         self.apply_loads()
 
@@ -107,10 +106,7 @@ class Simulator:
         """Set the external forces to the model's loads at the end of the coming step."""
         factors = tuple(load.factor(self.time + self._h) for load in self.system.model.loads)
         if factors != self._external_factor:
-            total = np.zeros(self.system.model.mesh.points.shape)
-            for factor, forces in zip(factors, self._unit_loads, strict=True):
-                total += factor * forces
-            self.system.external.assign(total)
+            self.system.external.assign(self.system.model.external_forces(self.time + self._h))
             self._external_factor = factors
 
     def prescribe(self, displacement: NDArray[np.float64]) -> None:
@@ -255,13 +251,9 @@ class Simulator:
         when = f"{1000.0 * self.time:.4g} ms"
         if min_J <= 0.0:
             # inversion first: it is the cause of what else may be wrong
-            J = self.system.element_J.numpy()
-            mesh = self.system.model.mesh
-            e = int(np.argmin(J))
-            x, y, z = 1000.0 * mesh.points[mesh.tetrahedra[e]].mean(axis=0)
             raise SolveError(
-                f"element {e} at ({x:.1f}, {y:.1f}, {z:.1f}) mm, tissue {mesh.tissue[e]}, turned inside out by {when} "
-                f"(J = {J[e]:.3g}): what acts is too much for this tissue or this time step"
+                f"{self.system.most_compressed()}, turned inside out by {when} "
+                f"(J = {min_J:.3g}): what acts is too much for this tissue or this time step"
             )
         if not (np.isfinite(linear.residual) and np.isfinite(min_J)):
             raise SolveError(f"the motion is not finite after {when}: conjugate gradients broke down")

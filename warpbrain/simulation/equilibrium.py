@@ -367,13 +367,7 @@ class EquilibriumSolver:
 
     def _worst_element(self) -> str:
         """Where the element with the smallest J of the last evaluation is, for a message."""
-        mesh = self.system.model.mesh
-        J = self.system.element_J.numpy()
-        e = int(np.argmin(J))
-        x, y, z = 1000.0 * mesh.points[mesh.tetrahedra[e]].mean(axis=0)
-        return (
-            f"; most compressed element {e} at ({x:.1f}, {y:.1f}, {z:.1f}) mm, tissue {mesh.tissue[e]}, J = {J[e]:.3g}"
-        )
+        return f"; most compressed {self.system.most_compressed()}, J = {np.min(self.system.element_J.numpy()):.3g}"
 
 
 def solve_equilibrium(

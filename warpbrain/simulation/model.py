@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,20 +115,22 @@ class Model:
 
     @property
     def node_masses(self) -> Floats:
-        """Lumped mass of each node [kg], a quarter of each of its tetrahedra, shape (n,)."""
-        quarter = np.repeat(self.density * self.mesh.volumes / 4.0, 4)
-        return np.bincount(self.mesh.tetrahedra.ravel(), weights=quarter, minlength=len(self.mesh.points)).astype(
-            np.float64
-        )
+        """Lumped mass of each node [kg], shape (n,)."""
+        return self.density * self.mesh.node_volumes
 
     @property
     def mass(self) -> float:
         """[kg]"""
         return self.density * self.mesh.volume
 
+    @cached_property
+    def _unit_forces(self) -> list[Floats]:
+        """Nodal forces of each load at factor 1 [N]; loads are dead, so they are computed once."""
+        return [load.nodal_forces(self.mesh) for load in self.loads]
+
     def external_forces(self, time: float = math.inf) -> Floats:
         """Sum of the loads on the nodes [N] at a time [s], shape (n, 3); by default long after every ramp."""
         total = np.zeros(self.mesh.points.shape)
-        for load in self.loads:
-            total += load.factor(time) * load.nodal_forces(self.mesh)
+        for load, forces in zip(self.loads, self._unit_forces, strict=True):
+            total += load.factor(time) * forces
         return total

@@ -277,6 +277,13 @@ class System:
             )
         return float(np.sum(self.element_energy.numpy(), dtype=np.float64)), float(np.min(self.element_J.numpy()))
 
+    def most_compressed(self) -> str:
+        """Which element had the smallest `J` when the energy was last evaluated, and where it is, for a message."""
+        mesh = self.model.mesh
+        e = int(np.argmin(self.element_J.numpy()))
+        x, y, z = 1000.0 * mesh.points[mesh.tetrahedra[e]].mean(axis=0)
+        return f"element {e} at ({x:.1f}, {y:.1f}, {z:.1f}) mm, tissue {mesh.tissue[e]}"
+
     def deformation_gradients(self) -> Floats:
         """`F` of each element at `u`, shape (m, 3, 3), computed on the host in double precision."""
         u = self.u.numpy().astype(np.float64)
