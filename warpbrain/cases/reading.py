@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.errors import InputError
+from warpbrain.frame import METRES
 from warpbrain.mesh import TetMesh, read_mesh
-from warpbrain.mesh.files import METRES
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.gravity import Gravity
 from warpbrain.physics.laws import LAWS, Law

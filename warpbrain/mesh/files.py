@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.atomic import whole_file
+from warpbrain.frame import METRES
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 
 ELEMENT_SET_PREFIX = "set_"
-METRES = {"m": 1.0, "mm": 1e-3}
 # cells of lower dimension are other people's boundary markers: they take nothing away from the volume
 _IGNORED = ("vertex", "line", "line3", "triangle", "triangle6", "quad", "quad8", "quad9", "polygon", "polyline")
 

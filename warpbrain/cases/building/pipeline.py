@@ -15,18 +15,17 @@ import numpy as np
 
 from warpbrain.atomic import whole_file
 from warpbrain.cases.building.anatomy import Anatomy, make_anatomy
+from warpbrain.cases.building.cleaning import finished, first_pass, opened_out, small_pieces
 from warpbrain.cases.building.cutting import compact, cut
 from warpbrain.cases.building.errors import BuildError, require_extra
 from warpbrain.cases.building.individual import individual_warp
 from warpbrain.cases.building.lattice import bcc_lattice
 from warpbrain.cases.building.maps import load_maps
-from warpbrain.cases.building.optimising import open_angles
 from warpbrain.cases.building.recipes import INDIVIDUAL_AMPLITUDE, RECIPES, CaseRecipe
-from warpbrain.cases.building.remeshing import Cells, fit_size, remesh
+from warpbrain.cases.building.remeshing import Cells, fit_size
 from warpbrain.cases.building.resection import anterior_temporal_lobe
 from warpbrain.cases.building.tags import margin, node_sets
-from warpbrain.mesh import Quality, TetMesh, boundary_faces, measure, ordered, pinched_nodes, split_boundary, write_mesh
-from warpbrain.mesh.quality import components, measure_arrays
+from warpbrain.mesh import Quality, TetMesh, measure, ordered, split_boundary, write_mesh
 from warpbrain.mesh.tet_mesh import signed_volumes
 
 NAMES = tuple(RECIPES)
@@ -34,14 +33,6 @@ GREY, WHITE, RESECTED = 1, 2, 10
 
 # background lattice [mm]: finer than any mesh made from it
 LATTICE = 6.0
-# pieces of a tissue smaller than this [mm3, template] go to their neighbour
-SMALLEST_PIECE = 2000.0
-# largest edge [mm] of the first pass, which only takes out the needles left by the cutting
-FIRST_EDGE = 8.0
-# bars a finished mesh must clear, and what the last step aims at [degrees]
-MIN_DIHEDRAL = 15.0
-FIRST_PERCENTILE = 20.0
-WANTED_DIHEDRAL = 22.0
 
 
 def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], None] = lambda line: None) -> Path:
@@ -75,10 +66,10 @@ def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], 
     for wanted in recipe.meshes:
         if wanted.multi not in start:
             progress(f"cutting the lattice along the surfaces ({'two tissues' if wanted.multi else 'one tissue'})")
-            start[wanted.multi] = _first_pass(discretise(anatomy, recipe, wanted.multi))
+            start[wanted.multi] = first_pass(discretise(anatomy, recipe, wanted.multi))
         size = wanted.size(tetrahedra)
         progress(f"{wanted.file}: looking for {size.at_least} to {size.at_most} {size.of}")
-        cells = fit_size(start[wanted.multi], size, 13.0, _finish)
+        cells = fit_size(start[wanted.multi], size, 13.0, finished)
         mesh = _to_mesh(cells, recipe)
         tetrahedra[wanted.file] = len(mesh.tetrahedra)
         write_mesh(folder / f"{wanted.file}.vtu", mesh, unit="mm")
@@ -131,72 +122,29 @@ def discretise(anatomy: Anatomy, recipe: CaseRecipe, multi: bool) -> Cells:
 
     points, tetrahedra, labels, brain = cut(points, tetrahedra, labels, lambda x: anatomy.sample(anatomy.brain, x))
     # pockets of air that the lattice pinched off are filled, crumbs of tissue are dropped
-    brain = brain | _small(points, tetrahedra, ~brain, keep_largest=True)
-    brain &= ~_small(points, tetrahedra, brain, keep_largest=True)
-    brain = _opened_out(tetrahedra, brain)
+    brain = brain | small_pieces(points, tetrahedra, ~brain, keep_largest=True)
+    brain &= ~small_pieces(points, tetrahedra, brain, keep_largest=True)
+    brain = opened_out(tetrahedra, brain)
     tetrahedra, labels = tetrahedra[brain], labels[brain]
 
     points, tetrahedra, labels, fluid = cut(points, tetrahedra, labels, lambda x: anatomy.sample(anatomy.ventricle, x))
-    fluid &= ~_small(points, tetrahedra, fluid)
-    tissue = _opened_out(tetrahedra, ~fluid)
+    fluid &= ~small_pieces(points, tetrahedra, fluid)
+    tissue = opened_out(tetrahedra, ~fluid)
     tetrahedra, labels = tetrahedra[tissue], labels[tissue]
 
     if multi:
         points, tetrahedra, labels, white = cut(points, tetrahedra, labels, lambda x: anatomy.sample(anatomy.white, x))
-        white = white & ~_small(points, tetrahedra, white)
-        white |= _small(points, tetrahedra, ~white)
+        white = white & ~small_pieces(points, tetrahedra, white)
+        white |= small_pieces(points, tetrahedra, ~white)
         labels[white] = WHITE
     if recipe.resection is not None:
         side = recipe.resection
         points, tetrahedra, labels, taken = cut(points, tetrahedra, labels, lambda x: anterior_temporal_lobe(x, side))
-        labels[taken & ~_small(points, tetrahedra, taken)] += RESECTED
+        labels[taken & ~small_pieces(points, tetrahedra, taken)] += RESECTED
     points, tetrahedra = compact(points, tetrahedra)
     if recipe.seed is not None:
         points = individual_warp(recipe.seed, INDIVIDUAL_AMPLITUDE)(points)
     return Cells(points, tetrahedra, labels)
-
-
-def _small(points: Any, tetrahedra: Any, region: Any, keep_largest: bool = False) -> Any:
-    """The tetrahedra of a region (m,) that belong to its small face-connected pieces: (m,) bool."""
-    members = np.flatnonzero(region)
-    piece = components(tetrahedra[members])
-    volume = np.bincount(piece, weights=signed_volumes(points, tetrahedra[members]))
-    small = np.arange(len(volume)) != volume.argmax() if keep_largest else volume < SMALLEST_PIECE
-    result = np.zeros(len(tetrahedra), dtype=bool)
-    result[members[small[piece]]] = True
-    return result
-
-
-def _opened_out(tetrahedra: Any, inside: Any) -> Any:
-    """Fill around the nodes where the surface touches itself, until it does so nowhere: (m,) bool."""
-    for _ in range(20):
-        touching = pinched_nodes(boundary_faces(tetrahedra[inside]))
-        if len(touching) == 0:
-            return inside
-        inside = inside | np.isin(tetrahedra, touching).any(axis=1)
-    raise BuildError("the surface of the brain touches itself, and filling there did not help")
-
-
-def _first_pass(cells: Cells) -> Cells:
-    made = remesh(cells, FIRST_EDGE)
-    if made is None:
-        raise BuildError("MMG could not mesh the cut lattice")
-    return made
-
-
-def _finish(cells: Cells) -> Cells | None:
-    """Open the sharp angles; None if the mesh is not good enough to ship."""
-    better = open_angles(cells, WANTED_DIHEDRAL)
-    quality = measure_arrays(better.points * 1e-3, better.tetrahedra.astype(np.int32), better.labels.astype(np.int32))
-    sound = (
-        quality.inverted == 0
-        and quality.components == 1
-        and quality.min_dihedral >= MIN_DIHEDRAL
-        and quality.first_percentile_dihedral >= FIRST_PERCENTILE
-        and len(split_boundary(better.points, better.tetrahedra)[1]) == 1
-        and len(pinched_nodes(boundary_faces(better.tetrahedra))) == 0
-    )
-    return better if sound else None
 
 
 def _to_mesh(cells: Cells, recipe: CaseRecipe) -> TetMesh:

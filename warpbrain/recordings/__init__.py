@@ -1,0 +1,1 @@
+"""What was observed: recordings, their files, and how a simulated state is compared with them."""
