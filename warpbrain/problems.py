@@ -38,6 +38,7 @@ class Problems:
 
     def __init__(self) -> None:
         self.found: list[Problem] = []
+        self.remarks: list[str] = []
 
     def __bool__(self) -> bool:
         return bool(self.found)
@@ -46,6 +47,10 @@ class Problems:
         """Note a problem; text that came with line breaks is put on one line."""
         one_line = " ".join(message.split())
         self.found.append(Problem(file, place, one_line, cure))
+
+    def remark(self, file: Path, message: str) -> None:
+        """Note what is not wrong and should be known."""
+        self.remarks.append(f"{file}: {' '.join(message.split())}")
 
     def stop(self) -> None:
         """Raise `InputError` with the first problem, and the number of the others, if there is any."""

@@ -1,19 +1,27 @@
-"""A case: an anatomy and what is assumed to act on it, before any of it is computed."""
+"""A case: an anatomy, what is assumed to act on it and what was recorded, before any of it is computed."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.cases.boundary import Boundary
+from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError
+from warpbrain.frame import Frame
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.gravity import Gravity
 from warpbrain.physics.laws import LAWS, Law
-from warpbrain.physics.load import Load
 from warpbrain.physics.resection import Resection
+from warpbrain.recordings.recording import Recording
+
+#: What a model is told by; see each one's file in `warpbrain.physics`.
+Mechanism = Gravity | Resection
 
 
 @dataclass(frozen=True)
@@ -23,13 +31,30 @@ class Tissue:
     Attributes
     ----------
     name : str
-    law : Law
+    law : Law or None
+        None if the generative model is to give it (``mu = "prior"``).
     formulation : str
+    prior : str
+        Group of the generative model; may be empty.
+    model : str
+        Name of the law, which is known even where its parameters are not.
     """
 
     name: str
-    law: Law
+    law: Law | None
     formulation: str = "coupled"
+    prior: str = ""
+    model: str = "neo-hookean"
+
+    @property
+    def known_law(self) -> Law:
+        """The law; `InputError` if there is none yet."""
+        if self.law is None:
+            raise InputError(
+                f"{self.name}: mu = \"prior\" asks the generative model '{self.prior}', which is not available yet: "
+                "give a shear modulus [Pa], in case.toml or with --mu"
+            )
+        return self.law
 
 
 @dataclass(frozen=True)
@@ -42,21 +67,23 @@ class Case:
         ``origin`` is ``"measured"``, ``"stand-in"`` or ``"synthetic"``.
     path : Path
         The file that was read.
+    frame : Frame
+        Unit and axes of the folder's files, in which they are written again.
+    gravity_axis : (float, float, float) or None
+        Where 'down' was while recording; None if unknown.
     mesh : TetMesh
         The imaged anatomy, whole.
+    mesh_file : str
+        Relative to the folder; empty for a specimen.
+    specimen : Specimen or None
     tissues : mapping of int to Tissue
     density, poisson : float
         [kg/m3] and without unit.
-    fixed : tuple of (str, (n,) bool array)
-        Names and members of the node sets that do not move.
-    displaced : tuple of (str, (n,) bool array, (3,) array)
-        Node sets with a prescribed displacement [m].
-    loads : tuple of Load
-    resection : Resection or None
-    assumptions : tuple of str
-        One sentence for each thing that is assumed to act.
-    unread_recordings : int
-        Recordings that the file names and this version does not compare with.
+    boundaries : tuple of Boundary
+    mechanisms : tuple of Gravity or Resection
+    recordings : tuple of Recording
+    remarks : tuple of str
+        What a user should know of how the files were read.
     """
 
     name: str
@@ -67,12 +94,45 @@ class Case:
     tissues: Mapping[int, Tissue]
     density: float
     poisson: float
-    fixed: tuple[tuple[str, NDArray[np.bool_]], ...]
-    displaced: tuple[tuple[str, NDArray[np.bool_], NDArray[np.float64]], ...] = ()
-    loads: tuple[Load, ...] = ()
-    resection: Resection | None = None
-    assumptions: tuple[str, ...] = ()
-    unread_recordings: int = 0
+    frame: Frame = field(default_factory=Frame)
+    gravity_axis: tuple[float, float, float] | None = None
+    mesh_file: str = "mesh.vtu"
+    specimen: Specimen | None = None
+    boundaries: tuple[Boundary, ...] = ()
+    mechanisms: tuple[Mechanism, ...] = ()
+    recordings: tuple[Recording, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def folder(self) -> Path:
+        """The case folder."""
+        return self.path.parent
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """One sentence for each thing that is assumed to act."""
+        said = tuple(boundary.sentence() for boundary in self.boundaries)
+        return said + tuple(mechanism.sentence + mechanism.detail() for mechanism in self.mechanisms)
+
+    @property
+    def resection(self) -> Resection | None:
+        """What was taken out."""
+        return next((m for m in self.mechanisms if isinstance(m, Resection)), None)
+
+    @cached_property
+    def remaining(self) -> tuple[TetMesh, NDArray[np.int32]]:
+        """The mesh without what was resected, and for each of its nodes the id in the whole mesh."""
+        if self.resection is None:
+            return self.mesh, np.arange(len(self.mesh.points), dtype=np.int32)
+        return self.resection.remaining(self.mesh)
+
+    def boundary(self, name: str) -> Boundary:
+        """The boundary of a name; `InputError` if there is none."""
+        for boundary in self.boundaries:
+            if boundary.name == name:
+                return boundary
+        known = ", ".join(f"'{b.name}'" for b in self.boundaries) or "none"
+        raise InputError(f"no [[boundary]] is called '{name}' (there are: {known})")
 
     def with_law(self, name: str) -> Case:
         """The same case with every tissue under another law of the same shear modulus, in its usual shape."""
@@ -80,9 +140,10 @@ class Case:
             raise InputError(f"model '{name}': expected one of {', '.join(LAWS)}")
 
         def convert(tissue: Tissue) -> Tissue:
-            if tissue.law.name == name:
+            if tissue.model == name:
                 return tissue
-            return replace(tissue, law=LAWS[name].of_shear_modulus(tissue.law.shear_modulus))
+            law = None if tissue.law is None else LAWS[name].of_shear_modulus(tissue.law.shear_modulus)
+            return replace(tissue, law=law, model=name)
 
         return replace(self, tissues={label: convert(tissue) for label, tissue in self.tissues.items()})
 
@@ -95,8 +156,9 @@ class Case:
             raise InputError(f"mu {label}={moduli[label]:g}: no tissue {label} in this case (it has {known})")
         tissues = dict(self.tissues)
         for label, mu in moduli.items():
+            tissue = tissues[label]
             if not mu > 0.0 or not np.isfinite(mu):
-                name = tissues[label].name
-                raise InputError(f"mu {label}={mu:g}: the shear modulus of {name} must be positive [Pa]")
-            tissues[label] = replace(tissues[label], law=tissues[label].law.scaled_to(mu))
+                raise InputError(f"mu {label}={mu:g}: the shear modulus of {tissue.name} must be positive [Pa]")
+            law = LAWS[tissue.model].of_shear_modulus(mu) if tissue.law is None else tissue.law.scaled_to(mu)
+            tissues[label] = replace(tissue, law=law)
         return replace(self, tissues=tissues)

@@ -19,6 +19,22 @@ SHIPPED = {
 }
 
 
+def files_of(name: str) -> list[Path]:
+    """Every `case.toml` of a shipped case or of a folder: the one of many tissues, and that of one tissue if there.
+
+    Raises
+    ------
+    InputError
+        If there is no such case and no such folder.
+    """
+    if name in SHIPPED:
+        return [_DATA / file for file in SHIPPED[name].values()]
+    path = _existing(name)
+    if not path.is_dir():
+        return [path]
+    return [path / "case.toml", *(file for file in [path / "case-single.toml"] if file.exists())]
+
+
 def find_case(name: str, tissue: str = "multi") -> Case:
     """Read a shipped case, or the case in a folder.
 
@@ -37,6 +53,15 @@ def find_case(name: str, tissue: str = "multi") -> Case:
     """
     if name in SHIPPED:
         return read_case(_DATA / SHIPPED[name][tissue])
+    path = _existing(name)
+    if tissue == "single":
+        if not path.is_dir():
+            raise InputError(f"case '{name}': one tissue needs a case folder with a case-single.toml, this is a file")
+        path = path / "case-single.toml"
+    return read_case(path)
+
+
+def _existing(name: str) -> Path:
     path = Path(name)
     try:
         there = bool(name) and path.exists()
@@ -46,8 +71,4 @@ def find_case(name: str, tissue: str = "multi") -> Case:
         near = difflib.get_close_matches(name, SHIPPED, 1)
         hint = f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(SHIPPED)}"
         raise InputError(f"case '{name}': no such case and no such folder ({hint})")
-    if tissue == "single":
-        if not path.is_dir():
-            raise InputError(f"case '{name}': one tissue needs a case folder with a case-single.toml, this is a file")
-        path = path / "case-single.toml"
-    return read_case(path)
+    return path

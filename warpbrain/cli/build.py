@@ -7,17 +7,15 @@ from pathlib import Path
 from typing import Any
 
 
-def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
-    """Add the command to the parser."""
-    cases = commands.add_parser("cases", help="the cases that ship with the package")
-    actions = cases.add_subparsers(dest="action", required=True, metavar="ACTION")
+def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
+    """Add the command to those of `warpbrain cases`."""
     parser = actions.add_parser(
         "build",
         help="remake a case's meshes from the MNI template in the nilearn wheel (needs warpbrain[build])",
         description="Remakes the meshes of a shipped case from the installed wheels, to the same meshes on the same "
         "versions. Needs the extra packages of `pip install warpbrain[build]`; downloads nothing.",
     )
-    parser.add_argument("name", help="phantom or 0529")
+    parser.add_argument("name", help="a shipped case: 0529, phantom, ...")
     parser.add_argument("--out", type=Path, default=Path("."), metavar="DIR", help="folder to write to (default: here)")
     parser.set_defaults(call=_build)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -32,7 +31,12 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "--to-rest it finds the static equilibrium.",
     )
     add = parser.add_argument
-    add("--case", required=True, metavar="NAME", help="0529, phantom, phantom-fine, or the path of a case folder")
+    add(
+        "--case",
+        required=True,
+        metavar="NAME",
+        help="0529, phantom, ... (see warpbrain cases), or the path of a case folder",
+    )
     add("--tissue", choices=("single", "multi"), default="multi", help="one tissue, or grey and white (default)")
     add(
         "--model",
@@ -54,6 +58,11 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         metavar="TOL",
         help="out-of-balance force at equilibrium, relative to all nodal forces (default: 1e-8)",
     )
+    add(
+        "--legacy-rmse",
+        action="store_true",
+        help="print also what the paper's own code calls rmse, the root of the mean distance in sqrt(mm)",
+    )
     add("--allow-unstable", action="store_true", help="accept a law that breaks the paper's stability conditions")
     add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-CASE-TISSUE)")
     add("--quiet", action="store_true", help="print nothing but errors")
@@ -67,6 +76,8 @@ def _run(options: argparse.Namespace) -> None:
 
     from warpbrain.atomic import output_folder
     from warpbrain.report import summary as tables
+    from warpbrain.report.comparison import comparison_lines, describe_comparisons, write_comparisons
+    from warpbrain.report.files import safe_name, write_result, write_summary
     from warpbrain.simulation.of_case import model_of
     from warpbrain.simulation.system import System, find_device
     from warpbrain.terminal.quiet import start_warp_quietly
@@ -78,9 +89,7 @@ def _run(options: argparse.Namespace) -> None:
     described = tables.describe_case(case, model)
     say(*tables.case_lines(described), sep="\n")
     system = System(model, options.device, options.precision)
-    # the name is free text: it must not become a path
-    safe = re.sub(r"[^\w.-]+", "-", case.name)
-    out = output_folder(options.out or Path(f"warpbrain-{safe}-{options.tissue}"))
+    out = output_folder(options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}"))
     say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
 
     loading = Progress("kernels", options.quiet)
@@ -91,13 +100,18 @@ def _run(options: argparse.Namespace) -> None:
     first_step = outcome.pop("first_step") - start
     seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **seconds}
 
+    from warpbrain.simulation.observation import observe
     from warpbrain.simulation.result import result_of
 
     result = result_of(system)
+    observed = observe(case, result, outcome.get("time_s"))
     said = tables.describe_result(result)
-    say("", *tables.displacement_lines(said), "", *tables.timing_lines(seconds, counts), sep="\n")
+    compared = describe_comparisons(observed)
+    say("", *tables.displacement_lines(said), sep="\n")
+    if case.recordings:
+        say("", *comparison_lines(compared, options.legacy_rmse), sep="\n")
+    say("", *tables.timing_lines(seconds, counts), sep="\n")
 
-    from warpbrain.report.files import write_result, write_summary
     from warpbrain.report.picture import write_picture
 
     write_result(out / "result.vtu", result)
@@ -108,13 +122,18 @@ def _run(options: argparse.Namespace) -> None:
         "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
         "solution": outcome,
         "result": said,
+        "recordings": compared,
         "seconds_by_phase": seconds,
         "calls_by_phase": counts,
         "seconds_to_first_step": first_step,
         "versions": tables.machine(),
     }
     write_summary(out / "summary.json", summary)
-    say("", f"written to {out}: result.vtu, summary.json, deformation.png", sep="\n")
+    files = ["result.vtu", "summary.json", "deformation.png"]
+    if observed.comparisons:
+        write_comparisons(out / "comparison.csv", case, observed)
+        files.append("comparison.csv")
+    say("", f"written to {out}: {', '.join(files)}", sep="\n")
 
 
 def _silent(*_values: object, **_options: object) -> None:
@@ -148,7 +167,7 @@ def _case(options: argparse.Namespace) -> Case:
     if not options.allow_unstable:
         for label, tissue in sorted(case.tissues.items()):
             try:
-                require_stable(tissue.law, case.poisson, tissue.formulation)
+                require_stable(tissue.known_law, case.poisson, tissue.formulation)
             except UnstableLawError as error:
                 raise UnstableLawError(
                     f"{case.path}: [tissue.{label}] {error}; --allow-unstable computes with it all the same"
@@ -302,7 +321,8 @@ def _follow(
     try:
         for step in range(1, options.steps + 1):
             # a prescribed displacement without a history of its own is reached evenly over the run
-            simulator.prescribe(step / options.steps * system.model.prescribed)
+            due = simulator.time + simulator.time_step
+            simulator.prescribe(system.model.prescribed_at(due, step / options.steps))
             simulator.timed_step(clock)
             min_J = simulator.check()
             first.append(time.perf_counter())
@@ -332,7 +352,8 @@ def _follow(
 
 
 def _subtitle(case: Case, outcome: Mapping[str, Any]) -> str:
-    laws = ", ".join(f"{t.name} {t.law.name} {t.law.shear_modulus:g} Pa" for _, t in sorted(case.tissues.items()))
+    tissues = [(tissue.name, tissue.known_law) for _, tissue in sorted(case.tissues.items())]
+    laws = ", ".join(f"{name} {law.name} {law.shear_modulus:g} Pa" for name, law in tissues)
     state = f"after {1000 * outcome['time_s']:.0f} ms" if outcome["kind"] == "motion" else outcome["kind"]
     stand_in = "stand-in, not the patient's images; " if case.origin == "stand-in" else ""
     return f"{stand_in}{laws}; {state}"

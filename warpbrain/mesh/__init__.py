@@ -3,7 +3,7 @@
 Importing this package costs NumPy and nothing else; SciPy and meshio are imported by the functions that need them.
 """
 
-from warpbrain.mesh.files import read_mesh, write_mesh
+from warpbrain.mesh.files import MeshInFile, read_mesh, read_mesh_file, write_mesh
 from warpbrain.mesh.ordering import ordered
 from warpbrain.mesh.quality import Quality, components, dihedral_angles, measure
 from warpbrain.mesh.surface import (
@@ -20,6 +20,7 @@ from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 
 __all__ = [
     "MeshError",
+    "MeshInFile",
     "Quality",
     "TetMesh",
     "boundary_faces",
@@ -34,6 +35,7 @@ __all__ = [
     "ordered",
     "pinched_nodes",
     "read_mesh",
+    "read_mesh_file",
     "split_boundary",
     "write_mesh",
 ]

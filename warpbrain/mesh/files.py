@@ -1,6 +1,7 @@
 """Meshes on disk: anything meshio reads comes in, a compressed VTU goes out.
 
 Conventions of the files
+    * tetrahedra of first order; of second-order ones the corners are taken;
     * tissue labels: an integer cell array, ``tissue`` unless the caller says otherwise;
     * node sets: every point array of one column that is integer, boolean, or real with no values but 0 and 1; non-zero
       = member;
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,22 +24,42 @@ from warpbrain.frame import METRES
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 
 ELEMENT_SET_PREFIX = "set_"
+#: A larger file [bytes] is refused, not read: the largest meshes that are worth a simulation are a tenth of it.
+LARGEST_FILE = 512 << 20
 # cells of lower dimension are other people's boundary markers: they take nothing away from the volume
+_TETRAHEDRA = ("tetra", "tetra10")
 _IGNORED = ("vertex", "line", "line3", "triangle", "triangle6", "quad", "quad8", "quad9", "polygon", "polyline")
 
 
-def read_mesh(path: str | os.PathLike[str], unit: str = "m", tissue: str = "tissue") -> TetMesh:
+@dataclass(frozen=True, eq=False)
+class MeshInFile:
+    """A mesh as a file has it.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+    node_numbers : (n,) int array
+        For each node of the mesh its number in the file, from 0.
+    file_nodes : int
+        How many nodes the file has: more than the mesh, if its tetrahedra are of second order.
+    """
+
+    mesh: TetMesh
+    node_numbers: NDArray[np.int64]
+    file_nodes: int
+
+
+def read_mesh(path: str | os.PathLike[str], unit: str = "m", tissue: str | None = None) -> TetMesh:
     """Read a tetrahedral mesh from any file that meshio reads.
 
     Parameters
     ----------
     path : path
-        The file.
+        The file. Of tetrahedra of second order the four corners are taken.
     unit : {"m", "mm"}
         Unit of the coordinates in the file; the mesh is in metres.
-    tissue : str
-        Name of the cell array of tissue labels; a file without it is one tissue, label 1, if `tissue`
-        is left at its default, and an error otherwise.
+    tissue : str or None
+        Name of the cell array of tissue labels. None: ``tissue`` if there is one, else one tissue, label 1.
 
     Returns
     -------
@@ -49,43 +71,69 @@ def read_mesh(path: str | os.PathLike[str], unit: str = "m", tissue: str = "tiss
     MeshError
         Naming the file, what was found and what was expected.
     """
+    return read_mesh_file(path, unit, tissue).mesh
+
+
+def read_mesh_file(path: str | os.PathLike[str], unit: str = "m", tissue: str | None = None) -> MeshInFile:
+    """As `read_mesh`, with the numbers that the nodes have in the file."""
     import meshio
 
     source = Path(path)
     scale = _scale(unit)
     if not source.is_file():
         raise MeshError(f"{source}: no such file")
+    if (size := source.stat().st_size) == 0:
+        raise MeshError(f"{source}: not a mesh that meshio can read (the file is empty)")
+    if size > LARGEST_FILE:
+        raise MeshError(f"{source}: found {size / 1e6:.0f} MB, expected a mesh of at most {LARGEST_FILE / 1e6:.0f} MB")
     try:
         raw = meshio.read(source)
     except SystemExit as error:  # meshio leaves the program on some unreadable files
         raise MeshError(f"{source}: not a mesh that meshio can read") from error
     except Exception as error:  # its readers raise whatever their parsers do
-        detail = " ".join(str(error).split()) or type(error).__name__
+        detail = " ".join(str(error).split())[:200] or type(error).__name__
         raise MeshError(f"{source}: not a mesh that meshio can read ({detail})") from error
     try:
         return _from_meshio(raw, scale, tissue)
     except MeshError as error:
-        raise MeshError(f"{source}: {error}") from error
+        raise error.within(str(source)) from error
+    except (ValueError, IndexError, TypeError) as error:  # arrays that do not fit together
+        raise MeshError(f"{source}: arrays that do not fit together ({' '.join(str(error).split())})") from error
 
 
-def _from_meshio(raw: Any, scale: float, tissue: str) -> TetMesh:
+def _from_meshio(raw: Any, scale: float, tissue: str | None) -> MeshInFile:
     kinds = [block.type for block in raw.cells]
-    foreign = sorted({kind for kind in kinds if kind != "tetra" and kind not in _IGNORED})
+    foreign = sorted({kind for kind in kinds if kind not in _TETRAHEDRA and kind not in _IGNORED})
     if foreign:
-        raise MeshError(f"found volume cells of type {', '.join(foreign)}; expected four-node tetrahedra only")
-    blocks = [number for number, kind in enumerate(kinds) if kind == "tetra"]
+        raise MeshError(f"found volume cells of type {', '.join(foreign)}; expected tetrahedra only")
+    blocks = [number for number, kind in enumerate(kinds) if kind in _TETRAHEDRA]
     if not blocks:
         raise MeshError(f"found no tetrahedra (cells: {', '.join(sorted(set(kinds))) or 'none'})")
     cells = {name: np.concatenate([data[b] for b in blocks]) for name, data in raw.cell_data.items()}
-    if tissue != "tissue" and tissue not in cells:
+    if tissue is not None and tissue not in cells:
         raise MeshError(f"no cell array '{tissue}' for tissue labels; found {', '.join(sorted(cells)) or 'none'}")
-    return TetMesh(
-        np.asarray(raw.points, dtype=np.float64) * scale,
-        np.concatenate([raw.cells[b].data for b in blocks]),
-        cells.get(tissue),  # type: ignore[arg-type]  # TetMesh fills in and converts labels itself
-        _members(raw.point_data, ""),
-        _members({name: data for name, data in cells.items() if name != tissue}, ELEMENT_SET_PREFIX),
+    points = np.asarray(raw.points, dtype=np.float64)
+    # the corners come first in every numbering of second-order tetrahedra that meshio knows
+    tetrahedra = np.concatenate([raw.cells[b].data[:, :4] for b in blocks])
+    node_sets = _members(raw.point_data, "")
+    numbers = np.arange(len(points))
+    if middles := [raw.cells[b].data[:, 4:] for b in blocks if kinds[b] == "tetra10"]:
+        # nodes on edges go; one that no tetrahedron has stays, to be found and named
+        middle = np.setdiff1d(np.concatenate(middles), tetrahedra)
+        numbers = np.setdiff1d(numbers, middle)
+        renumbered = np.full(len(points), -1)
+        renumbered[numbers] = np.arange(len(numbers))
+        points, tetrahedra = points[numbers], renumbered[tetrahedra]
+        node_sets = {name: members[numbers] for name, members in node_sets.items()}
+    label = "tissue" if tissue is None else tissue
+    mesh = TetMesh(
+        points * scale,
+        tetrahedra,
+        cells.get(label),  # type: ignore[arg-type]  # TetMesh fills in and converts labels itself
+        node_sets,
+        _members({name: data for name, data in cells.items() if name != label}, ELEMENT_SET_PREFIX),
     )
+    return MeshInFile(mesh, numbers, len(raw.points))
 
 
 def _members(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[np.bool_]]:

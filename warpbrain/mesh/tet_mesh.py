@@ -18,7 +18,21 @@ Bools = NDArray[np.bool_]
 
 
 class MeshError(InputError):
-    """A mesh that cannot be computed with; the message is one line that says what is wrong and where."""
+    """A mesh that cannot be computed with; the message is one line that says what is wrong and where.
+
+    Attributes
+    ----------
+    messages : tuple of str
+        Everything that is wrong, of which the message is the first.
+    """
+
+    def __init__(self, *messages: str) -> None:
+        super().__init__(messages[0])
+        self.messages = messages
+
+    def within(self, place: str) -> MeshError:
+        """The same error, said of a place."""
+        return MeshError(*(f"{place}: {message}" for message in self.messages))
 
 
 def _ids(mask_or_ids: ArrayLike, limit: int = 5) -> str:
@@ -109,9 +123,8 @@ class TetMesh:
         tissue = np.ones(count, dtype=np.int32) if self.tissue is None else _integers(self.tissue, "tissue labels")
         if tissue.shape != (count,):
             raise MeshError(f"tissue has shape {tissue.shape}, expected one label a tetrahedron: ({count},)")
-        _check_points(points)
-        _check_connectivity(points, tetrahedra)
-        _check_orientation(points, tetrahedra)
+        if found := _defects(points, tetrahedra):
+            raise MeshError(*found)
         for name, value in (("points", points), ("tetrahedra", tetrahedra), ("tissue", tissue)):
             object.__setattr__(self, name, _frozen(value))
         object.__setattr__(self, "node_sets", _sets(self.node_sets, len(points), "node"))
@@ -206,38 +219,45 @@ def signed_volumes(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
     return np.asarray(np.einsum("ij,ij->i", np.cross(a, b), c) / 6.0)
 
 
-def _check_points(points: Floats) -> None:
-    bad = ~np.isfinite(points).all(axis=1)
+def _defects(points: Floats, tetrahedra: Ints) -> list[str]:
+    """Everything that makes points and tetrahedra no body, one line each."""
+    found = []
+    bad = np.asarray(~np.isfinite(points).all(axis=1))
     if bad.any():
-        raise MeshError(f"{bad.sum()} node(s) with a coordinate that is not finite: node {_ids(bad)}")
-
-
-def _check_connectivity(points: Floats, tetrahedra: Ints) -> None:
+        found.append(f"{bad.sum()} node(s) with a coordinate that is not finite: node {_ids(bad)}")
     count = len(points)
     outside = ((tetrahedra < 0) | (tetrahedra >= count)).any(axis=1)
     if outside.any():
         first = int(np.flatnonzero(outside)[0])
-        raise MeshError(
+        found.append(
             f"{outside.sum()} tetrahedra name a node that does not exist (nodes are 0 to {count - 1}): "
             f"tetrahedron {_ids(outside)}; the first has nodes {tetrahedra[first].tolist()}"
         )
     ordered = np.sort(tetrahedra, axis=1)
     repeated = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
     if repeated.any():
-        raise MeshError(f"{repeated.sum()} tetrahedra name a node twice: tetrahedron {_ids(repeated)}")
-    unused = np.bincount(tetrahedra.ravel(), minlength=count) == 0
+        found.append(f"{repeated.sum()} tetrahedra name a node twice: tetrahedron {_ids(repeated)}")
+    unused = np.bincount(tetrahedra[~outside].ravel(), minlength=count) == 0
     if unused.any():
-        raise MeshError(f"{unused.sum()} node(s) belong to no tetrahedron: node {_ids(unused)}")
+        found.append(f"{unused.sum()} node(s) belong to no tetrahedron: node {_ids(unused)}")
+    whole = np.flatnonzero(~outside & ~repeated)
+    return found + _flat_or_inverted(points, tetrahedra[whole], whole, bad)
 
 
-def _check_orientation(points: Floats, tetrahedra: Ints) -> None:
-    volumes = signed_volumes(points, tetrahedra)
+def _flat_or_inverted(points: Floats, tetrahedra: Ints, numbers: NDArray[np.int64], bad: Bools) -> list[str]:
     corner = points[tetrahedra]
-    longest = np.sqrt(((corner[:, :, None] - corner[:, None]) ** 2).sum(-1).max(axis=(1, 2)))
-    # flat to rounding: such a volume has no sign that means anything
-    flat = np.abs(volumes) <= 1e-12 * longest**3
+    measurable = ~bad[tetrahedra].any(axis=1)
+    with np.errstate(invalid="ignore"):
+        volumes = signed_volumes(points, tetrahedra)
+        longest = np.sqrt(((corner[:, :, None] - corner[:, None]) ** 2).sum(-1).max(axis=(1, 2)))
+        # flat to rounding: such a volume has no sign that means anything
+        flat = measurable & (np.abs(volumes) <= 1e-12 * longest**3)
+        inverted = measurable & ~flat & (volumes < 0)
+    found = []
     if flat.any():
-        raise MeshError(f"{flat.sum()} tetrahedra have zero volume: tetrahedron {_ids(flat)}")
-    inverted = volumes < 0
+        found.append(f"{flat.sum()} tetrahedra have zero volume: tetrahedron {_ids(numbers[flat])}")
     if inverted.any():
-        raise MeshError(f"{inverted.sum()} tetrahedra are inverted (negative volume): tetrahedron {_ids(inverted)}")
+        found.append(
+            f"{inverted.sum()} tetrahedra are inverted (negative volume): tetrahedron {_ids(numbers[inverted])}"
+        )
+    return found

@@ -59,16 +59,16 @@ def describe_case(case: Case, model: Model) -> dict[str, Any]:
         "tissues": {
             str(label): {
                 "name": tissue.name,
-                "law": tissue.law.name,
+                "law": tissue.known_law.name,
                 "formulation": tissue.formulation,
-                "parameters": vars(tissue.law),
-                "shear_modulus_Pa": tissue.law.shear_modulus,
+                "parameters": vars(tissue.known_law),
+                "shear_modulus_Pa": tissue.known_law.shear_modulus,
             }
             for label, tissue in sorted(case.tissues.items())
         },
         "assumptions": list(case.assumptions),
         "left_out": list(LEFT_OUT),
-        "unread_recordings": case.unread_recordings,
+        "remarks": list(case.remarks),
     }
 
 
@@ -118,8 +118,7 @@ def case_lines(summary: Mapping[str, Any]) -> list[str]:
             f"mu = {tissue['shear_modulus_Pa']:g} Pa, nu = {summary['poisson']:g}"
         )
     lines += [f"  assumed   {sentence}" for sentence in summary["assumptions"]]
-    if summary["unread_recordings"]:
-        lines.append(f"  not used  {summary['unread_recordings']} recordings: this version does not compare with them")
+    lines += [f"  remark    {sentence}" for sentence in summary["remarks"]]
     lines += [f"  left out  {sentence}" for sentence in summary["left_out"]]
     return lines
 

@@ -100,6 +100,11 @@ class Simulator:
         self._h = time_step
         self._graph = None
 
+    @property
+    def time_step(self) -> float:
+        """`h` [s]"""
+        return self._h
+
     # -- what acts ------------------------------------------------------------------------------------------------
 
     def apply_loads(self) -> None:

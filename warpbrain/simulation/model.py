@@ -59,6 +59,28 @@ class Damping:
                 raise InputError(f"damping: {name} = {value}: expected a number >= 0")
 
 
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A displacement that some nodes are given over time.
+
+    Attributes
+    ----------
+    nodes : (n,) bool array
+    times : (k,) array
+        [s], increasing.
+    values : (k, 3) array
+        [m], linear between the times and constant outside them.
+    """
+
+    nodes: Bools
+    times: Floats
+    values: Floats
+
+    def at(self, time: float) -> Floats:
+        """Displacement (3,) [m] at a time [s]."""
+        return np.array([np.interp(time, self.times, component) for component in self.values.T])
+
+
 @dataclass(frozen=True)
 class Model:
     """Everything that is assumed to act on a body.
@@ -76,6 +98,8 @@ class Model:
         Their values [m] at full load; zero where not given.
     loads : sequence of Load
         What else acts, each a file of `warpbrain.physics`.
+    motions : sequence of Motion
+        Histories of prescribed displacements, which end at `prescribed`.
     damping : Damping
 
     Raises
@@ -90,6 +114,7 @@ class Model:
     constrained: Bools = None  # type: ignore[assignment]  # nothing constrained
     prescribed: Floats = None  # type: ignore[assignment]  # zero
     loads: Sequence[Load] = ()
+    motions: Sequence[Motion] = ()
     damping: Damping = field(default_factory=Damping)
 
     def __post_init__(self) -> None:
@@ -112,6 +137,13 @@ class Model:
             raise InputError(f"materials: no material for tissue {', '.join(map(str, missing))} of the mesh")
         object.__setattr__(self, "constrained", constrained)
         object.__setattr__(self, "prescribed", prescribed)
+
+    def prescribed_at(self, time: float, share: float) -> Floats:
+        """Prescribed displacements (n, 3) [m] at a time [s]; a `share` of those that have no history."""
+        displacement = share * self.prescribed
+        for motion in self.motions:
+            displacement[motion.nodes] = motion.at(time)
+        return displacement
 
     @property
     def node_masses(self) -> Floats:

@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.cases.boundary import Displaced, Fixed, Forced
 from warpbrain.cases.case import Case
-from warpbrain.simulation.model import Material, Model
+from warpbrain.errors import InputError
+from warpbrain.physics.force import NodalForce
+from warpbrain.physics.load import Load
+from warpbrain.physics.resection import Resection
+from warpbrain.simulation.model import Material, Model, Motion
 
 
 def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
@@ -18,18 +23,38 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
         Of the tissue that is left: a resection is done here.
     nodes : (n,) int array
         For each node of the model its id in the case's whole mesh.
+
+    Raises
+    ------
+    InputError
+        If the case assumes what cannot be simulated, or leaves a law to the generative model.
     """
-    mesh, nodes = case.mesh, np.arange(len(case.mesh.points), dtype=np.int32)
-    if case.resection is not None:
-        mesh, nodes = case.resection.remaining(mesh)
+    if case.specimen is not None:
+        raise InputError(f"{case.path}: [specimen]: laboratory specimens cannot be simulated yet")
+    mesh, nodes = case.remaining
     constrained = np.zeros(mesh.points.shape, dtype=bool)
     prescribed = np.zeros(mesh.points.shape)
-    for _, members, displacement in case.displaced:
-        constrained[members[nodes]] = True
-        prescribed[members[nodes]] = displacement
-    for _, members in case.fixed:
-        constrained[members[nodes]] = True
-    materials = {
-        label: Material(tissue.law, case.poisson, tissue.formulation) for label, tissue in case.tissues.items()
-    }
-    return Model(mesh, materials, case.density, constrained, prescribed, case.loads), nodes
+    loads: list[Load] = [m for m in case.mechanisms if not isinstance(m, Resection)]
+    motions: list[Motion] = []
+    for boundary in case.boundaries:
+        members = case.mesh.node_sets[boundary.nodes][nodes]
+        if isinstance(boundary, Fixed | Displaced):
+            constrained[members] = True
+        if isinstance(boundary, Displaced):
+            prescribed[members] = boundary.final
+            if boundary.has_history:
+                motions.append(Motion(members, np.array(boundary.times), np.array(boundary.values)))
+        elif isinstance(boundary, Forced):
+            loads.append(NodalForce(nodes=boundary.nodes, total=boundary.total, ramp=boundary.ramp))
+        elif not isinstance(boundary, Fixed):
+            raise InputError(
+                f"{case.path}: [[boundary]] '{boundary.name}' kind: '{boundary.kind}' cannot be simulated yet"
+            )
+    try:
+        materials = {
+            label: Material(tissue.known_law, case.poisson, tissue.formulation)
+            for label, tissue in case.tissues.items()
+        }
+    except InputError as error:
+        raise InputError(f"{case.path}: [tissue] {error}") from None
+    return Model(mesh, materials, case.density, constrained, prescribed, loads, motions), nodes

@@ -1,0 +1,43 @@
+"""The JSON Schema that ships is the one that the code makes, and says yes and no where the reader does."""
+
+import json
+import tomllib
+from importlib.resources import files
+
+import jsonschema
+import pytest
+from folders import CASE, RECORDINGS, changed
+from test_reading import WRONG
+
+from warpbrain.cases.format.schema import FILE, case_schema, schema_text
+from warpbrain.cases.shipped import SHIPPED
+
+VALIDATOR = jsonschema.Draft202012Validator(case_schema())
+DATA = files("warpbrain.cases") / "data"
+
+#: Faults that only reading the mesh and the files can find, or that are not TOML at all.
+NOT_OF_THE_TEXT = {
+    "no axis", "zero axis", "negative mu", "zero mu", "prior", "ogden terms", "ramp back", "ramp nan", "tissue missing",
+    "tissue unused", "labels", "set", "empty set", "empty fixed", "elements", "both", "twice", "no mesh", "outside",
+    "absolute", "null", "a folder", "list", "tissue 02", "low nu",
+}  # fmt: skip
+
+
+def test_the_shipped_schema_is_the_code_s():
+    """If this fails: warpbrain cases schema > warpbrain/cases/case.schema.json"""
+    assert (files("warpbrain.cases") / FILE).read_text(encoding="utf-8") == schema_text()
+    jsonschema.Draft202012Validator.check_schema(json.loads(schema_text()))
+
+
+@pytest.mark.parametrize("file", [file for variants in SHIPPED.values() for file in variants.values()])
+def test_shipped_cases_are_valid(file):
+    VALIDATOR.validate(tomllib.loads((DATA / file).read_text(encoding="utf-8")))
+
+
+def test_recordings_are_valid():
+    VALIDATOR.validate(tomllib.loads(CASE + RECORDINGS))
+
+
+@pytest.mark.parametrize("name", sorted(set(WRONG) - NOT_OF_THE_TEXT))
+def test_what_the_reader_refuses_is_not_valid(name):
+    assert not VALIDATOR.is_valid(tomllib.loads(changed(CASE, WRONG[name][0])))

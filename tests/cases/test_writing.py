@@ -1,0 +1,106 @@
+"""A case that is written reads back as the same case, whatever its units and axes."""
+
+import re
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from folders import write_recorded
+
+from warpbrain.cases.reading import read_case
+from warpbrain.cases.shipped import SHIPPED, find_case
+from warpbrain.cases.writing import write_case
+from warpbrain.errors import InputError
+from warpbrain.frame import Frame
+from warpbrain.mesh import TetMesh
+
+EVERYTHING = [
+    ('axes = "RAS"', 'axes = "LPS"\ngravity_axis = [0.5, 1.0, 0.25]'),
+    ("mu = 1000.0", 'mu = "prior"\nprior = "hyperelastic/grey matter"'),
+    ("mu = 3000.0", 'model = "ogden"\nmu = [100.0, -50.0]\nalpha = [2.0, -4.7]\nformulation = "uncoupled"'),
+    (
+        'kind = "force"\ntotal = [0.01, 0.02, -0.05]',
+        'kind = "force"\ntotal = [0.01, 0.02, -0.05]\nramp = [[0.0, 0.0], [0.05, 1.0]]\n'
+        '[[boundary]]\nname = "pull/1"\nnodes = "corner"\nkind = "displacement"\nvalue = "pull.csv"\n'
+        '[[boundary]]\nname = "pull 2"\nnodes = "corner"\nkind = "displacement"\nvalue = [0.1, 0.2, 0.3]\n'
+        '[[boundary]]\nname = "air"\nnodes = "top"\nkind = "pressure"\nvalue = -20.0\nramp = [[0.0, 1.0]]\n'
+        '[[boundary]]\nname = "wall"\nnodes = "top"\nkind = "sliding"\n'
+        '[[boundary]]\nname = "skull"\nnodes = "top"\nkind = "contact"\nsurface = "skull.stl"\nfriction = 0.1\n'
+        '[[mechanism]]\nkind = "gravity"\ncsf_level = 12.0\n'
+        '[[mechanism]]\nkind = "resection"\nelements = "corner"',
+    ),
+]
+
+
+def everything(folder: Path) -> Path:
+    """A folder with every kind of boundary, mechanism and recording, in LPS."""
+    write_recorded(folder, *EVERYTHING[:3])
+    text = (folder / "case.toml").read_text()
+    old, new = EVERYTHING[3]
+    assert old in text
+    # two displacements of the same nodes would contradict each other
+    new = new.replace('name = "pull 2"\nnodes = "corner"', 'name = "pull 2"\nnodes = "tip"')
+    (folder / "case.toml").write_text(text.replace(old, new))
+    (folder / "pull.csv").write_text("t,ux,uy,uz\n0,0,0,0\n1.5,0.1,0.2,-0.3\n")
+    corners = np.array([[0, 0, 0], [90, 0, 0], [0, 90, 0], [0, 0, 90]]) - 20.0
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    meshio.write(folder / "skull.stl", meshio.Mesh(corners, [("triangle", faces)]), binary=True)
+    raw = meshio.read(folder / "mesh.vtu")
+    raw.points[:, :2] *= -1.0
+    loose = np.flatnonzero(raw.points[:, 2] > 0.0)
+    nodes = np.arange(len(raw.points))
+    raw.point_data |= {"corner": (nodes == loose[0]).astype(np.uint8), "tip": (nodes == loose[5]).astype(np.uint8)}
+    meshio.write(folder / "mesh.vtu", raw)
+    for name in ("beads", "lid"):
+        path = folder / f"recordings/{name}.csv"
+        flipped = re.sub(r"(?m)^((?:\w,)?)(\d+),(\d+),", r"\1-\2,-\3,", path.read_text())
+        path.write_text(flipped)
+    return folder
+
+
+def assert_same(a, b, where="case"):
+    """Equal as far as the files hold it: lengths to rounding."""
+    if is_dataclass(a) and not isinstance(a, type):
+        assert type(a) is type(b), where
+        for field in fields(a):
+            # where it came from, and what was said of that file
+            if field.name not in ("path", "mesh_file", "file", "moved_file", "remarks"):
+                assert_same(getattr(a, field.name), getattr(b, field.name), f"{where}.{field.name}")
+    elif isinstance(a, str | bool | type(None) | Path):
+        assert a == b, where
+    elif isinstance(a, TetMesh) or hasattr(a, "keys"):
+        assert sorted(a) == sorted(b), where
+        for key in a:
+            assert_same(a[key], b[key], f"{where}[{key}]")
+    elif isinstance(a, tuple | list) and any(not isinstance(item, int | float) for item in a):
+        assert len(a) == len(b), where
+        for number, (x, y) in enumerate(zip(a, b, strict=True)):
+            assert_same(x, y, f"{where}[{number}]")
+    else:
+        np.testing.assert_allclose(np.asarray(a), np.asarray(b), rtol=1e-14, atol=1e-17, err_msg=where)
+
+
+def test_everything_comes_back(tmp_path):
+    case = read_case(everything(tmp_path / "a"))
+    assert len(case.boundaries) == 7 and len(case.mechanisms) == 2 and len(case.recordings) == 3
+    again = read_case(write_case(tmp_path / "b", case).parent)
+    assert_same(case, again)
+    # and once more, in other units and axes
+    other = read_case(write_case(tmp_path / "c", replace(again, frame=Frame("m", "RAS"))))
+    assert_same(replace(case, frame=Frame("m", "RAS")), other)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_cases_come_back(tmp_path, name):
+    case = find_case(name, "single")
+    assert_same(case, read_case(write_case(tmp_path, case)))
+
+
+def test_nothing_is_overwritten(tmp_path):
+    folder = write_recorded(tmp_path)
+    before = (folder / "case.toml").read_bytes()
+    with pytest.raises(InputError, match=r"case\.toml: there is a case already"):
+        write_case(folder, read_case(folder))
+    assert (folder / "case.toml").read_bytes() == before

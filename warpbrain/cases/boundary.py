@@ -1,0 +1,150 @@
+"""What is assumed to act on sets of nodes: one class a kind, plain data in SI units and RAS axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ramp = Sequence[tuple[float, float]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Boundary:
+    """What all kinds have.
+
+    Attributes
+    ----------
+    name : str
+    nodes : str
+        Node set of the case's mesh.
+    """
+
+    kind: ClassVar[str]
+    name: str
+    nodes: str
+
+    def sentence(self) -> str:
+        """What is assumed, for people to read."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fixed(Boundary):
+    """Nodes that do not move."""
+
+    kind: ClassVar[str] = "fixed"
+
+    def sentence(self) -> str:
+        return f"The {self.name} does not move."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sliding(Boundary):
+    """Nodes that move along their surface only."""
+
+    kind: ClassVar[str] = "sliding"
+
+    def sentence(self) -> str:
+        return f"The {self.name} slides along its surface and does not leave it."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Displaced(Boundary):
+    """Nodes that are moved.
+
+    Attributes
+    ----------
+    times : tuple of k floats
+        [s], increasing; one, if the displacement has no history.
+    values : tuple of k displacements
+        [m]; linear between the times, constant outside them.
+    file : str
+        Where the history came from, relative to the case folder; empty if case.toml gives it.
+    """
+
+    kind: ClassVar[str] = "displacement"
+    times: tuple[float, ...]
+    values: tuple[tuple[float, float, float], ...]
+    file: str = ""
+
+    @property
+    def final(self) -> Floats:
+        """Displacement (3,) [m] long after everything."""
+        return np.array(self.values[-1])
+
+    @property
+    def has_history(self) -> bool:
+        """Whether it says when it moves."""
+        return len(self.times) > 1
+
+    def sentence(self) -> str:
+        size = 1000.0 * max(float(np.linalg.norm(value)) for value in self.values)
+        return f"The {self.name} is moved by {size:.3g} mm{' at most, over time' if self.has_history else ''}."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forced(Boundary):
+    """Nodes that share a force evenly.
+
+    Attributes
+    ----------
+    total : (float, float, float)
+        [N]
+    ramp : sequence of (time, factor)
+    """
+
+    kind: ClassVar[str] = "force"
+    total: tuple[float, float, float]
+    ramp: Ramp = field(default=())
+
+    def sentence(self) -> str:
+        size = float(np.linalg.norm(self.total))
+        return f"A force of {size:.3g} N in all, shared evenly by the nodes of the {self.name}."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pressed(Boundary):
+    """Faces of the nodes under a pressure that follows them.
+
+    Attributes
+    ----------
+    value : float
+        [Pa]; positive pushes on the tissue.
+    ramp : sequence of (time, factor)
+    """
+
+    kind: ClassVar[str] = "pressure"
+    value: float
+    ramp: Ramp = field(default=())
+
+    def sentence(self) -> str:
+        return f"A pressure of {self.value:g} Pa on the {self.name}."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact(Boundary):
+    """Nodes that cannot cross a closed surface.
+
+    Attributes
+    ----------
+    file : str
+        The surface, relative to the case folder.
+    points : (n, 3) array
+        [m]
+    faces : (k, 3) int array
+    friction : float
+    """
+
+    kind: ClassVar[str] = "contact"
+    file: str
+    points: Floats = field(repr=False, compare=False)
+    faces: NDArray[np.int32] = field(repr=False, compare=False)
+    friction: float = 0.0
+
+    def sentence(self) -> str:
+        return f"The {self.name} cannot cross the surface of {self.file}; friction {self.friction:g}."

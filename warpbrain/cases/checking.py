@@ -1,0 +1,112 @@
+"""Checks a case completely: what is wrong with it, how good its mesh is, and what a person should look at again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from warpbrain.cases.case import Case
+from warpbrain.cases.reading import examine_case
+from warpbrain.mesh import Quality, measure
+from warpbrain.problems import Problem, Problems
+from warpbrain.recordings.recording import PointsRecording
+
+#: Volumes [cm3] of brains without their ventricles: the paper's Table 4 has 1060 to 1609; heads differ.
+BRAIN = (800.0, 1800.0)
+#: Shear moduli [Pa] of soft tissue and gels; published ones for brain are 80 to 15 000 Pa (literature.md, table).
+SOFT = (20.0, 100_000.0)
+#: Displacement [m] beyond any brain shift: the largest published ones are 25 mm (Miga et al. 2016).
+LARGEST_SHIFT = 0.05
+#: Dihedral angles [degrees] below which elements make a solver slow and stresses wrong.
+SHARP = 5.0
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What checking found.
+
+    Attributes
+    ----------
+    file : Path
+    problems : tuple of Problem
+        What is wrong: the case cannot be used.
+    remarks : tuple of str
+        What is allowed and should be looked at.
+    case : Case or None
+        As far as it could be read.
+    quality : Quality or None
+        Of its mesh.
+    plausible : str
+        A word on its volume.
+    """
+
+    file: Path
+    problems: tuple[Problem, ...]
+    remarks: tuple[str, ...]
+    case: Case | None
+    quality: Quality | None
+    plausible: str
+
+
+def check_case(file: Path) -> Checked:
+    """Check a `case.toml` with everything that it names.
+
+    Parameters
+    ----------
+    file : Path
+        A `case.toml`, or the folder that holds it.
+    """
+    problems = Problems()
+    case = examine_case(file, problems)
+    remarks = list(problems.remarks)
+    quality, plausible = None, ""
+    if case is not None:
+        quality = measure(case.mesh)
+        plausible = volume_word(1e6 * quality.volume)
+        remarks += _look_again(case, quality)
+    return Checked(file, tuple(problems.found), tuple(remarks), case, quality, plausible)
+
+
+def volume_word(cm3: float) -> str:
+    """What a volume [cm3] may be."""
+    if BRAIN[0] <= cm3 <= BRAIN[1]:
+        return "plausible for a whole brain without its ventricles"
+    if cm3 < 20.0:
+        return "a specimen? A whole brain has about 1000 to 1600 cm3"
+    if cm3 < BRAIN[0]:
+        return "small for a whole brain (about 1000 to 1600 cm3): a child's, a part or a phantom?"
+    return "large for a brain (about 1000 to 1600 cm3): are the units right, is the skull in it?"
+
+
+def _look_again(case: Case, quality: Quality) -> list[str]:
+    found = []
+    if quality.min_dihedral < SHARP:
+        found.append(
+            f"the sharpest tetrahedron has a dihedral angle of {quality.min_dihedral:.2g} degrees: it slows the solver "
+            "and spoils the stress around it"
+        )
+    small = {label: n for label, n in quality.tissue_components.items() if n > 20}
+    if small:
+        label, count = next(iter(small.items()))
+        found.append(f"tissue {label} is in {count} pieces: a noisy segmentation?")
+    for label, tissue in sorted(case.tissues.items()):
+        mu = tissue.law.shear_modulus if tissue.law is not None else None
+        if mu is not None and not SOFT[0] <= mu <= SOFT[1]:
+            kilo = f"; {mu:g} kPa is {1000.0 * mu:g} Pa" if mu < SOFT[0] else ""
+            found.append(f"[tissue.{label}] shear modulus {mu:g} Pa: not that of soft tissue{kilo}")
+    size = float(np.linalg.norm(np.ptp(case.mesh.points, axis=0)))
+    for recording in case.recordings:
+        if not isinstance(recording, PointsRecording):
+            continue
+        largest = float(np.linalg.norm(recording.displacement, axis=1).max())
+        if largest > min(LARGEST_SHIFT, 0.5 * size):
+            found.append(f"recording '{recording.name}': a point moves {1000.0 * largest:.3g} mm: is the unit right?")
+        if len(np.unique(recording.points, axis=0)) < len(recording.points) and recording.time is None:
+            found.append(f"recording '{recording.name}': a point is recorded twice")
+    if not case.boundaries and case.specimen is None:
+        found.append("no [[boundary]]: nothing holds the body, so it cannot be simulated")
+    if not case.recordings:
+        found.append("no [[recording]]: there is nothing to compare a simulation with")
+    return found

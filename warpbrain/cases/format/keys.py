@@ -1,0 +1,157 @@
+"""A key of `case.toml`: its type, unit, limits and meaning."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+#: What a value can be, and how a message calls it.
+KINDS = {
+    "text": "text",
+    "file": "the name of a file in this folder",
+    "number": "a finite number",
+    "vector": "3 finite numbers",
+    "numbers": "a list of finite numbers",
+    "pairs": "[time, factor] pairs of finite numbers",
+}
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key.
+
+    Attributes
+    ----------
+    name : str
+    kinds : tuple of str
+        What the value can be, of `KINDS`.
+    doc : str
+        One sentence.
+    unit : str
+        Of a number: a unit of SI, or ``"units"`` for the length that ``[case] units`` names.
+    needed : bool
+        Whether a table without it is wrong.
+    choices : tuple of str
+        The only texts allowed, if not empty.
+    above, below : float
+        Limits of a number, themselves not allowed.
+    hint : str
+        What to do where it is missing or out of its limits.
+    """
+
+    name: str
+    kinds: tuple[str, ...]
+    doc: str
+    unit: str = ""
+    needed: bool = False
+    choices: tuple[str, ...] = ()
+    above: float = -math.inf
+    below: float = math.inf
+    hint: str = ""
+
+    def expected(self) -> str:
+        """What the value should be, in words."""
+        unit = f" [{self.unit}]" if self.unit else ""
+        if self.choices:
+            texts = f"one of {', '.join(self.choices)}"
+            others = [KINDS[kind] for kind in self.kinds if kind != "text"]
+            return " or ".join([*others, texts]) + unit
+        return " or ".join(KINDS[kind] for kind in self.kinds) + unit
+
+    def fault(self, value: Any) -> str:
+        """What is wrong with a value, in words; empty if nothing is."""
+        kind = kind_of(value)
+        if kind is None or not any(kind == k or (k, kind) in _ALSO for k in self.kinds):
+            return f"expected {self.expected()}, found {short(value)}"
+        if isinstance(value, str):
+            if self.choices and value not in self.choices:
+                return f"found '{value}', expected {self.expected()}"
+            if "\0" in value:
+                return f"expected {self.expected()}, found {short(value)}"
+        elif not isinstance(value, list) and not self.above < value < self.below:
+            return f"found {value:g}, expected {self._limits()}"
+        return ""
+
+    def _limits(self) -> str:
+        unit = f" [{self.unit}]" if self.unit else ""
+        if math.isinf(self.below):
+            return f"a number above {self.above:g}{unit}" if self.above else f"a positive number{unit}"
+        return f"a number in the open interval ({self.above:g}, {self.below:g}){unit}"
+
+
+#: (wanted, found) pairs that fit as well: three numbers are a list of numbers, a file's name is text.
+_ALSO = {("file", "text"), ("numbers", "vector"), ("pairs", "empty"), ("numbers", "empty")}
+
+
+def kind_of(value: Any) -> str | None:
+    """The kind of `KINDS` that a value of TOML is, ``"empty"`` for a list of nothing, None if it is none."""
+    if isinstance(value, str):
+        return "text"
+    if finite(value):
+        return "number"
+    if not isinstance(value, list):
+        return None
+    if not value:
+        return "empty"
+    if all(finite(item) for item in value):
+        return "vector" if len(value) == 3 else "numbers"
+    if all(isinstance(item, list) and len(item) == 2 and all(map(finite, item)) for item in value):
+        return "pairs"
+    return None
+
+
+def finite(value: Any) -> bool:
+    """Whether it is a number of TOML that a float can hold (its integers may have any number of digits)."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def short(value: Any) -> str:
+    """A value as an error message shows it, on one line of a length that can be read."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of `case.toml`.
+
+    Attributes
+    ----------
+    name : str
+    doc : str
+        One sentence.
+    keys : tuple of Key
+        That it may have whatever it is.
+    by : Key or None
+        The key that says which variant it is.
+    default : str
+        The variant where that key is absent.
+    variants : mapping of str to tuple of Key
+        What each variant may have besides.
+    several : bool
+        Whether it is a list of tables, ``[[name]]``.
+    """
+
+    name: str
+    doc: str
+    keys: tuple[Key, ...] = ()
+    by: Key | None = None
+    default: str = ""
+    variants: Mapping[str, tuple[Key, ...]] = field(default_factory=dict)
+    several: bool = False
+
+    def keys_of(self, variant: str) -> dict[str, Key]:
+        """Keys of a variant by name, the common ones included."""
+        first = (self.by,) if self.by is not None else ()
+        return {key.name: key for key in (*first, *self.keys, *self.variants.get(variant, ()))}
+
+    def all_keys(self) -> list[str]:
+        """Names of the keys of any variant."""
+        return list(dict.fromkeys(name for variant in (*self.variants, "") for name in self.keys_of(variant)))

@@ -1,0 +1,98 @@
+"""The JSON Schema of `case.toml`, made from the tables that it is read by.
+
+Editors complete and check with it what a person types (``#:schema case.schema.json`` on the first line, in those that
+know Taplo). It says what a file may say; what its words mean together with the mesh, only reading the case can tell.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+from warpbrain.cases.format.keys import Key, Table
+from warpbrain.cases.format.tables import PRIOR, TABLES
+from warpbrain.physics.laws import LAWS
+
+#: Where the schema ships, relative to `warpbrain.cases`.
+FILE = "case.schema.json"
+
+_NUMBER = {"type": "number"}
+_KINDS: dict[str, dict[str, Any]] = {
+    "text": {"type": "string"},
+    "file": {"type": "string", "minLength": 1},
+    "number": _NUMBER,
+    "vector": {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3},
+    "numbers": {"type": "array", "items": _NUMBER},
+    "pairs": {"type": "array", "items": {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}},
+}
+
+
+def case_schema() -> dict[str, Any]:
+    """The schema (JSON Schema, draft 2020-12)."""
+    properties = {table.name: _table(table) for table in TABLES}
+    for variant in properties["tissue"]["oneOf"]:
+        variant["anyOf"] = _laws(variant["properties"]["model"]["enum"][0])
+    properties["tissue"] = {
+        "type": "object",
+        "description": next(t.doc for t in TABLES if t.name == "tissue"),
+        "patternProperties": {"^(0|[1-9][0-9]{0,9})$": properties["tissue"]},
+        "additionalProperties": False,
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "case.toml of warpbrain",
+        "description": "One folder is one case: an anatomy, what is assumed to act on it, and what was recorded.",
+        "type": "object",
+        "properties": properties,
+        "required": ["case", "tissue"],
+        # a specimen has a shape in the place of a mesh
+        "oneOf": [{"required": ["mesh"]}, {"required": ["specimen"]}],
+        "additionalProperties": False,
+    }
+
+
+def schema_text() -> str:
+    """The schema as it ships."""
+    return json.dumps(case_schema(), indent=2) + "\n"
+
+
+def _laws(name: str) -> list[dict[str, Any]]:
+    """A tissue has all parameters of its law, or leaves them to the generative model."""
+    given = {"required": list(LAWS[name].keys), "properties": {"mu": {"not": {"const": PRIOR}}}}
+    return [given, {"required": ["mu", "prior"], "properties": {"mu": {"const": PRIOR}}}]
+
+
+def _table(table: Table) -> dict[str, Any]:
+    if table.by is None:
+        schema = _variant(table, "")
+    else:
+        schema = {"oneOf": [_variant(table, name) for name in table.variants]}
+    schema["description"] = table.doc
+    return {"type": "array", "items": schema, "description": table.doc} if table.several else schema
+
+
+def _variant(table: Table, name: str) -> dict[str, Any]:
+    keys = table.keys_of(name)
+    properties = {key.name: _key(key) for key in keys.values()}
+    required = [key.name for key in keys.values() if key.needed]
+    if table.by is not None:
+        properties[table.by.name]["enum"] = [name]
+        if name != table.default and table.by.name not in required:
+            required.append(table.by.name)
+    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
+
+
+def _key(key: Key) -> dict[str, Any]:
+    kinds: list[dict[str, Any]] = [dict(_KINDS[kind]) for kind in key.kinds]
+    for kind in kinds:
+        if kind["type"] == "string" and key.choices:
+            kind["enum"] = list(key.choices)
+        if kind["type"] == "number":
+            if math.isfinite(key.above):
+                kind["exclusiveMinimum"] = key.above
+            if math.isfinite(key.below):
+                kind["exclusiveMaximum"] = key.below
+    schema: dict[str, Any] = kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+    schema["description"] = key.doc + (f" [{key.unit}]" if key.unit else "")
+    return schema

@@ -1,0 +1,233 @@
+"""Every table of `case.toml`. The page that users read is docs/case-format.md; the JSON Schema is made from this."""
+
+from __future__ import annotations
+
+from warpbrain.cases.format.keys import Key, Table
+from warpbrain.frame import AXES, METRES
+from warpbrain.physics.laws import FORMULATIONS, LAWS
+
+ORIGINS = ("measured", "stand-in", "synthetic")
+ROLES = ("fit", "check")
+MODES = ("axial", "shear", "torsion")
+GRIPS = ("glued", "lubricated")
+
+#: Groups of the generative model: method and anatomy of the published strain-energy functions.
+PRIOR_GROUPS = tuple(
+    f"{method}/{anatomy}"
+    for method in ("MRE", "linear", "hyperelastic")
+    for anatomy in ("grey matter", "white matter", "brain", "abnormal")
+)
+
+CASE = Table(
+    "case",
+    "What the case is, and the units and axes of every file in its folder.",
+    (
+        Key("name", ("text",), "Short name; names the folder of results.", needed=True, hint='name = "my-case"'),
+        Key("title", ("text",), "One line for people; the name if absent."),
+        Key(
+            "origin",
+            ("text",),
+            "Whether the recordings were measured, stand in for measured ones, or are synthetic.",
+            needed=True,
+            choices=ORIGINS,
+            hint='origin = "measured", if it was',
+        ),
+        Key("units", ("text",), "Unit of all lengths in the folder; mm if absent.", choices=tuple(METRES)),
+        Key("axes", ("text",), "Axes of all vectors in the folder; RAS if absent.", choices=tuple(AXES)),
+        Key("gravity_axis", ("vector",), "Where 'down' was while recording, in the axes; unknown if absent."),
+    ),
+)
+
+MESH = Table(
+    "mesh",
+    "The anatomy.",
+    (
+        Key("file", ("file",), "Volume mesh that meshio reads.", needed=True, hint='file = "mesh.vtu"'),
+        Key(
+            "tissue",
+            ("text",),
+            "Cell array of tissue labels; absent: 'tissue' if there, else one tissue.",
+        ),
+    ),
+)
+
+# one key may mean several things: a law's mu is a number, a list of numbers or "prior"
+_LAW_KEYS = {
+    "mu": 'Shear modulus (a list for Ogden\'s terms), or "prior": the generative model gives it.',
+    "C1": "First Mooney-Rivlin modulus.",
+    "C2": "Second Mooney-Rivlin modulus.",
+    "alpha": "Exponents of Ogden's terms.",
+}
+#: What stands in the place of a shear modulus that the generative model is to give.
+PRIOR = "prior"
+
+
+def _law_key(name: str, kind: type) -> Key:
+    unit = "" if name == "alpha" else "Pa"
+    kinds = ("numbers",) if kind is list else ("number",)
+    if name == "mu":
+        return Key(name, (*kinds, "text"), _LAW_KEYS[name], unit=unit, choices=(PRIOR,))
+    return Key(name, kinds, _LAW_KEYS[name], unit=unit)
+
+
+TISSUE = Table(
+    "tissue",
+    "A tissue, by its label in the mesh: [tissue.1], [tissue.2], ...",
+    (
+        Key("name", ("text",), "For people."),
+        Key("formulation", ("text",), "How the law treats changes of volume; coupled if absent.", choices=FORMULATIONS),
+        Key("prior", ("text",), "Group of the generative model.", choices=PRIOR_GROUPS),
+    ),
+    by=Key("model", ("text",), "Law; neo-hookean if absent.", choices=tuple(LAWS)),
+    default="neo-hookean",
+    # mu = "prior" has a meaning for every law
+    variants={
+        name: tuple(_law_key(key, kind) for key, kind in ({"mu": float} | dict(law.keys)).items())
+        if "mu" in law.keys
+        else (
+            Key(
+                "mu",
+                ("text",),
+                'Only "prior": the generative model gives the law.',
+                choices=(PRIOR,),
+                hint=f"{name} takes {', '.join(law.keys)}",
+            ),
+            *(_law_key(key, kind) for key, kind in law.keys.items()),
+        )
+        for name, law in LAWS.items()
+    },
+)
+
+BODY = Table(
+    "body",
+    "What all tissues share.",
+    (
+        # wide enough for foams and metals, too narrow for g/cm3
+        Key(
+            "density",
+            ("number",),
+            "1211.5 (the paper's Table 4) if absent.",
+            unit="kg/m3",
+            above=0.0,
+        ),
+        Key("poisson", ("number",), "Poisson ratio at rest; 0.45 if absent.", above=-1.0, below=0.5),
+    ),
+)
+
+_RAMP = Key("ramp", ("pairs",), "Factor over time [s]; 1 throughout if absent.")
+
+BOUNDARY = Table(
+    "boundary",
+    "What is assumed to act on a set of nodes.",
+    (
+        Key("name", ("text",), "For people, and for recordings of force; the node set's name if absent."),
+        Key(
+            "nodes",
+            ("text",),
+            "Point array of the mesh (non-zero: member), or a .csv of node ids in this folder.",
+            needed=True,
+        ),
+    ),
+    by=Key(
+        "kind",
+        ("text",),
+        "What is assumed.",
+        needed=True,
+        choices=("fixed", "sliding", "displacement", "force", "pressure", "contact"),
+    ),
+    variants={
+        "fixed": (),
+        "sliding": (),
+        "displacement": (
+            Key(
+                "value",
+                ("vector", "file"),
+                "Displacement, or a .csv of it over time with the columns t, ux, uy, uz.",
+                unit="units",
+                needed=True,
+                hint="value = [x, y, z]",
+            ),
+            _RAMP,
+        ),
+        "force": (Key("total", ("vector",), "Total force, shared evenly by the nodes.", unit="N", needed=True), _RAMP),
+        "pressure": (
+            Key("value", ("number",), "Pressure on the faces of the nodes, positive pushes.", unit="Pa", needed=True),
+            _RAMP,
+        ),
+        "contact": (
+            Key("surface", ("file",), "Closed surface that the nodes cannot cross.", needed=True),
+            Key("friction", ("number",), "Coefficient of friction; 0 if absent.", above=-1e-300),
+        ),
+    },
+    several=True,
+)
+
+MECHANISM = Table(
+    "mechanism",
+    "Further physics that is assumed to act.",
+    by=Key("kind", ("text",), "Its name.", needed=True, choices=("gravity", "resection")),
+    variants={
+        "gravity": (
+            Key(
+                "csf_level",
+                ("number",),
+                "Height of the fluid's surface against gravity, above the lowest point of the anatomy.",
+                unit="mm",
+                needed=True,
+            ),
+        ),
+        "resection": (Key("elements", ("text",), "Element set that was taken out; 'resection' if absent."),),
+    },
+    several=True,
+)
+
+_SIGMA = Key(
+    "sigma",
+    ("number",),
+    "Noise of one component, one standard deviation, in the unit of what was recorded; estimated if absent.",
+    unit="units, N, Pa or N m",
+    above=0.0,
+)
+
+RECORDING = Table(
+    "recording",
+    "What was observed.",
+    (
+        Key("name", ("text",), "For people.", needed=True),
+        Key("file", ("file",), "Its file in this folder.", needed=True),
+        Key("role", ("text",), "A check recording is never fitted, only scored; fit if absent.", choices=ROLES),
+        _SIGMA,
+    ),
+    by=Key("kind", ("text",), "What it holds.", needed=True, choices=("points", "surface", "force", "test")),
+    variants={
+        "points": (
+            Key("moved", ("file",), "Where the points went, if the file is a Slicer markup."),
+            Key(
+                "outside",
+                ("text",),
+                "What a point outside the mesh is: an error, or observed at the nearest point; error if absent.",
+                choices=("error", "nearest"),
+            ),
+        ),
+        "surface": (Key("nodes", ("text",), "Node set whose faces are compared with it.", needed=True),),
+        "force": (Key("boundary", ("text",), "Name of the boundary that acts with it.", needed=True),),
+        "test": (Key("mode", ("text",), "How the specimen was loaded.", needed=True, choices=MODES),),
+    },
+    several=True,
+)
+
+SPECIMEN = Table(
+    "specimen",
+    "A laboratory specimen, in the place of [mesh]: its shape is given and meshed.",
+    (Key("grips", ("text",), "How its ends are held.", needed=True, choices=GRIPS),),
+    by=Key("shape", ("text",), "Its shape.", needed=True, choices=("cylinder", "block")),
+    variants={
+        "cylinder": (
+            Key("radius", ("number",), "Its axis is z.", unit="units", needed=True, above=0.0),
+            Key("height", ("number",), "Along z.", unit="units", needed=True, above=0.0),
+        ),
+        "block": (Key("size", ("vector",), "Along x, y and z.", unit="units", needed=True),),
+    },
+)
+
+TABLES = (CASE, MESH, SPECIMEN, TISSUE, BODY, BOUNDARY, MECHANISM, RECORDING)

@@ -1,0 +1,167 @@
+"""The anatomy of a case: its mesh, or the mesh of its specimen, checked for being one sound body."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.format.tables import MESH, SPECIMEN
+from warpbrain.cases.parts.context import Context
+from warpbrain.cases.specimen import Specimen
+from warpbrain.frame import METRES
+from warpbrain.mesh import MeshError, MeshInFile, TetMesh, pinched_nodes, read_mesh_file
+from warpbrain.mesh.soundness import coincident_nodes
+from warpbrain.mesh.surface import boundary_faces
+
+#: Volumes [m3] that no brain, phantom or specimen has: 100 litres, and a tenth of a cubic millimetre.
+LARGEST_VOLUME, SMALLEST_VOLUME = 0.1, 1e-10
+
+
+def read_anatomy(context: Context) -> tuple[str, MeshInFile | None, Specimen | None]:
+    """The mesh's file name, the mesh as that file has it, and the specimen, as far as they are right."""
+    if "specimen" in context.tables:
+        specimen = _read_specimen(context)
+        if "mesh" in context.tables:
+            context.problems.add(context.file, "[mesh]", "means nothing with [specimen], whose shape is meshed")
+        if specimen is None:
+            return "", None, None
+        mesh = specimen.mesh()
+        return "", MeshInFile(mesh, np.arange(len(mesh.points)), len(mesh.points)), specimen
+    table = context.table(MESH)
+    path = context.path(table, "file")
+    found = None if path is None else _read_mesh(context, path, table.get("tissue"))
+    return table.get("file", ""), found, None
+
+
+def _read_specimen(context: Context) -> Specimen | None:
+    table = context.table(SPECIMEN)
+    metres = context.frame.metres
+    if table.variant == "block" and table.has("size"):
+        size = table.get("size")
+        if min(size) <= 0.0:
+            table.problem("size", f"found {size}, expected 3 positive numbers [{context.frame.unit}]")
+            return None
+    elif table.variant == "cylinder" and table.has("radius") and table.has("height"):
+        size = (2.0 * table.get("radius"), 2.0 * table.get("radius"), table.get("height"))
+    else:
+        return None
+    if not table.has("grips"):
+        return None
+    if max(size) > 100.0 * min(size):
+        table.problem("shape", f"{max(size):g} long and {min(size):g} thick: too slender to be meshed as it is")
+        return None
+    x, y, z = (metres * float(length) for length in size)
+    return Specimen(str(table.variant), (x, y, z), table.get("grips"))
+
+
+def _read_mesh(context: Context, path: Path, tissue: str | None) -> MeshInFile | None:
+    try:
+        # meshio prints lines of its own where it gives up; the error says it
+        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+            found = read_mesh_file(path, context.frame.unit, tissue)
+    except MeshError as error:
+        for message in error.messages:
+            context.problems.add(path, "", message.removeprefix(f"{path}: "))
+        return None
+    mesh = found.mesh
+    if not np.all(context.frame.signs > 0):
+        # both axes conventions are right-handed: turning two axes keeps the orientation of the elements
+        points = context.frame.directions(mesh.points)
+        mesh = TetMesh(points, mesh.tetrahedra, mesh.tissue, mesh.node_sets, mesh.element_sets)
+    if found.file_nodes > len(mesh.points):
+        context.problems.remark(
+            path,
+            f"tetrahedra of second order: their corners are used, {file_nodes_left(found)} nodes on edges are not",
+        )
+    return _sound(context, path, replace(found, mesh=mesh))
+
+
+def file_nodes_left(found: MeshInFile) -> int:
+    """How many nodes of the file the mesh does not have."""
+    return found.file_nodes - len(found.node_numbers)
+
+
+def _sound(context: Context, path: Path, found: MeshInFile) -> MeshInFile | None:
+    """The mesh, if it is one body of a size that a body can have."""
+    mesh, problems = found.mesh, context.problems
+    volume = mesh.volume
+    if not SMALLEST_VOLUME < volume < LARGEST_VOLUME:
+        unit = context.frame.unit
+        other = next(name for name in METRES if name != unit)
+        converted = 1e6 * volume * (METRES[other] / METRES[unit]) ** 3
+        problems.add(
+            path,
+            "",
+            f"the volume is {1e6 * volume:.4g} cm3 if lengths are in {unit}, which no brain, phantom or specimen has",
+            f'with [case] units = "{other}" it would be {converted:.4g} cm3',
+        )
+        return None
+    pairs = coincident_nodes(mesh.points)
+    if len(pairs):
+        a, b = found.node_numbers[pairs[0]]
+        problems.add(
+            path,
+            f"node {a}",
+            f"{len(pairs)} pair(s) of nodes are at the same place (first {a} and {b}): the body is torn there",
+            "merge them and number the tetrahedra anew",
+        )
+    try:
+        faces = boundary_faces(mesh.tetrahedra)
+    except ValueError as error:
+        problems.add(path, "", f"{error}: the surface is not closed", "tetrahedra may not overlap")
+        return None
+    if len(pinched := pinched_nodes(faces)):
+        problems.remark(
+            path,
+            f"the surface touches itself at {len(pinched)} node(s), first at node {found.node_numbers[pinched[0]]}",
+        )
+    return found
+
+
+def node_ids(context: Context, path: Path, found: MeshInFile) -> NDArray[np.bool_] | None:
+    """Members (n,) of a node set given as a .csv of node numbers, one a line, from 0; None if something is wrong."""
+    problems = context.problems
+    try:
+        if path.stat().st_size > 64 << 20:
+            problems.add(path, "", f"found {path.stat().st_size / 1e6:.0f} MB, expected a list of node numbers")
+            return None
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        problems.add(path, "", f"not UTF-8 text (byte {error.start})", "save it as UTF-8")
+        return None
+    except OSError as error:
+        problems.add(path, "", f"cannot be read: {error.strerror}")
+        return None
+    where = np.full(found.file_nodes, -1, dtype=np.int64)
+    where[found.node_numbers] = np.arange(len(found.node_numbers))
+    members = np.zeros(len(found.mesh.points), dtype=bool)
+    good, header = True, True
+    for number, line in enumerate(lines, 1):
+        text = line.split("#")[0].strip().rstrip(",;")
+        if not text:
+            continue
+        fault = ""
+        if not text.isascii() or not text.isdigit():
+            if header and text.lower() in ("id", "ids", "node", "nodes"):
+                header = False
+                continue
+            fault = f"expected the number of a node, found '{text[:40]}'"
+        elif int(text) >= found.file_nodes:
+            fault = f"found node {text[:20]}, but the mesh has nodes 0 to {found.file_nodes - 1}"
+        elif where[int(text)] < 0:
+            fault = f"node {text} is on an edge of a second-order tetrahedron, and only corners are used"
+        else:
+            members[where[int(text)]] = True
+        header = False
+        if fault:
+            problems.add(path, f"row {number}", fault)
+            good = False
+    if good and not members.any():
+        problems.add(path, "", "the file names no node: the set is empty")
+        return None
+    return members if good else None

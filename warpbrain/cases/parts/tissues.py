@@ -1,0 +1,102 @@
+"""The tissues of a case: a law for every label of its mesh."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from warpbrain.cases.case import Tissue
+from warpbrain.cases.format.keys import short
+from warpbrain.cases.format.table import Reading
+from warpbrain.cases.format.tables import BODY, PRIOR, PRIOR_GROUPS, TISSUE
+from warpbrain.cases.parts.context import Context
+from warpbrain.errors import InputError
+from warpbrain.physics.laws import LAWS, Law
+
+#: Densities [kg/m3] that a tissue, gel or foam can have: wide, and too narrow for g/cm3.
+LIGHTEST, HEAVIEST = 20.0, 30000.0
+
+
+def read_tissues(context: Context) -> dict[int, Tissue]:
+    """Tissues by label, as far as they are right."""
+    values = context.tables.get("tissue")
+    if values is None:
+        context.problems.add(context.file, "[tissue]", "missing", "one table [tissue.LABEL] for each label of the mesh")
+        return {}
+    if not isinstance(values, dict):
+        context.problems.add(context.file, "[tissue]", f"expected a table, found {short(values)}")
+        return {}
+    tissues: dict[int, Tissue] = {}
+    labels: set[int] = set()
+    for key, value in values.items():
+        if not re.fullmatch("0|[1-9][0-9]{0,9}", key):
+            found = f"tissue labels are whole numbers, found '{key}'"
+            context.problems.add(context.file, f"[tissue.{key}]", " ".join(found.split()), "[tissue.1]")
+            continue
+        labels.add(int(key))
+        tissue = _read_tissue(Reading(TISSUE, value, context.file, f"tissue.{key}", context.problems), key)
+        if tissue is not None:
+            tissues[int(key)] = tissue
+    if context.mesh is not None:
+        there = set(np.unique(context.mesh.tissue).tolist())
+        for label in sorted(there - labels):
+            count = int((context.mesh.tissue == label).sum())
+            found = f"missing, but the mesh has tissue {label} ({count} tetrahedra)"
+            context.problems.add(context.file, f"[tissue.{label}]", found, "add the table")
+        for label in sorted(labels - there):
+            found = f"the mesh has no tissue {label}"
+            known = ", ".join(map(str, sorted(there)))
+            context.problems.add(context.file, f"[tissue.{label}]", found, f"it has {known}")
+    return tissues
+
+
+def _read_tissue(table: Reading, label: str) -> Tissue | None:
+    if table.variant is None:
+        return None
+    law, good = _law(table)
+    if not good:
+        return None
+    return Tissue(
+        name=table.get("name", f"tissue {label}"),
+        law=law,
+        formulation=table.get("formulation", "coupled"),
+        prior=table.get("prior", ""),
+        model=table.variant,
+    )
+
+
+def _law(table: Reading) -> tuple[Law | None, bool]:
+    """The law, None where the generative model is to give it; and whether the table is right."""
+    law = LAWS[str(table.variant)]
+    if table.get("mu") == PRIOR:
+        others = [key for key in law.keys if key != "mu" and table.has(key)]
+        for key in others:
+            table.problem(key, f'means nothing with mu = "{PRIOR}", which gives the whole law')
+        if not table.has("prior"):
+            table.problem("prior", f'missing, but mu = "{PRIOR}" needs it', f"one of {', '.join(PRIOR_GROUPS)}")
+            return None, False
+        return None, not others
+    missing = [key for key in law.keys if not table.has(key)]
+    for key in missing:
+        if not table.named(key):
+            table.problem(key, "missing", 'a modulus in Pa, or mu = "prior"' if key == "mu" else "")
+    if missing:
+        return None, False
+    given = {key: table.get(key) for key in law.keys}
+    values = {key: tuple(map(float, v)) if isinstance(v, list) else float(v) for key, v in given.items()}
+    try:
+        return law(**values), True
+    except InputError as error:
+        table.problems.add(table.file, f"[{table.where}]", str(error))
+        return None, False
+
+
+def read_body(context: Context) -> tuple[float, float]:
+    """Density [kg/m3] and Poisson ratio."""
+    table = context.table(BODY, needed=False)
+    density = float(table.get("density", 1211.5))
+    if not LIGHTEST < density < HEAVIEST:
+        cure = f"{density:g} g/cm3 is {1000.0 * density:g} kg/m3" if density < LIGHTEST else "is it in kg/m3?"
+        table.problem("density", f"found {density:g} kg/m3, which no tissue or gel has", cure)
+    return density, float(table.get("poisson", 0.45))

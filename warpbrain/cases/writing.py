@@ -1,0 +1,187 @@
+"""Writes a case folder that reads back as the same case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpbrain.atomic import output_folder, whole_file
+from warpbrain.cases.boundary import Boundary, Contact, Displaced, Fixed, Forced, Pressed, Sliding
+from warpbrain.cases.case import Case, Mechanism, Tissue
+from warpbrain.cases.format.tables import PRIOR
+from warpbrain.errors import InputError
+from warpbrain.frame import Frame
+from warpbrain.mesh import TetMesh, write_mesh
+from warpbrain.physics.gravity import Gravity
+from warpbrain.recordings.recording import (
+    ForceRecording,
+    PointsRecording,
+    Recording,
+    SurfaceRecording,
+    TestRecording,
+)
+from warpbrain.recordings.writing import write_recording
+
+#: The schema that editors check a case.toml with; see `warpbrain.cases.format.schema`.
+_HEAD = "# A case of warpbrain. What its tables and keys mean: docs/case-format.md.\n\n"
+
+
+def write_case(folder: Path, case: Case) -> Path:
+    """Write a case as `folder/case.toml` with its mesh and recordings, in the case's own units and axes.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there. A folder that holds a `case.toml` is refused: nothing is overwritten.
+    case : Case
+
+    Returns
+    -------
+    Path
+        The `case.toml`, written last.
+
+    Raises
+    ------
+    InputError
+        If the folder holds a case already or cannot be written to.
+    """
+    target = folder / "case.toml"
+    if target.exists():
+        raise InputError(f"{target}: there is a case already; write to another folder")
+    output_folder(folder)
+    frame = case.frame
+    tables: dict[str, Any] = {"case": _head(case)}
+    if case.specimen is not None:
+        tables["specimen"] = _specimen(case)
+    else:
+        name = Path(case.mesh_file).with_suffix(".vtu").name
+        tables["mesh"] = {"file": name, "tissue": "tissue"}
+        write_mesh(folder / name, _in_axes(case.mesh, frame), unit=frame.unit)
+    tables["tissue"] = {str(label): _tissue(tissue) for label, tissue in sorted(case.tissues.items())}
+    tables["body"] = {"density": case.density, "poisson": case.poisson}
+    if case.boundaries:
+        tables["boundary"] = [_boundary(folder, boundary, frame) for boundary in case.boundaries]
+    if case.mechanisms:
+        tables["mechanism"] = [_mechanism(mechanism) for mechanism in case.mechanisms]
+    if case.recordings:
+        tables["recording"] = [
+            _recording(folder, number, recording, frame) for number, recording in enumerate(case.recordings, 1)
+        ]
+    import tomli_w
+
+    with whole_file(target) as temporary:
+        temporary.write_text(_HEAD + tomli_w.dumps(tables), encoding="utf-8")
+    return target
+
+
+def _in_axes(mesh: TetMesh, frame: Frame) -> TetMesh:
+    return TetMesh(frame.directions(mesh.points), mesh.tetrahedra, mesh.tissue, mesh.node_sets, mesh.element_sets)
+
+
+def _head(case: Case) -> dict[str, Any]:
+    head: dict[str, Any] = {"name": case.name, "title": case.title, "origin": case.origin}
+    head |= {"units": case.frame.unit, "axes": case.frame.axes}
+    if case.gravity_axis is not None:
+        head["gravity_axis"] = _plain(case.frame.directions(case.gravity_axis))
+    return head
+
+
+def _specimen(case: Case) -> dict[str, Any]:
+    assert case.specimen is not None
+    x, y, z = (length / case.frame.metres for length in case.specimen.size)
+    shape = {"radius": 0.5 * x, "height": z} if case.specimen.shape == "cylinder" else {"size": [x, y, z]}
+    return {"shape": case.specimen.shape, **shape, "grips": case.specimen.grips}
+
+
+def _tissue(tissue: Tissue) -> dict[str, Any]:
+    law: dict[str, Any] = {"mu": PRIOR}
+    if tissue.law is not None:
+        law = {key: _plain(getattr(tissue.law, key)) for key in tissue.law.keys}
+    prior = {"prior": tissue.prior} if tissue.prior else {}
+    return {"name": tissue.name, "model": tissue.model, "formulation": tissue.formulation, **law, **prior}
+
+
+def _boundary(folder: Path, boundary: Boundary, frame: Frame) -> dict[str, Any]:
+    table: dict[str, Any] = {"name": boundary.name, "nodes": boundary.nodes, "kind": boundary.kind}
+    if isinstance(boundary, Displaced):
+        return table | _displacement(folder, boundary, frame)
+    if isinstance(boundary, Forced):
+        return table | {"total": _plain(frame.directions(boundary.total)), **_ramp(boundary.ramp)}
+    if isinstance(boundary, Pressed):
+        return table | {"value": boundary.value, **_ramp(boundary.ramp)}
+    if isinstance(boundary, Contact):
+        name = f"surfaces/{_safe(boundary.name)}.vtu"
+        _write_surface(folder / name, boundary, frame)
+        return table | {"surface": name, "friction": boundary.friction}
+    assert isinstance(boundary, Fixed | Sliding)
+    return table
+
+
+def _ramp(ramp: Any) -> dict[str, Any]:
+    return {"ramp": _plain(ramp)} if ramp else {}
+
+
+def _displacement(folder: Path, boundary: Displaced, frame: Frame) -> dict[str, Any]:
+    values = frame.file_lengths(boundary.values)
+    if not boundary.has_history:
+        return {"value": _plain(values[0])}
+    name = f"boundaries/{_safe(boundary.name)}.csv"
+    (folder / name).parent.mkdir(exist_ok=True)
+    rows = "".join(
+        ",".join(repr(float(v)) for v in (time, *value)) + "\n"
+        for time, value in zip(boundary.times, values, strict=True)
+    )
+    with whole_file(folder / name) as temporary:
+        temporary.write_text("t,ux,uy,uz\n" + rows, encoding="utf-8")
+    return {"value": name}
+
+
+def _write_surface(path: Path, contact: Contact, frame: Frame) -> None:
+    import meshio
+
+    path.parent.mkdir(exist_ok=True)
+    surface = meshio.Mesh(frame.file_lengths(contact.points), [("triangle", contact.faces)])
+    with whole_file(path) as temporary:
+        meshio.write(temporary, surface, file_format="vtu", binary=True, compression="zlib")
+
+
+def _mechanism(mechanism: Mechanism) -> dict[str, Any]:
+    if isinstance(mechanism, Gravity):
+        assert mechanism.csf_level is not None  # a case's gravity always has one
+        return {"kind": "gravity", "csf_level": 1000.0 * mechanism.csf_level}
+    return {"kind": "resection", "elements": mechanism.elements}
+
+
+def _recording(folder: Path, number: int, recording: Recording, frame: Frame) -> dict[str, Any]:
+    name = f"recordings/{_safe(recording.name)}{'.vtu' if getattr(recording, 'faces', None) is not None else '.csv'}"
+    if (folder / name).exists():  # two names that are one file name
+        name = name.replace("recordings/", f"recordings/{number}-")
+    (folder / name).parent.mkdir(exist_ok=True)
+    table: dict[str, Any] = {"name": recording.name, "kind": recording.kind, "file": name, "role": recording.role}
+    length = isinstance(recording, PointsRecording | SurfaceRecording)
+    if recording.sigma is not None:
+        table["sigma"] = recording.sigma / (frame.metres if length else 1.0)
+    more: dict[type[Recording], Callable[[Any], dict[str, Any]]] = {
+        PointsRecording: lambda r: {"outside": r.outside},
+        SurfaceRecording: lambda r: {"nodes": r.nodes},
+        ForceRecording: lambda r: {"boundary": r.boundary},
+        TestRecording: lambda r: {"mode": r.mode},
+    }
+    write_recording(folder / name, replace(recording, file=name), frame)
+    return table | more[type(recording)](recording)
+
+
+def _safe(name: str) -> str:
+    """A file name made from free text."""
+    return "".join(c if c.isalnum() or c in "-_" else "-" for c in name)[:60] or "unnamed"
+
+
+def _plain(value: Any) -> Any:
+    """Python's numbers and lists of NumPy's and tuples."""
+    if isinstance(value, np.ndarray | tuple | list):
+        return [_plain(item) for item in value]
+    return float(value) if isinstance(value, float | np.floating) else value

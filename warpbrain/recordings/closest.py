@@ -1,0 +1,135 @@
+"""The points of a triangulated surface that are closest to given points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.errors import InputError
+from warpbrain.recordings.spheres import Spheres
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class ClosestPoints:
+    """Closest points of a surface.
+
+    Attributes
+    ----------
+    position : (n, 3) array
+        Where they are.
+    face : (n,) int32 array
+        Triangle on which each lies; of several, the one with the smallest number.
+    weights : (n, 3) array
+        Barycentric coordinates there: not negative, their sum is 1.
+    distance : (n,) array
+        From the given point.
+    """
+
+    position: Floats
+    face: Ints
+    weights: Floats
+    distance: Floats
+
+
+def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> ClosestPoints:
+    """Closest points of a surface, exact to rounding; triangles without area count as the segments they are.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    vertices : (v, 3) array
+    faces : (k, 3) array
+        Ids of vertices.
+
+    Raises
+    ------
+    InputError
+        If there are no faces.
+    """
+    xyz = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    triangles = np.asarray(faces)
+    if len(triangles) == 0:
+        raise InputError("a surface without faces has no closest points")
+    corners = np.asarray(vertices, dtype=np.float64)[triangles]
+    centres = corners.mean(axis=1)
+    radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
+    spheres = Spheres(centres, radii)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1)
+    # the normal of a sliver points anywhere: it has none, and counts as a sphere
+    normals = (
+        np.where(length > 1e-8 * radii**2, 1.0, 0.0)[:, None] * normals / np.where(length > 0.0, length, 1.0)[:, None]
+    )
+    near = spheres.nearest(xyz, 4)
+    face = np.zeros(len(xyz), dtype=np.int64)
+    distance = np.full(len(xyz), np.inf)
+    weights = np.zeros((len(xyz), 3))
+    for column in near.T:
+        _improve(np.arange(len(xyz)), column, xyz, corners, face, distance, weights)
+    # whatever is closer than the best so far touches the sphere of that radius
+    for which, candidates in spheres.touching(xyz, distance.copy()):
+        # and, being flat, the disc in that sphere, which leaves few where the surface is far away
+        offset = xyz[which] - centres[candidates]
+        height = np.einsum("ij,ij->i", offset, normals[candidates])
+        aside = np.sqrt(np.maximum(np.einsum("ij,ij->i", offset, offset) - height**2, 0.0)) - radii[candidates]
+        reach = distance[which] + 1e-6 * (distance[which] + radii[candidates])
+        near_enough = np.hypot(height, np.maximum(aside, 0.0)) <= reach
+        which, candidates = which[near_enough], candidates[near_enough]
+        _improve(which, candidates, xyz, corners, face, distance, weights)
+    position = np.einsum("ni,nij->nj", weights, corners[face])
+    return ClosestPoints(position, face.astype(np.int32), weights, distance)
+
+
+def _improve(
+    which: NDArray[np.int64],
+    candidates: NDArray[np.int64],
+    points: Floats,
+    corners: Floats,
+    face: NDArray[np.int64],
+    distance: Floats,
+    weights: Floats,
+) -> None:
+    """Take over, in place, the candidates that are closer than the best so far; a tie goes to the smaller number."""
+    barycentric, apart = _on_triangles(points[which], corners[candidates])
+    order = np.lexsort((candidates, apart, which))
+    first = order[np.append(True, which[order][1:] != which[order][:-1])] if len(order) else order
+    at = which[first]
+    closer = (apart[first] < distance[at]) | ((apart[first] == distance[at]) & (candidates[first] < face[at]))
+    first, at = first[closer], at[closer]
+    face[at], distance[at], weights[at] = candidates[first], apart[first], barycentric[first]
+
+
+def _on_triangles(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
+    """Barycentric coordinates (n, 3) of the closest point of one triangle (n, 3, 3) a point, and its distance (n,)."""
+    a = corners[:, 0]
+    ab, ac, ap = corners[:, 1] - a, corners[:, 2] - a, points - a
+    normal = np.cross(ab, ac)
+    area = np.einsum("ij,ij->i", normal, normal)
+    longest = np.maximum(np.einsum("ij,ij->i", ab, ab), np.einsum("ij,ij->i", ac, ac))
+    flat = area <= 1e-28 * longest**2
+    safe = np.where(flat, 1.0, area)
+    v = np.einsum("ij,ij->i", np.cross(ap, ac), normal) / safe
+    w = np.einsum("ij,ij->i", np.cross(ab, ap), normal) / safe
+    best = np.stack([1.0 - v - w, v, w], axis=1)
+    inside = ~flat & (best >= 0.0).all(axis=1)
+    distance = np.where(inside, _distance(points, corners, best), np.inf)
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        side = corners[:, j] - corners[:, i]
+        square = np.einsum("ij,ij->i", side, side)
+        along = np.einsum("ij,ij->i", points - corners[:, i], side) / np.where(square > 0.0, square, 1.0)
+        along = np.clip(along, 0.0, 1.0)
+        candidate = np.zeros_like(best)
+        candidate[:, i], candidate[:, j] = 1.0 - along, along
+        apart = _distance(points, corners, candidate)
+        closer = apart < distance
+        best[closer], distance[closer] = candidate[closer], apart[closer]
+    return best, distance
+
+
+def _distance(points: Floats, corners: Floats, weights: Floats) -> Floats:
+    return np.linalg.norm(np.einsum("ni,nij->nj", weights, corners - points[:, None]), axis=1)

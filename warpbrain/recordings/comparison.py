@@ -1,0 +1,289 @@
+"""What a state says about a recording: how far what was computed is from what was observed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.errors import InputError
+from warpbrain.mesh.surface import boundary_faces
+from warpbrain.mesh.tet_mesh import TetMesh
+from warpbrain.recordings.closest import closest_points
+from warpbrain.recordings.location import Location, locate
+from warpbrain.recordings.recording import ForceRecording, PointsRecording, SurfaceRecording
+from warpbrain.recordings.times import rows_at
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+def root_mean_square(residuals: ArrayLike) -> float:
+    """`sqrt(mean |r|^2)` of residual vectors (n, 3) or distances (n,), in their unit."""
+    return float(np.sqrt(np.mean(_lengths(residuals) ** 2)))
+
+
+def legacy_error(distances: ArrayLike) -> float:
+    """`sqrt(sum_i |r_i| / n)` with lengths in mm: the number that the paper's own code calls its rmse.
+
+    Its unit is the square root of a mm, not mm: it is the root of the mean distance, and no root mean square. It is
+    here to stand beside published numbers, and for nothing else.
+
+    Parameters
+    ----------
+    distances : (n,) array or (n, 3) array
+        Distances or residual vectors [m].
+
+    Returns
+    -------
+    float
+        [sqrt(mm)]
+    """
+    return float(np.sqrt(np.mean(1000.0 * _lengths(distances))))
+
+
+@dataclass(frozen=True)
+class Error:
+    """Distances in four numbers.
+
+    Attributes
+    ----------
+    root_mean_square, percentile_95, largest : float
+        In the unit of the comparison.
+    legacy : float or None
+        `legacy_error` [sqrt(mm)], of lengths only.
+    """
+
+    root_mean_square: float
+    legacy: float | None
+    percentile_95: float
+    largest: float
+
+    @classmethod
+    def of(cls, residuals: ArrayLike, unit: str = "m") -> Error:
+        """The error of residual vectors (n, 3) or distances (n,)."""
+        distances = _lengths(residuals)
+        return cls(
+            root_mean_square(distances),
+            legacy_error(distances) if unit == "m" else None,
+            float(np.percentile(distances, 95)),
+            float(distances.max()),
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Comparison:
+    """A recording beside a state.
+
+    Attributes
+    ----------
+    name, kind, role : str
+        Of the recording.
+    unit : {"m", "N", "N m"}
+        Of errors and residuals.
+    rows : (n,) int array
+        Rows of the recording that were compared.
+    before, after : Error
+        With nothing moved (or no force), and with the state. Of a surface: from each recorded point to the surface.
+    residuals_before, residuals_after : (n, 3) array
+        Recorded less computed, for each row. Of a surface: from its closest point to the recorded one. A component that
+        was not recorded is NaN.
+    reverse_before, reverse_after : Error or None
+        Of a surface: from each of its nodes to what was recorded; large where only a part of it was recorded.
+    noise : float or None
+        What the noise alone would leave of the root mean square; None if it is not known.
+    """
+
+    name: str
+    kind: str
+    role: str
+    unit: str
+    rows: NDArray[np.int64]
+    before: Error
+    after: Error
+    residuals_before: Floats
+    residuals_after: Floats
+    reverse_before: Error | None = None
+    reverse_after: Error | None = None
+    noise: float | None = None
+
+    @property
+    def count(self) -> int:
+        """Rows that were compared."""
+        return len(self.rows)
+
+
+def compare_points(
+    recording: PointsRecording,
+    mesh: TetMesh,
+    u: ArrayLike,
+    time: float | None = None,
+    location: Location | None = None,
+) -> Comparison:
+    """Compare displacements of tracked points.
+
+    Parameters
+    ----------
+    recording : PointsRecording
+    mesh : TetMesh
+        At rest.
+    u : (N, 3) array
+        Displacement of the nodes [m].
+    time : float, optional
+        Of the state [s]; the recording's end if left out, see `rows_at`.
+    location : Location, optional
+        Of all points of the recording in the mesh, if it is known already.
+
+    Raises
+    ------
+    InputError
+        If nothing was recorded at that time.
+    """
+    rows = rows_at(recording, time)
+    place = locate(mesh.points, mesh.tetrahedra, recording.points[rows]) if location is None else location.at(rows)
+    before = recording.displacement[rows]
+    after = before - place.interpolate(u)
+    squares = recording.sigma**2 if recording.sigma is not None else None
+    if recording.sigmas is not None:
+        squares = float(np.mean(recording.sigmas[rows] ** 2))
+    return Comparison(
+        name=recording.name,
+        kind=recording.kind,
+        role=recording.role,
+        unit="m",
+        rows=rows,
+        before=Error.of(before),
+        after=Error.of(after),
+        residuals_before=before,
+        residuals_after=after,
+        noise=None if squares is None else float(np.sqrt(3.0 * squares)),
+    )
+
+
+def compare_surface(recording: SurfaceRecording, mesh: TetMesh, u: ArrayLike, time: float | None = None) -> Comparison:
+    """Compare a recorded surface with the moved faces of its node set, both ways.
+
+    Parameters are those of `compare_points`. The way back goes from the nodes of these faces to the recorded triangles,
+    or to the nearest recorded points if no triangles were recorded.
+
+    Raises
+    ------
+    InputError
+        If the mesh has no such node set, no boundary triangle has all its nodes in it, or nothing was recorded at that
+        time.
+    """
+    rows = rows_at(recording, time)
+    points = recording.points[rows]
+    faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
+    members = np.unique(faces)
+    residuals, reverse = [], []
+    for moved in (mesh.points, mesh.points + np.asarray(u, dtype=np.float64)):
+        residuals.append(points - closest_points(points, moved, faces).position)
+        reverse.append(Error.of(_to_recorded(moved[members], points, recording.faces)))
+    return Comparison(
+        name=recording.name,
+        kind=recording.kind,
+        role=recording.role,
+        unit="m",
+        rows=rows,
+        before=Error.of(residuals[0]),
+        after=Error.of(residuals[1]),
+        residuals_before=residuals[0],
+        residuals_after=residuals[1],
+        reverse_before=reverse[0],
+        reverse_after=reverse[1],
+        # noise along a surface is not seen: one component of three is left
+        noise=recording.sigma,
+    )
+
+
+def compare_force(recording: ForceRecording, reaction: ArrayLike, time: float | None = None) -> Comparison:
+    """Compare the resultant of a boundary; components that were not recorded do not count.
+
+    Parameters
+    ----------
+    recording : ForceRecording
+    reaction : (3,) array
+        Force of the boundary on the tissue [N].
+    time : float, optional
+        As in `compare_points`.
+
+    Raises
+    ------
+    InputError
+        If no component of the force was recorded (see `compare_torque`), or nothing at that time.
+    """
+    rows = rows_at(recording, time)
+    before = recording.force[rows]
+    recorded = np.isfinite(before).all(axis=0)
+    if not recorded.any():
+        raise InputError(f"recording '{recording.name}' has no component of the force, only the torque")
+    after = before - np.asarray(reaction, dtype=np.float64).reshape(3)
+    return Comparison(
+        name=recording.name,
+        kind=recording.kind,
+        role=recording.role,
+        unit="N",
+        rows=rows,
+        before=Error.of(before[:, recorded], "N"),
+        after=Error.of(after[:, recorded], "N"),
+        residuals_before=before,
+        residuals_after=after,
+        noise=None if recording.sigma is None else float(np.sqrt(recorded.sum())) * recording.sigma,
+    )
+
+
+def compare_torque(recording: ForceRecording, torque: float, time: float | None = None) -> Comparison:
+    """Compare the torque [N m] of a boundary on the tissue; otherwise as `compare_force`.
+
+    The residuals have one column. `sigma` is the torque's only where no force was recorded with it.
+    """
+    rows = rows_at(recording, time)
+    if recording.torque is None:
+        raise InputError(f"recording '{recording.name}' has no torque")
+    before = recording.torque[rows, None]
+    after = before - torque
+    return Comparison(
+        name=recording.name,
+        kind=recording.kind,
+        role=recording.role,
+        unit="N m",
+        rows=rows,
+        before=Error.of(before, "N m"),
+        after=Error.of(after, "N m"),
+        residuals_before=before,
+        residuals_after=after,
+        noise=recording.sigma if np.isnan(recording.force).all() else None,
+    )
+
+
+def faces_of_set(mesh: TetMesh, name: str, who: str) -> Ints:
+    """Boundary triangles (k, 3) all of whose nodes are in a node set; `who` asks for them, for the message.
+
+    Raises
+    ------
+    InputError
+        If there is no such set or no such triangle.
+    """
+    if name not in mesh.node_sets:
+        known = ", ".join(sorted(mesh.node_sets)) or "none"
+        raise InputError(f"{who}: the mesh has no node set '{name}', found {known}")
+    faces = boundary_faces(mesh.tetrahedra)
+    faces = faces[mesh.node_sets[name][faces].all(axis=1)]
+    if len(faces) == 0:
+        raise InputError(f"{who}: no boundary triangle of the mesh has all its nodes in the set '{name}'")
+    return faces
+
+
+def _to_recorded(nodes: Floats, points: Floats, faces: Ints | None) -> Floats:
+    if faces is not None:
+        return closest_points(nodes, points, faces).distance
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(points).query(nodes)[0])
+
+
+def _lengths(residuals: ArrayLike) -> Floats:
+    values = np.asarray(residuals, dtype=np.float64)
+    return np.linalg.norm(values, axis=1) if values.ndim == 2 else np.abs(values)

@@ -1,0 +1,132 @@
+"""Surface meshes that were recorded: triangles from any file that meshio reads, and from ``.vtp``."""
+
+from __future__ import annotations
+
+import io
+import re
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.frame import AXES
+from warpbrain.problems import Problems
+from warpbrain.recordings.text import is_readable, shown
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+# cells that have no area: markers, outlines and the points of point clouds
+_WITHOUT_AREA = ("vertex", "line", "line3", "polyline")
+_WITH_AREA = ("triangle", "triangle6", "triangle7", "quad", "quad8", "quad9", "polygon")
+# corners of the cells of second order come first
+_CORNERS = {"triangle6": 3, "triangle7": 3, "quad8": 4, "quad9": 4}
+# as 3D Slicer and Mimics write it into headers and comments
+_SPACE = re.compile(rb"SPACE=(RAS|LPS)")
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceMesh:
+    """Points (n, 3) as the file has them, triangles (k, 3) or None for a cloud of points, and the axes it states."""
+
+    points: Floats
+    faces: Ints | None
+    axes: str | None
+
+
+def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh | None:
+    """Read a surface mesh or a cloud of points; None if there were problems.
+
+    Polygons are cut into triangles; triangles without area are left out, and so are points that no triangle uses where
+    there are triangles.
+    """
+    if not is_readable(path, problems):
+        return None
+    before = len(problems.found)
+    try:
+        raw = _from_vtp(path) if path.suffix.lower() == ".vtp" else _from_meshio(path, problems)
+    except Exception as error:  # whatever the parsers raise
+        detail = " ".join(str(error).split())[:100] or type(error).__name__
+        cure = "is the file whole? .vtp, .stl, .ply, .obj and .vtu can be read"
+        problems.add(path, "", f"found no surface mesh ({detail})", cure)
+        return None
+    if raw is None or len(problems.found) > before:
+        return None
+    return _checked(raw, path, problems)
+
+
+def _from_vtp(path: Path) -> SurfaceMesh:
+    from warpbrain.recordings.vtp import read_vtp
+
+    points, faces, axes = read_vtp(path)
+    return SurfaceMesh(points, faces if len(faces) else None, axes)
+
+
+def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh | None:
+    import meshio
+
+    if path.suffix.lower() not in meshio.extension_to_filetypes:
+        problems.add(path, "", f"found ending {shown(path.suffix)}, expected .csv, .vtp, .stl, .ply, .obj, .vtu, ...")
+        return None
+    said = io.StringIO()
+    try:
+        # it prints what it says, and leaves the program where it cannot read
+        with redirect_stdout(said), redirect_stderr(said):
+            raw = meshio.read(path)
+    except SystemExit:
+        raise ValueError("meshio cannot read it") from None
+    foreign = {block.type for block in raw.cells} - {*_WITHOUT_AREA, *_WITH_AREA}
+    if foreign:
+        problems.add(path, "", f"found cells of type {', '.join(sorted(foreign))}, expected triangles of a surface")
+        return None
+    fans = [np.empty((0, 3), dtype=np.int32)]
+    for block in raw.cells:
+        if block.type in _WITH_AREA:
+            corners = np.asarray(block.data)[:, : _CORNERS.get(block.type)]
+            fans += [corners[:, [0, i, i + 1]] for i in range(1, corners.shape[1] - 1)]
+    faces = np.concatenate(fans)
+    points = np.asarray(raw.points, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3:
+        problems.add(path, "", f"found points of shape {points.shape}, expected (n, 3)")
+        return None
+    mark = _SPACE.search(path.open("rb").read(2048))
+    return SurfaceMesh(points, faces if len(faces) else None, mark.group(1).decode() if mark else None)
+
+
+def _checked(raw: SurfaceMesh, path: Path, problems: Problems) -> SurfaceMesh | None:
+    points, faces = raw.points, raw.faces
+    count = len(points)
+    if count == 0:
+        problems.add(path, "", "found no points")
+        return None
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        problems.add(path, f"point {bad[0]}", f"found a coordinate that is not finite ({len(bad)} such points in all)")
+        return None
+    if raw.axes not in (None, *AXES):
+        problems.add(path, "SPACE", f"found {shown(raw.axes)}, expected RAS or LPS")
+        return None
+    if faces is None:
+        return raw
+    wrong = np.flatnonzero(((faces < 0) | (faces >= count)).any(axis=1))
+    if len(wrong):
+        what = "a face" if len(wrong) == 1 else f"{len(wrong)} faces"
+        found = f"found {what} with points that are not there (there are {count})"
+        problems.add(path, f"face {wrong[0]}", found)
+        return None
+    corner = points[faces]
+    sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    sound = np.linalg.norm(normal, axis=1) > 1e-12 * sides**2
+    if not sound.any():
+        problems.add(path, "", "found faces without area only")
+        return None
+    if not sound.all():
+        problems.remark(path, f"{np.count_nonzero(~sound)} of {len(faces)} faces have no area and are left out")
+    faces = faces[sound]
+    used, numbers = np.unique(faces, return_inverse=True)
+    if len(used) < count:
+        problems.remark(path, f"{count - len(used)} of {count} points belong to no face and are left out")
+    return SurfaceMesh(points[used], numbers.reshape(-1, 3).astype(np.int32), raw.axes)

@@ -1,0 +1,225 @@
+"""Tables in CSV files: named columns of numbers and words, every wrong row and value of a file reported at once.
+
+A table has one header line. ``#`` starts a comment, on a line of its own or after a row. Columns are in any order, and
+columns that nobody asks for may hold anything; a remark names them. Fields are separated by commas, or by semicolons or
+tabs if the header has those and no comma.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.problems import Problems
+from warpbrain.recordings.text import lines_of, read_text, shown, without_comment
+
+Floats = NDArray[np.float64]
+
+
+class Table:
+    """A table as it was read: cells that are asked for are checked, and what is wrong is added to `problems`.
+
+    Parameters
+    ----------
+    path : Path
+    header : list of str
+        Names of the columns.
+    cells : list of rows
+        Each as long as the header.
+    rows : list of int
+        Line in the file of each row, counted from 1.
+    problems : Problems
+    """
+
+    def __init__(
+        self, path: Path, header: list[str], cells: list[list[str]], rows: list[int], problems: Problems
+    ) -> None:
+        self.path = path
+        self.header = header
+        self.rows = rows
+        self._cells = cells
+        self._problems = problems
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.header
+
+    def problem(self, index: int, name: str, message: str, cure: str = "") -> None:
+        """Note a problem with the value of column `name` in a row, counted from 0."""
+        self._problems.add(self.path, f"row {self.rows[index]}, column {name}", message, cure)
+
+    def require(self, *names: str) -> bool:
+        """Whether all these columns are there; each that is not is a problem."""
+        missing = [name for name in names if name not in self.header]
+        for name in missing:
+            near = _nearest(name, self.header)
+            found = ", ".join(f"{column}" for column in self.header[:8]) + (", ..." if len(self.header) > 8 else "")
+            cure = f"is {shown(near)} meant?" if near else ""
+            self._problems.add(self.path, "header", f"found no column '{name}', found {found[:100]}", cure)
+        return not missing
+
+    def words(self, name: str) -> tuple[str, ...]:
+        """A column as text, none of it empty."""
+        column = self.header.index(name)
+        words = tuple(row[column] for row in self._cells)
+        for index, word in enumerate(words):
+            if not word:
+                self.problem(index, name, "found nothing, expected a name")
+        return words
+
+    def numbers(self, name: str) -> Floats:
+        """A column as finite numbers (n,); NaN where there was a problem."""
+        column = self.header.index(name)
+        values = np.full(len(self._cells), np.nan)
+        for index, row in enumerate(self._cells):
+            cell = row[column]
+            value = _number(cell)
+            if value is not None and math.isfinite(value):
+                values[index] = value
+            elif not cell:
+                self.problem(index, name, "found nothing, expected a number", "leave out rows that were not recorded")
+            elif value is not None:
+                self.problem(index, name, f"found {shown(cell)}, expected a finite number")
+            else:
+                comma = _number(cell.replace(",", ".")) is not None
+                cure = "write decimals with a point" if comma else ""
+                self.problem(index, name, f"found {shown(cell)}, expected a number", cure)
+        return values
+
+    def vectors(self, *names: str) -> Floats:
+        """Columns side by side, (n, number of names)."""
+        return np.stack([self.numbers(name) for name in names], axis=1)
+
+    def bounded(self, name: str, lowest: float, *, itself: bool) -> Floats:
+        """A column of numbers none of which may be less than `lowest`, nor be it unless `itself`."""
+        values = self.numbers(name)
+        wrong = values < lowest if itself else values <= lowest
+        for index in np.flatnonzero(wrong):
+            limit = f"{lowest:g} or more" if itself else f"more than {lowest:g}"
+            self.problem(int(index), name, f"found {values[index]:g}, expected {limit}")
+        return values
+
+    def times(self, *, strictly: bool, of: Sequence[str] | None = None) -> Floats:
+        """Column ``t`` [s], which must not decrease down the file, or must increase if `strictly`.
+
+        `of` names what each row is about; then the rule holds for each of these by itself.
+        """
+        values = self.numbers("t")
+        before: dict[str, int] = {}
+        for index in np.flatnonzero(np.isfinite(values)).tolist():
+            key = of[index] if of is not None else ""
+            if key in before:
+                last = before[key]
+                if values[index] < values[last] or (strictly and values[index] == values[last]):
+                    whose = f" of {shown(key)}" if of is not None else ""
+                    rule = "a later time" if strictly else "no earlier time"
+                    found = f"found {values[index]:.12g} s after {values[last]:.12g} s (row {self.rows[last]}){whose}"
+                    self.problem(index, "t", f"{found}, expected {rule}")
+            before[key] = index
+        return values
+
+
+def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table | None:
+    """Read a CSV file.
+
+    Parameters
+    ----------
+    path : Path
+    problems : Problems
+        Gets everything that is wrong; rows that are too long or too short are left out of the table.
+    known : sequence of str
+        Columns that mean something: none of them may be there twice.
+
+    Returns
+    -------
+    Table or None
+        None if there is no table to speak of: no readable text, no header or no rows.
+    """
+    text = read_text(path, problems)
+    if text is None:
+        return None
+    if not text.endswith(("\n", "\r")):
+        problems.remark(path, "the last row does not end with a line break: is the file cut off?")
+    header: list[str] = []
+    separator = ","
+    cells: list[list[str]] = []
+    rows: list[int] = []
+    broken = 0
+    for number, line in enumerate(lines_of(text), 1):
+        content = without_comment(line)
+        if not content.strip():
+            continue
+        if not header:
+            separator = next((mark for mark in ",;\t" if mark in content), ",")
+        try:
+            fields = _split(content, separator)
+        except csv.Error:
+            problems.add(path, f"row {number}", "found a quotation mark that is not closed, or one inside a field")
+            broken += 1
+            continue
+        if not header:
+            header = fields
+            if not _is_header(path, number, header, known, problems):
+                return None
+        elif not any(fields):
+            continue  # what spreadsheets write for an empty line
+        elif len(fields) != len(header):
+            found = (
+                f"found {len(fields)} field{'s' if len(fields) != 1 else ''}, expected {len(header)} as in the header"
+            )
+            problems.add(path, f"row {number}", found, "is the file cut off?" if len(fields) < len(header) else "")
+            broken += 1
+        else:
+            cells.append(fields)
+            rows.append(number)
+    if not rows and not broken:
+        problems.add(path, "", "found a header and no rows" if header else "found comments only, expected a header")
+    return Table(path, header, cells, rows, problems) if rows else None
+
+
+def _is_header(path: Path, number: int, header: list[str], known: Sequence[str], problems: Problems) -> bool:
+    if all(_number(name) is not None for name in header):
+        cure = "the line with the names must not start with #"
+        problems.add(path, f"row {number}", f"found numbers, expected a header such as {','.join(known[:6])}", cure)
+        return False
+    for name in known:
+        if header.count(name) > 1:
+            problems.add(path, "header", f"found column '{name}' {header.count(name)} times, expected it once")
+    others = [name for name in header if name and name not in known]
+    if others:
+        problems.remark(path, f"ignores column{'s' if len(others) > 1 else ''} {', '.join(others)[:150]}")
+    return True
+
+
+def _split(line: str, separator: str) -> list[str]:
+    if '"' not in line:
+        return [field.strip() for field in line.split(separator)]
+    reader = csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True)
+    return [field.strip() for field in next(reader)]
+
+
+def _number(cell: str) -> float | None:
+    # Python reads 1_000 as a thousand; in a file it is more likely a name
+    if "_" in cell:
+        return None
+    try:
+        return float(cell)
+    except ValueError:
+        return None
+
+
+def _nearest(name: str, header: Sequence[str]) -> str | None:
+    # people add units to names: "x [mm]", "x_mm"
+    bare = {re.split(r"[^a-z0-9]", column.lower())[0]: column for column in reversed(header) if column}
+    plain = bare | {column.lower(): column for column in reversed(header) if column}
+    near = get_close_matches(name.lower(), list(plain), n=1, cutoff=0.4)
+    return plain[near[0]] if near else None

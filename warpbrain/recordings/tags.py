@@ -1,0 +1,101 @@
+"""MNI ``.tag`` files: pairs of landmarks in the world coordinates of two volumes, which are mm in RAS.
+
+The grammar is that of the MINC Tag file format reference: the line ``MNI Tag Point File``, ``Volumes = 1;`` or ``2;``,
+then ``Points =``, one record a line, and a semicolon. A record is x, y and z in each volume, then nothing, or a label,
+or weight, structure, patient and label. ``%`` and ``#`` start comments. The weight is not taken over: programs write
+0 or 1 there whatever the landmark is worth.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.problems import Problems
+from warpbrain.recordings.text import lines_of, read_text, shown, without_comment
+
+Floats = NDArray[np.float64]
+
+TITLE = "MNI Tag Point File"
+
+
+def read_tags(path: Path, problems: Problems) -> tuple[Floats, Floats, tuple[str, ...] | None] | None:
+    """Start (n, 3) and end (n, 3) of landmarks [mm, RAS] and their labels; None if there were problems.
+
+    Labels are None unless all landmarks have one and no two the same.
+    """
+    text = read_text(path, problems)
+    if text is None:
+        return None
+    before = len(problems.found)
+    lines = lines_of(text)
+    if lines[0].strip() != TITLE:
+        problems.add(path, "row 1", f"found {shown(lines[0].strip())}, expected '{TITLE}'")
+        return None
+    state = "Volumes"
+    numbers: list[list[float]] = []
+    labels: list[str] = []
+    for row, line in enumerate(lines[1:], 2):
+        content = without_comment(line, "#%").strip()
+        if state == "Volumes" and content:
+            key, _, value = content.partition("=")
+            if key.strip() != "Volumes" or value.strip() != "2;":
+                cure = "landmarks before and after are needed: both volumes of a pair in one file"
+                problems.add(path, f"row {row}", f"found {shown(content)}, expected 'Volumes = 2;'", cure)
+                return None
+            state = "Points"
+        elif state == "Points" and content:
+            key, equals, content = content.partition("=")
+            if key.strip() != "Points" or not equals:
+                problems.add(path, f"row {row}", f"found {shown(key.strip())}, expected 'Points ='")
+                return None
+            state = "records"
+        if state == "records":
+            record = without_comment(content, ";")
+            if record.strip():
+                _read_record(path, row, record, numbers, labels, problems)
+            if len(record) < len(content):
+                state = "end"
+                if content[len(record) + 1 :].strip():
+                    problems.add(path, f"row {row}", "found text after the semicolon that ends the points")
+        elif state == "end" and content:
+            problems.add(path, f"row {row}", f"found {shown(content)} after the semicolon that ends the points")
+            break
+    if state != "end":
+        problems.add(path, "", "found no semicolon after the points", "is the file cut off?")
+    elif not numbers and len(problems.found) == before:
+        problems.add(path, "", "found no points")
+    if len(problems.found) > before:
+        return None
+    pairs = np.array(numbers)
+    named = all(labels) and len(set(labels)) == len(labels)
+    return pairs[:, :3], pairs[:, 3:], tuple(labels) if named else None
+
+
+def _read_record(
+    path: Path, row: int, record: str, numbers: list[list[float]], labels: list[str], problems: Problems
+) -> None:
+    place = f"row {row}"
+    try:
+        words = next(csv.reader([" ".join(record.split())], delimiter=" ", strict=True))
+    except csv.Error:
+        problems.add(path, place, "found a quotation mark that is not closed")
+        return
+    if len(words) not in (6, 7, 10):
+        expected = "6 coordinates and no more, or a label, or weight, structure, patient and label"
+        problems.add(path, place, f"found {len(words)} fields, expected {expected}")
+        return
+    try:
+        values = [float(word) for word in words[:6]]
+    except ValueError:
+        problems.add(path, place, f"found {shown(' '.join(words[:6]))}, expected 6 numbers")
+        return
+    if not all(math.isfinite(value) for value in values):
+        problems.add(path, place, f"found {shown(' '.join(words[:6]))}, expected finite numbers")
+        return
+    numbers.append(values)
+    labels.append(words[-1].strip() if len(words) > 6 else "")

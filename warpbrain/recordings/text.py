@@ -1,0 +1,117 @@
+"""Files of a case that are text, opened with care: what is no readable text is a problem, and not an exception."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from warpbrain.problems import Problems
+
+#: Largest text file that is read [bytes].
+LIMIT = 64 * 2**20
+#: Problems of one file that are listed one by one.
+LISTED = 20
+
+
+@contextmanager
+def collected(path: Path, problems: Problems) -> Iterator[Problems]:
+    """Problems of one file: at the end the first `LISTED` are added to `problems`, and the number of the others;
+    remarks are passed on."""
+    found = Problems()
+    yield found
+    problems.remarks.extend(found.remarks)
+    problems.found.extend(found.found[:LISTED])
+    problems.remarks.extend(found.remarks)
+    others = len(found.found) - LISTED
+    if others > 0:
+        problems.add(path, "", f"and {others} more problem{'s' if others > 1 else ''} in this file")
+
+
+def shown(text: object) -> str:
+    """What was found, in quotation marks and short enough for a message."""
+    words = str(text)
+    return f"'{words[:30]}...'" if len(words) > 33 else f"'{words}'"
+
+
+def is_readable(path: Path, problems: Problems) -> bool:
+    """Whether there is a file of that name that is not empty and may be read; if not, that is a problem."""
+    try:
+        if path.is_dir():
+            problems.add(path, "", "found a folder, expected a file")
+        elif not path.exists():
+            problems.add(path, "", "no such file", _nearest_name(path))
+        elif not os.access(path, os.R_OK):
+            problems.add(path, "", "cannot be read", "check its permissions")
+        elif path.stat().st_size == 0:
+            problems.add(path, "", "is empty (0 bytes)")
+        else:
+            return True
+    except OSError as error:
+        problems.add(path, "", f"cannot be read: {error.strerror}")
+    return False
+
+
+def read_text(path: Path, problems: Problems) -> str | None:
+    """The text of a UTF-8 file, with or without byte order mark; None if there were problems.
+
+    Parameters
+    ----------
+    path : Path
+    problems : Problems
+        Gets what is wrong: no such file, a folder, no permission, nothing in it, larger than `LIMIT`, not UTF-8.
+    """
+    if not is_readable(path, problems):
+        return None
+    try:
+        size = path.stat().st_size
+        if size > LIMIT:
+            problems.add(path, "", f"is {size / 2**20:.0f} MB, expected no more than {LIMIT // 2**20} MB of text")
+            return None
+        data = path.read_bytes()
+    except OSError as error:
+        problems.add(path, "", f"cannot be read: {error.strerror}")
+        return None
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        row = data.count(b"\n", 0, error.start) + 1
+        found = f"found byte 0x{data[error.start]:02x} at position {error.start}, expected UTF-8 text"
+        problems.add(path, f"row {row}", found, "save the file as UTF-8")
+        return None
+    if not text.strip():
+        problems.add(path, "", "is empty: it holds white space only")
+        return None
+    return text
+
+
+def lines_of(text: str) -> list[str]:
+    """Lines of a text, whatever ended them on the machine that wrote it."""
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def without_comment(line: str, marks: str = "#") -> str:
+    """A line up to the first of `marks` outside double quotation marks."""
+    if '"' not in line:
+        for mark in marks:
+            line = line.partition(mark)[0]
+        return line
+    inside = False
+    for at, character in enumerate(line):
+        if character == '"':
+            inside = not inside
+        elif character in marks and not inside:
+            return line[:at]
+    return line
+
+
+def _nearest_name(path: Path) -> str:
+    from difflib import get_close_matches
+
+    try:
+        names = [entry.name for entry in path.parent.iterdir()]
+    except OSError:
+        return f"there is no folder {path.parent}"
+    near = get_close_matches(path.name, names, n=1)
+    return f"is {shown(near[0])} meant?" if near else ""

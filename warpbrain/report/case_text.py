@@ -1,0 +1,111 @@
+"""A case in words: the list of cases, one case, and what checking it found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpbrain.cases.case import Case
+from warpbrain.cases.checking import Checked
+from warpbrain.mesh import Quality, measure
+from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording, TestRecording
+from warpbrain.report.summary import SET_TITLES
+
+#: Said wherever a stand-in is met.
+STAND_IN = "a stand-in: the MNI anatomy deformed and scaled to the paper's volume, not the patient's images"
+
+_LIST = "{:<14} {:<7} {:<10} {:>7} {:>9} {:>9}   {}"
+
+
+def list_header() -> str:
+    """Names of the columns of `list_line`."""
+    return _LIST.format("case", "tissue", "origin", "nodes", "elements", "cm3", "recordings")
+
+
+def list_line(name: str, tissue: str, case: Case) -> str:
+    """One line about a case."""
+    recordings = ", ".join(f"{r.name} ({count_of(r)})" for r in case.recordings) or "none"
+    mesh = case.mesh
+    return _LIST.format(
+        name, tissue, case.origin, len(mesh.points), len(mesh.tetrahedra), f"{1e6 * mesh.volume:.1f}", recordings
+    )
+
+
+def count_of(recording: Recording) -> int:
+    """How many rows, points or instants a recording has."""
+    if isinstance(recording, PointsRecording | SurfaceRecording):
+        return len(recording.points)
+    assert isinstance(recording, ForceRecording | TestRecording)
+    return len(recording.response) if isinstance(recording, TestRecording) else len(recording.time)
+
+
+def show_lines(case: Case) -> list[str]:
+    """Everything a case says, as printed."""
+    lines = [case.title, f"  file      {case.path}", f"  origin    {case.origin}"]
+    if case.origin == "stand-in":
+        lines[-1] = f"  origin    {STAND_IN}"
+    lines += [f"  {line}" for line in _mesh_lines(case, measure(case.mesh))]
+    for label, tissue in sorted(case.tissues.items()):
+        law = f"mu = {tissue.law.shear_modulus:g} Pa" if tissue.law is not None else f"from the prior '{tissue.prior}'"
+        lines.append(
+            f"  tissue {label}  {tissue.name}: {tissue.model} ({tissue.formulation}), {law}, nu = {case.poisson:g}"
+        )
+    lines += [f"  assumed   {sentence}" for sentence in case.assumptions]
+    lines += [f"  recorded  {sentence}" for sentence in map(recording_line, case.recordings)]
+    lines += [f"  remark    {sentence}" for sentence in case.remarks]
+    return lines
+
+
+def _mesh_lines(case: Case, quality: Quality) -> list[str]:
+    units = f"files in {case.frame.unit}, {case.frame.axes}"
+    sets = {SET_TITLES.get(k, k): int(v.sum()) for k, v in case.mesh.node_sets.items()}
+    elements = {k: int(v.sum()) for k, v in case.mesh.element_sets.items()}
+    volume, edge = 1e6 * quality.volume, 1000.0 * quality.mean_edge
+    lines = [
+        f"mesh      {quality.nodes} nodes, {quality.tetrahedra} tetrahedra of {edge:.3g} mm edge; {units}",
+        f"volume    {volume:.4g} cm3, {case.density * quality.volume:.4g} kg at {case.density:g} kg/m3",
+        f"quality   dihedral angles from {quality.min_dihedral:.1f} to {quality.max_dihedral:.1f} degrees, first "
+        f"percentile of each tetrahedron's smallest {quality.first_percentile_dihedral:.1f}; "
+        f"{quality.components} part(s)",
+    ]
+    if sets:
+        lines.append("node sets " + ", ".join(f"{name} ({count})" for name, count in sets.items()))
+    if elements:
+        lines.append("elements  " + ", ".join(f"{name} ({count})" for name, count in elements.items()))
+    return lines
+
+
+def recording_line(recording: Recording) -> str:
+    """One line about a recording."""
+    head = f"{recording.name}: {count_of(recording)} "
+    role = "" if recording.role == "fit" else "; only checked, never fitted"
+    unit = "mm" if isinstance(recording, PointsRecording | SurfaceRecording) else ""
+    scale = 1000.0 if unit else 1.0
+    noise = f"; noise {scale * recording.sigma:g} {unit}".rstrip() if recording.sigma is not None else ""
+    if isinstance(recording, PointsRecording):
+        sizes = 1000.0 * np.linalg.norm(recording.displacement, axis=1)
+        rms = float(np.sqrt(np.mean(sizes**2)))
+        return f"{head}tracked points, moved by {rms:.2f} mm RMS, {sizes.max():.2f} mm at most{noise}{role}"
+    if isinstance(recording, SurfaceRecording):
+        return f"{head}points of the moved surface '{recording.nodes}', not paired{noise}{role}"
+    if isinstance(recording, ForceRecording):
+        return f"{head}forces on '{recording.boundary}'{noise}{role}"
+    assert isinstance(recording, TestRecording)
+    return f"{head}rows of a test in {recording.mode}: {' and '.join(recording.quantities)}{noise}{role}"
+
+
+def check_lines(checked: Checked) -> list[str]:
+    """What checking found, as printed: problems first."""
+    lines = [str(checked.file)]
+    for problem in checked.problems:
+        place = f"{problem.file.name}: {problem.place}: " if problem.place else f"{problem.file.name}: "
+        lines.append(f"  problem   {place}{problem.message}")
+        if problem.cure:
+            lines.append(f"            -> {problem.cure}")
+    if checked.case is not None and checked.quality is not None:
+        lines += [f"  {line}" for line in _mesh_lines(checked.case, checked.quality)]
+        lines.append(f"  plausible {1e6 * checked.quality.volume:.4g} cm3: {checked.plausible}")
+        lines += [f"  recorded  {sentence}" for sentence in map(recording_line, checked.case.recordings)]
+    lines += [f"  look at   {sentence}" for sentence in checked.remarks]
+    if not checked.problems:
+        lines.append("  nothing is wrong with it")
+    return lines
