@@ -34,6 +34,9 @@ _HOMES = {
     "cases.case": ("Case",),
     "cases.reading": ("read_case",),
     "cases.shipped": ("find_case",),
+    "cases.writing": ("write_case",),
+    "cases.checking": ("check_case",),
+    "simulation.observation": ("observe",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -59,21 +62,26 @@ __all__ = [
     "SolveError",
     "System",
     "TetMesh",
+    "check_case",
     "find_case",
     "model_of",
+    "observe",
     "read_case",
     "read_mesh",
     "relax_to_rest",
     "require_stable",
     "result_of",
     "solve_equilibrium",
+    "write_case",
     "write_mesh",
 ]
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
+    from warpbrain.cases.checking import check_case
     from warpbrain.cases.reading import read_case
     from warpbrain.cases.shipped import find_case
+    from warpbrain.cases.writing import write_case
     from warpbrain.errors import InputError, SolveError
     from warpbrain.mesh import MeshError, TetMesh, read_mesh, write_mesh
     from warpbrain.physics.force import NodalForce
@@ -89,6 +97,7 @@ if TYPE_CHECKING:
         solve_equilibrium,
     )
     from warpbrain.simulation.model import Damping, Material, Model
+    from warpbrain.simulation.observation import observe
     from warpbrain.simulation.of_case import model_of
     from warpbrain.simulation.relaxation import relax_to_rest
     from warpbrain.simulation.result import Result, result_of

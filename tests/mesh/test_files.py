@@ -112,3 +112,15 @@ def test_errors_say_what_was_found(tmp_path):
         read_mesh(path, unit="cm")
     with pytest.raises(MeshError, match=r"written as \.vtu"):
         write_mesh(tmp_path / "a.vtk", sample())
+
+
+@pytest.mark.parametrize("ending", ["bdf", "ele", "dat"])
+def test_a_reader_that_would_wait_for_ever_is_stopped(tmp_path, monkeypatch, ending):
+    """meshio's readers of these formats look for the end of a file that is cut off until somebody ends them."""
+    monkeypatch.setattr("warpbrain.mesh.patience.PATIENCE", 0.5)
+    path = tmp_path / f"mesh.{ending}"
+    content = {"bdf": "BEGIN BULK\nGRID,1,,0.0,0.0,0.0\n", "ele": "", "dat": 'VARIABLES = "X"'}[ending]
+    path.write_text(content or "# cut off\n")
+    (tmp_path / "mesh.node").write_text("# cut off\n")
+    with pytest.raises(MeshError, match=f"mesh.{ending}: not a mesh that meshio can read"):
+        read_mesh(path)

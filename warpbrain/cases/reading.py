@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from pathlib import Path
 
 from warpbrain.cases.case import Case
@@ -21,12 +22,12 @@ from warpbrain.recordings.inside import check_points_inside
 from warpbrain.recordings.recording import PointsRecording
 
 
-def read_case(path: Path) -> Case:
+def read_case(path: str | os.PathLike[str]) -> Case:
     """Read a case.
 
     Parameters
     ----------
-    path : Path
+    path : path
         A `case.toml`, or the folder that holds it.
 
     Raises
@@ -35,7 +36,7 @@ def read_case(path: Path) -> Case:
         If anything in it is wrong: the file, the key or row, what was found and what was expected.
     """
     problems = Problems()
-    case = examine_case(path, problems)
+    case = examine_case(Path(path), problems)
     problems.stop()
     assert case is not None  # nothing was wrong
     return case

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -30,12 +31,12 @@ from warpbrain.recordings.writing import write_recording
 _HEAD = "# A case of warpbrain. What its tables and keys mean: docs/case-format.md.\n\n"
 
 
-def write_case(folder: Path, case: Case) -> Path:
+def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
     """Write a case as `folder/case.toml` with its mesh and recordings, in the case's own units and axes.
 
     Parameters
     ----------
-    folder : Path
+    folder : path
         Made if it is not there. A folder that holds a `case.toml` is refused: nothing is overwritten.
     case : Case
 
@@ -49,6 +50,7 @@ def write_case(folder: Path, case: Case) -> Path:
     InputError
         If the folder holds a case already or cannot be written to.
     """
+    folder = Path(folder)
     target = folder / "case.toml"
     if target.exists():
         raise InputError(f"{target}: there is a case already; write to another folder")

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from warpbrain.atomic import whole_file
 from warpbrain.frame import METRES
+from warpbrain.mesh.patience import patience
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 
 ELEMENT_SET_PREFIX = "set_"
@@ -87,7 +88,8 @@ def read_mesh_file(path: str | os.PathLike[str], unit: str = "m", tissue: str | 
     if size > LARGEST_FILE:
         raise MeshError(f"{source}: found {size / 1e6:.0f} MB, expected a mesh of at most {LARGEST_FILE / 1e6:.0f} MB")
     try:
-        raw = meshio.read(source)
+        with patience(source):
+            raw = meshio.read(source)
     except SystemExit as error:  # meshio leaves the program on some unreadable files
         raise MeshError(f"{source}: not a mesh that meshio can read") from error
     except Exception as error:  # its readers raise whatever their parsers do

@@ -94,6 +94,6 @@ def _mistake(points: Floats, mesh: TetMesh) -> str:
         place = locate(mesh.points, mesh.tetrahedra, undone)
         # shrunk to a dot, any points lie inside a body that holds the origin: that tells nothing
         dot = np.ptp(undone, axis=0).max() < _DOT * np.ptp(mesh.points, axis=0).max()
-        shares.append(0.0 if dot else np.mean(place.distance <= place.edge))
+        shares.append(0.0 if dot else float(np.mean(place.distance <= place.edge)))
     best = int(np.argmax(shares))
     return _MISTAKES[best][1] if shares[best] > 0.5 else ""

@@ -79,7 +79,7 @@ def paired(start: Markup, end: Markup, path: Path, moved: Path, problems: Proble
 def _read_json(path: Path, text: str, problems: Problems) -> Markup | None:
     try:
         content = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         problems.add(path, "", f"found no valid JSON ({error})", "is the file cut off?")
         return None
     markups = content.get("markups") if isinstance(content, dict) else None
@@ -114,7 +114,8 @@ def _position(control: dict[str, Any], number: int, path: Path, problems: Proble
         return None
     position = control.get("position")
     if isinstance(position, list) and len(position) == 3:
-        numbers = [float(value) for value in position if type(value) in (int, float) and math.isfinite(value)]
+        # true is an integer for Python, and integers of JSON may be larger than any float
+        numbers = [float(value) for value in position if type(value) in (int, float) and abs(value) < 1e300]
         if len(numbers) == 3:
             return numbers
     problems.add(path, place, f"found position {shown(position)}, expected three finite numbers")
@@ -139,8 +140,12 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
                     problems.add(path, f"row {row}", f"found columns {shown(value)}, expected {_COLUMNS}")
                     return None
         elif line.strip():
+            try:
+                fields = next(csv.reader([line]))
+            except csv.Error as error:
+                problems.add(path, f"row {row}", f"found no fields ({error})")
+                continue
             # rows need not have the columns after the label
-            fields = next(csv.reader([line]))
             last = max(columns.index(name) for name in ("x", "y", "z", "label"))
             if len(fields) <= last:
                 problems.add(path, f"row {row}", f"found {len(fields)} fields, expected {len(columns)}")

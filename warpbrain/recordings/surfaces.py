@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.frame import AXES
+from warpbrain.mesh.patience import patience
 from warpbrain.problems import Problems
 from warpbrain.recordings.text import is_readable, shown
 
@@ -25,6 +26,8 @@ _WITH_AREA = ("triangle", "triangle6", "triangle7", "quad", "quad8", "quad9", "p
 _CORNERS = {"triangle6": 3, "triangle7": 3, "quad8": 4, "quad9": 4}
 # as 3D Slicer and Mimics write it into headers and comments
 _SPACE = re.compile(rb"SPACE=(RAS|LPS)")
+# what there must be of a header: without it meshio's readers go round for ever at the end of the file
+_WHOLE_HEADER = {".ply": re.compile(rb"^end_header\s*$", re.MULTILINE), ".off": re.compile(rb"\n[ \t]*[^#\s]")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +73,15 @@ def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh | None:
     if path.suffix.lower() not in meshio.extension_to_filetypes:
         problems.add(path, "", f"found ending {shown(path.suffix)}, expected .csv, .vtp, .stl, .ply, .obj, .vtu, ...")
         return None
+    with path.open("rb") as file:
+        head = file.read(2**16)
+    whole = _WHOLE_HEADER.get(path.suffix.lower())
+    if whole is not None and not whole.search(head):
+        raise ValueError("its header is cut off")
     said = io.StringIO()
     try:
         # it prints what it says, and leaves the program where it cannot read
-        with redirect_stdout(said), redirect_stderr(said):
+        with redirect_stdout(said), redirect_stderr(said), np.errstate(all="ignore"), patience(path):
             raw = meshio.read(path)
     except SystemExit:
         raise ValueError("meshio cannot read it") from None
@@ -91,7 +99,7 @@ def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh | None:
     if points.ndim != 2 or points.shape[1] != 3:
         problems.add(path, "", f"found points of shape {points.shape}, expected (n, 3)")
         return None
-    mark = _SPACE.search(path.open("rb").read(2048))
+    mark = _SPACE.search(head[:2048])
     return SurfaceMesh(points, faces if len(faces) else None, mark.group(1).decode() if mark else None)
 
 

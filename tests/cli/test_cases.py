@@ -1,0 +1,125 @@
+"""`warpbrain cases`: the list, one case, and what checking says."""
+
+import json
+
+import pytest
+from command import run, warpbrain
+from folders import write_folder, write_recorded
+
+from warpbrain.cases.shipped import SHIPPED
+
+
+def test_the_list_names_every_case_and_says_what_a_stand_in_is():
+    done = warpbrain("cases")
+    assert done.status == 0 and done.err == ""
+    head, *lines = done.out.splitlines()
+    assert head.split() == ["case", "tissue", "origin", "nodes", "elements", "cm3", "recordings"]
+    rows = {(line.split()[0], line.split()[1]): line.split() for line in lines if line.strip() and line[0] in "0p"}
+    assert set(rows) == {(name, tissue) for name, variants in SHIPPED.items() for tissue in variants}
+    for (name, _), row in rows.items():
+        assert row[2] == ("synthetic" if name.startswith("phantom") else "stand-in")
+        assert int(row[3]) > 2000 and int(row[4]) > 10000 and 1000 < float(row[5]) < 1700
+    assert "not the patient's images" in done.out
+
+
+@pytest.mark.parametrize("name", ["0529", "phantom"])
+def test_show(tmp_path, name):
+    done = warpbrain("cases", "show", name, "--tissue", "single", "--out", tmp_path / "a.png")
+    assert done.status == 0, done.err
+    assert ("not the patient's images" in done.out) == (name == "0529")
+    assert "skull base" in done.out and "cm3" in done.out
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_show_refuses_a_place_it_cannot_write_to(tmp_path):
+    done = warpbrain("cases", "show", "phantom", "--out", tmp_path / "none" / "a.png")
+    assert done.status == 2
+    assert done.out == ""
+    assert "no such folder" in done.err
+
+
+def test_check_of_a_good_folder(tmp_path):
+    done = warpbrain("cases", "check", write_recorded(tmp_path))
+    assert done.status == 0 and done.err == ""
+    assert "nothing is wrong with it" in done.out
+    assert "27 cm3" in done.out and "quality" in done.out
+    assert "beads: 3 tracked points, moved by" in done.out
+
+
+def test_check_prints_every_problem_with_its_cure(tmp_path):
+    folder = write_recorded(tmp_path, ("mu = 1000.0", "m = 1000.0"), ("poisson", "poison"))
+    done = warpbrain("cases", "check", folder)
+    assert done.status == 2
+    assert "  problem   case.toml: [tissue.1] m: unknown key" in done.out
+    assert "            -> did you mean 'poisson'?" in done.out
+    assert done.err == f"warpbrain: error: {folder}: 3 problems, listed above\n"
+
+
+def test_check_of_both_files_of_a_folder(tmp_path):
+    folder = write_folder(tmp_path)
+    (folder / "case-single.toml").write_text("[case]\n")
+    done = warpbrain("cases", "check", folder)
+    assert done.status == 2
+    assert "case-single.toml: [mesh]: missing" in done.out
+    assert "case.toml\n" in done.out and "nothing is wrong" in done.out
+
+
+@pytest.mark.parametrize("action", ["check", "show"])
+def test_no_such_case(action):
+    done = warpbrain("cases", action, "0528")
+    assert done.status == 2
+    assert "did you mean '0529'?" in done.err
+
+
+def test_schema():
+    done = warpbrain("cases", "schema")
+    assert done.status == 0
+    assert json.loads(done.out)["title"] == "case.toml of warpbrain"
+
+
+@pytest.mark.parametrize("legacy", [False, True])
+def test_run_prints_the_error_at_each_recording(tmp_path, legacy):
+    folder = write_recorded(tmp_path / "case")
+    done = run(folder, "--out", tmp_path / "out", *(["--legacy-rmse"] if legacy else []))
+    assert done.status == 0, done.err
+    table = done.out.split("RMSE at recordings")[1].split("time [ms]")[0]
+    assert [line.split()[0] for line in table.splitlines()[1:5]] == ["beads", "lid", "mesh", "cell"]
+    assert ("sqrt(mm)" in table) == legacy
+    assert "check" in table
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())["recordings"]
+    beads, lid, cell = summary["compared"]
+    assert beads["unit"] == "mm" and beads["before"]["root_mean_square"] == pytest.approx((1.4 / 3) ** 0.5)
+    assert beads["noise_root_mean_square"] == pytest.approx(0.1 * 3**0.5)
+    # the paper's formula: the root of the mean distance
+    assert beads["before"]["legacy_sqrt_mm"] == pytest.approx(((0.05**0.5 + 0.26**0.5 + 1.09**0.5) / 3) ** 0.5)
+    assert lid["role"] == "check" and "mesh_to_recording_after" in lid
+    assert cell["unit"] == "N" and cell["after"]["root_mean_square"] == pytest.approx(0.001)
+    rows = (tmp_path / "out" / "comparison.csv").read_text().splitlines()
+    assert len(rows) == 1 + 3 + 3 + 1
+    assert rows[1].startswith("beads,points,mm,0,a,10,10,10,0.1,0,-0.2,")
+
+
+def test_run_refuses_what_cannot_be_simulated(tmp_path):
+    force = 'kind = "force"\ntotal = [0.01, 0.02, -0.05]'
+    for kind in ("sliding", 'pressure"\nvalue = 10.0 #"'):
+        folder = write_folder(tmp_path / kind[:7], (force, f'kind = "{kind}"'.replace('#""', "")))
+        done = run(folder, "--out", tmp_path / "out")
+        assert done.status == 2
+        assert f"[[boundary]] 'press' kind: '{kind.split(chr(34))[0]}' cannot be simulated yet" in done.err
+    prior = write_folder(tmp_path / "prior", ("mu = 1000.0", 'mu = "prior"\nprior = "linear/brain"'))
+    done = run(prior, "--out", tmp_path / "out")
+    assert done.status == 2 and "generative model" in done.err
+    done = run(prior, "--mu", "1=900", "--out", tmp_path / "out")
+    assert done.status == 0, done.err
+
+
+def test_a_history_is_followed(tmp_path):
+    """A boundary that is moved there and back is where its file says, at every time."""
+    force = 'kind = "force"\ntotal = [0.01, 0.02, -0.05]'
+    folder = write_folder(tmp_path, (force, 'kind = "displacement"\nvalue = "pull.csv"'))
+    (folder / "pull.csv").write_text("t,ux,uy,uz\n0,0,0,0\n0.002,0,0,-0.4\n0.004,0,0,0.2\n")
+    for steps, size in (("1", 0.2), ("2", 0.4), ("3", 0.1), ("4", 0.2), ("6", 0.2)):
+        done = run(folder, "--steps", steps, "--out", tmp_path / "out")
+        assert done.status == 0, done.err
+        summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+        assert summary["result"]["displacement_mm"]["top"]["largest"] == pytest.approx(size), steps
