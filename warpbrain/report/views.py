@@ -1,0 +1,176 @@
+"""What the pictures share: where an anatomy is cut, how a cut is held and framed, colours, legend and file.
+
+Drawn with matplotlib alone: a cut needs no renderer, so a picture comes out the same on a laptop, a server without a
+display and a machine without graphics libraries. Cuts are shown as a radiologist holds them: the patient's left is on
+the right of the picture.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.atomic import whole_file
+from warpbrain.mesh import TetMesh
+from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.slices import Cut, outline
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+TISSUE_COLOURS = ("#b9aea6", "#efe8df", "#d3b8a8", "#c9d3c0", "#c5c3d8", "#d9cfa8")
+RESECTED = "#d9483b"
+TISSUE_EDGE = "#4d4640"
+
+
+@dataclass(frozen=True)
+class View:
+    """A cut: its name, the axis it is normal to, and the letters at its edges."""
+
+    name: str
+    axis: int
+    letters: tuple[str, str, str, str]  # left, right, bottom, top of the picture
+
+    @property
+    def plane(self) -> list[int]:
+        """The two axes that are not cut."""
+        return [k for k in range(3) if k != self.axis]
+
+
+VIEWS = (
+    View("axial", 2, ("R", "L", "P", "A")),
+    View("coronal", 1, ("R", "L", "I", "S")),
+    View("sagittal", 0, ("A", "P", "I", "S")),
+)
+
+
+def resected_elements(mesh: TetMesh, name: str = "resection") -> Bools:
+    """Elements of the set that was taken out; none if there is no such set."""
+    return mesh.element_sets.get(name, np.zeros(len(mesh.tetrahedra), dtype=bool))
+
+
+def places(mesh: TetMesh, resected: Bools) -> tuple[float, float, float]:
+    """Where to cut [m], in the order of `VIEWS`: through the resected tissue, else through a lateral ventricle."""
+    ventricle = mesh.node_sets.get("ventricle", np.zeros(len(mesh.points), dtype=bool))
+    centre = mesh.points[ventricle].mean(axis=0) if ventricle.any() else mesh.points.mean(axis=0)
+    if resected.any():
+        cavity = mesh.points[mesh.tetrahedra[resected].ravel()].mean(axis=0)
+        return float(cavity[2]), float(cavity[1]), float(cavity[0])
+    # beside the midline, where a lateral ventricle is
+    beside = float(np.quantile(mesh.points[ventricle, 0], 0.75)) if ventricle.any() else float(centre[0])
+    return float(centre[2]), float(centre[1]), beside
+
+
+def in_view(coordinates: Floats) -> Floats:
+    """Picture coordinates [mm] of in-plane coordinates [m]: the horizontal axis is turned, as radiologists hold it."""
+    return np.array(coordinates) * (-MILLIMETRES, MILLIMETRES)
+
+
+def scale_length(mesh: TetMesh) -> float:
+    """Length of the scale bar [mm]: 1, 2 or 5 and zeros, 20 for a brain."""
+    sixth = MILLIMETRES * float(np.ptp(mesh.points, axis=0).max()) / 6.0
+    decade = 10.0 ** math.floor(math.log10(sixth))
+    # a logarithm rounded up is why a half is among them
+    return max(step * decade for step in (0.5, 1.0, 2.0, 5.0) if step * decade <= sixth)
+
+
+def heading(mesh: TetMesh, view: View, place: float) -> str:
+    """Name of a cut and where it is."""
+    # as fine as the scale bar makes sense of; -0 is 0
+    decimals = max(0, 1 - math.floor(math.log10(scale_length(mesh))))
+    return f"{view.name}, {'xyz'[view.axis]} = {place * MILLIMETRES:z.{decimals}f} mm"
+
+
+def element_colours(mesh: TetMesh, resected: Bools) -> NDArray[np.str_]:
+    """Colour of each element: of its tissue, or that of what was resected."""
+    numbers = np.unique(mesh.tissue, return_inverse=True)[1]
+    return np.where(resected, RESECTED, np.array(TISSUE_COLOURS)[numbers % len(TISSUE_COLOURS)])
+
+
+def draw_tissue(axes: Any, section: Cut, colours: NDArray[np.str_], rim: float = 0.4) -> None:
+    """Fill a cut with the colours of its elements; a rim of the same colour hides the seams between them."""
+    from matplotlib.collections import PolyCollection
+
+    shown = colours[section.elements].tolist()
+    polygons = [in_view(p) for p in section.polygons]
+    axes.add_collection(PolyCollection(polygons, facecolors=shown, edgecolors=shown, linewidths=rim))
+
+
+def draw_outline(
+    axes: Any, faces: Ints, points: Floats, view: View, place: float, style: Any = "-", colour: str = TISSUE_EDGE
+) -> None:
+    """Draw where faces cross the plane of a cut."""
+    from matplotlib.collections import LineCollection
+
+    segments = in_view(outline(points, faces, view.axis, place))
+    axes.add_collection(LineCollection(list(segments), colors=colour, linestyles=[style], linewidths=0.9))
+
+
+def frame(axes: Any, mesh: TetMesh, view: View, margin: float | None = None) -> None:
+    """Frame a cut: limits at a margin [mm] around the body, letters and scale bar."""
+    length = scale_length(mesh)
+    margin = 0.4 * length if margin is None else margin
+    corners = in_view(np.array([mesh.points.min(axis=0)[view.plane], mesh.points.max(axis=0)[view.plane]]))
+    low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    bare(axes)
+    left, right, bottom, top = view.letters
+    style = {"fontsize": 11, "color": "#7a7a7a", "transform": axes.transAxes}
+    axes.text(0.01, 0.5, left, va="center", ha="left", **style)
+    axes.text(0.99, 0.5, right, va="center", ha="right", **style)
+    axes.text(0.5, 0.0, bottom, va="bottom", ha="center", **style)
+    axes.text(0.5, 1.0, top, va="top", ha="center", **style)
+    start, height = low + 0.2 * length
+    axes.plot([start, start + length], [height, height], color="#333333", linewidth=2.0)
+    middle, above = start + 0.5 * length, height + 0.1 * length
+    axes.text(middle, above, f"{length:g} mm", fontsize=8, ha="center", color="#333333")
+
+
+def bare(axes: Any) -> None:
+    """Equal scales, no ticks, no box."""
+    axes.set_aspect("equal")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    for side in axes.spines.values():
+        side.set_visible(False)
+
+
+def tissue_entries(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> list[tuple[Any, str]]:
+    """Legend entries of the tissues and of what was resected."""
+    from matplotlib.patches import Patch
+
+    entries = []
+    for i, label in enumerate(np.unique(mesh.tissue).tolist()):
+        colour = TISSUE_COLOURS[i % len(TISSUE_COLOURS)]
+        entries.append((Patch(facecolor=colour, edgecolor=TISSUE_EDGE), names.get(label, str(label))))
+    if resected.any():
+        entries.append((Patch(facecolor=RESECTED), "resected"))
+    return entries
+
+
+def legend(figure: Any, entries: list[tuple[Any, str]], **options: Any) -> list[Any]:
+    """A legend of the whole figure; the texts, in the order of the entries."""
+    # labels are set afterwards: names are the user's free text, in which a dollar sign begins no formula and a leading
+    # underscore hides nothing
+    made = figure.legend([handle for handle, _ in entries], ["-"] * len(entries), frameon=False, **options)
+    for text, (_, label) in zip(made.get_texts(), entries, strict=True):
+        text.set_parse_math(False)
+        text.set_text(label)
+    return list(made.get_texts())
+
+
+def save(figure: Any, path: Path) -> None:
+    """Write a figure as PNG, whole."""
+    with whole_file(path) as temporary, warnings.catch_warnings():
+        # a title in a script that the font lacks is no reason to print anything
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        figure.savefig(temporary, dpi=110, format="png")
