@@ -6,7 +6,7 @@ import stat
 import pytest
 
 from warpbrain import atomic
-from warpbrain.atomic import check_writable, output_folder, remove_unfinished, whole_file
+from warpbrain.atomic import check_writable, output_folder, remove_unfinished, whole_file, whole_folder
 from warpbrain.errors import InputError
 
 
@@ -102,3 +102,68 @@ def test_output_folder_cannot_be_a_file(tmp_path):
     for path in (tmp_path / "a", tmp_path / "a" / "b"):
         with pytest.raises(InputError, match="cannot be made a folder"):
             output_folder(path)
+
+
+@pytest.mark.parametrize("empty", [False, True])
+def test_a_folder_appears_when_it_is_whole(tmp_path, empty):
+    path = tmp_path / "a"
+    if empty:
+        path.mkdir()
+    with whole_folder(path) as temporary:
+        assert temporary.parent == path.parent
+        (temporary / "inside").mkdir()
+        (temporary / "inside" / "b").write_text("new")
+        assert not path.exists() or not list(path.iterdir())
+    assert (path / "inside" / "b").read_text() == "new"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt, SystemExit])
+def test_an_error_leaves_no_folder(tmp_path, error):
+    def write() -> None:
+        with whole_folder(tmp_path / "a") as temporary:
+            (temporary / "b").write_text("ne")
+            raise error("stopped")
+
+    with pytest.raises(error, match="stopped"):
+        write()
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_unfinished_folder_can_be_removed_from_outside(tmp_path):
+    def write() -> None:
+        with whole_folder(tmp_path / "a") as temporary, whole_file(temporary / "b") as file:
+            file.write_text("x")
+            remove_unfinished()
+            assert not list(tmp_path.iterdir())
+
+    with pytest.raises(FileNotFoundError):
+        write()
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("mask", [0o022, 0o077])
+def test_a_folder_has_the_rights_of_any_new_folder(tmp_path, mask):
+    before = os.umask(mask)
+    try:
+        with whole_folder(tmp_path / "a"):
+            pass
+    finally:
+        assert os.umask(before) == mask
+    assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o777 & ~mask
+
+
+def test_places_where_no_new_folder_can_be(tmp_path):
+    (tmp_path / "file").write_text("x")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "b").write_text("y")
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    for name, message in {
+        "file": "there is a file of that name",
+        "nowhere": "there is a file of that name",
+        "full": "there is a folder of that name that is not empty",
+        "none/a": "none: cannot be written to: no such folder",
+    }.items():
+        with pytest.raises(InputError, match=message), whole_folder(tmp_path / name):
+            pass
+    assert (tmp_path / "file").read_text() + (tmp_path / "full" / "b").read_text() == "xy"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +11,7 @@ from pathlib import Path
 
 from warpbrain.errors import InputError
 
-#: Temporary files that are being written.
+#: Temporary files and folders that are being written.
 _unfinished: set[Path] = set()
 
 
@@ -45,6 +46,52 @@ def whole_file(path: Path) -> Iterator[Path]:
         _unfinished.discard(temporary)
 
 
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """A temporary folder beside `path` to fill; it becomes `path` when the block ends without error.
+
+    Raises
+    ------
+    InputError
+        If there is something at `path` other than an empty folder, or the place cannot be written to.
+    """
+    check_new_folder(path)
+    # what is really written, where `path` ends in a dot or is a link
+    target = path.resolve()
+    try:
+        temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}-"))
+    except OSError as error:
+        raise InputError(f"{target.parent}: cannot be written to: {error.strerror}") from None
+    _unfinished.add(temporary)
+    try:
+        yield temporary
+        # mkdtemp makes private folders; a result should have the rights that any new folder has
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o777 & ~mask)
+        if target.is_dir():
+            # an empty one; not every system renames onto it
+            target.rmdir()
+        temporary.rename(target)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+        _unfinished.discard(temporary)
+
+
+def check_new_folder(path: Path) -> None:
+    """`InputError` if a folder cannot be made there, or there is one that is not empty."""
+    if path.is_dir():
+        if any(path.iterdir()):
+            raise InputError(f"{path}: there is a folder of that name that is not empty: choose another one")
+    elif path.exists() or path.is_symlink():
+        raise InputError(f"{path}: there is a file of that name: choose another one")
+    parent = path.resolve().parent
+    if not parent.is_dir():
+        raise InputError(f"{parent}: cannot be written to: no such folder")
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise InputError(f"{parent}: cannot be written to")
+
+
 def check_writable(path: Path) -> None:
     """`InputError` if a file cannot be written there: to know it before long work, not after."""
     if path.is_dir():
@@ -58,7 +105,10 @@ def check_writable(path: Path) -> None:
 def remove_unfinished() -> None:
     """Remove what is half-written, before the process is ended from outside the block that writes it."""
     for temporary in list(_unfinished):
-        temporary.unlink(missing_ok=True)
+        if temporary.is_dir():
+            shutil.rmtree(temporary, ignore_errors=True)
+        else:
+            temporary.unlink(missing_ok=True)
 
 
 def output_folder(path: Path) -> Path:

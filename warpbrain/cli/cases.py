@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from warpbrain.cli import build
+from warpbrain.cli import build, new
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -20,6 +20,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     actions = cases.add_subparsers(dest="action", metavar="ACTION")
     _add_show(actions)
     _add_check(actions)
+    new.add_parser(actions)
     build.add_parser(actions)
     schema = actions.add_parser("schema", help="print the JSON Schema of case.toml")
     schema.set_defaults(call=_schema)

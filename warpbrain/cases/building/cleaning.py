@@ -26,12 +26,19 @@ FIRST_PERCENTILE = 20.0
 WANTED_DIHEDRAL = 22.0
 
 
-def small_pieces(points: Floats, tetrahedra: Integers, region: Bools, keep_largest: bool = False) -> Bools:
-    """The tetrahedra of a region (m,) that belong to its small face-connected pieces: (m,) bool."""
+def small_pieces(
+    points: Floats, tetrahedra: Integers, region: Bools, keep_largest: bool = False, smallest: float = SMALLEST_PIECE
+) -> Bools:
+    """The tetrahedra of a region (m,) in its face-connected pieces smaller than `smallest` [mm3]: (m,) bool.
+
+    With `keep_largest` those of all pieces but the largest, whatever their size.
+    """
     members = np.flatnonzero(region)
+    if len(members) == 0:
+        return np.zeros(len(tetrahedra), dtype=bool)
     piece = components(tetrahedra[members])
     volume = np.bincount(piece, weights=signed_volumes(points, tetrahedra[members]))
-    small = np.arange(len(volume)) != volume.argmax() if keep_largest else volume < SMALLEST_PIECE
+    small = np.arange(len(volume)) != volume.argmax() if keep_largest else volume < smallest
     result = np.zeros(len(tetrahedra), dtype=bool)
     result[members[small[piece]]] = True
     return result
@@ -47,24 +54,33 @@ def opened_out(tetrahedra: Integers, inside: Bools) -> Bools:
     raise BuildError("the surface of the brain touches itself, and filling there did not help")
 
 
-def first_pass(cells: Cells) -> Cells:
-    """Take out the needles that the cutting left."""
-    made = remesh(cells, FIRST_EDGE)
+def first_pass(cells: Cells, edge: float = FIRST_EDGE) -> Cells:
+    """Take out the needles that the cutting left; `edge` is the largest one [mm]."""
+    made = remesh(cells, edge)
     if made is None:
         raise BuildError("MMG could not mesh the cut lattice")
     return made
 
 
-def finished(cells: Cells) -> Cells | None:
-    """Open the sharp angles; None if the mesh is not good enough to ship."""
+def finished(cells: Cells, cavities: int | None = 1, easier: float = 0.0) -> Cells | None:
+    """Open the sharp angles; None if the mesh is not good enough to ship.
+
+    Parameters
+    ----------
+    cells : Cells
+    cavities : int or None
+        How many closed surfaces inside there must be; None: any number.
+    easier : float
+        How much lower [degrees] the bars for the angles are.
+    """
     better = open_angles(cells, WANTED_DIHEDRAL)
     quality = measure_arrays(better.points * 1e-3, better.tetrahedra.astype(np.int32), better.labels.astype(np.int32))
     sound = (
         quality.inverted == 0
         and quality.components == 1
-        and quality.min_dihedral >= MIN_DIHEDRAL
-        and quality.first_percentile_dihedral >= FIRST_PERCENTILE
-        and len(split_boundary(better.points, better.tetrahedra)[1]) == 1
+        and quality.min_dihedral >= MIN_DIHEDRAL - easier
+        and quality.first_percentile_dihedral >= FIRST_PERCENTILE - easier
+        and (cavities is None or len(split_boundary(better.points, better.tetrahedra)[1]) == cavities)
         and len(pinched_nodes(boundary_faces(better.tetrahedra))) == 0
     )
     return better if sound else None

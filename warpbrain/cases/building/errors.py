@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Collection
 
 from warpbrain.errors import InputError
 
@@ -14,9 +15,11 @@ class BuildError(InputError):
     """A mesh could not be built; the message says why and what to do."""
 
 
-def require_extra() -> None:
-    """Stop with a plain sentence if a package that only building needs is missing."""
-    missing = [name for module, name in _EXTRA.items() if importlib.util.find_spec(module) is None]
+def require_extra(modules: Collection[str] = tuple(_EXTRA)) -> None:
+    """Stop with a plain sentence if one of the packages that only building needs is missing."""
+    missing = [
+        name for module, name in _EXTRA.items() if module in modules and importlib.util.find_spec(module) is None
+    ]
     if missing:
         raise BuildError(
             f"building meshes needs {', '.join(missing)}, not installed here: pip install 'warpbrain[build]'. "

@@ -1,0 +1,238 @@
+"""A conforming mesh of a segmentation: lattice, cuts along every surface, MMG, and what each step left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.building.cleaning import finished, first_pass, opened_out, small_pieces
+from warpbrain.cases.building.crumbs import crumbs_given_away
+from warpbrain.cases.building.cutting import compact, cut
+from warpbrain.cases.building.errors import BuildError
+from warpbrain.cases.building.label_fields import LabelFields, make_fields
+from warpbrain.cases.building.label_image import LabelImage
+from warpbrain.cases.building.label_regions import CAVITY, make_regions
+from warpbrain.cases.building.lattice import bcc_lattice
+from warpbrain.cases.building.remeshing import Cells, remesh
+from warpbrain.cases.building.tissue_names import Assignment
+from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.tet_mesh import signed_volumes
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+# nodes of a mesh whose size is not given: about what the shipped cases have
+NODES = 5000
+# of a finished mesh: tetrahedra a node, and their mean volume as a share of the cubed mean edge
+TETRAHEDRA_A_NODE = 5.0
+TETRAHEDRON = 0.0953
+# of the element size: spacing of the lattice, largest edge of the pass that takes out needles, and first guess of the
+# largest edge that gives this mean edge
+LATTICE = 0.75
+FIRST_EDGE = 0.9
+LARGEST_EDGE = 1.3
+# pieces smaller than this many cubed element sizes go to what surrounds them
+CRUMB = 2.0
+# more are no mistake in principle, but take hours and more memory than there is
+MOST_NODES = 300_000
+FEWEST_NODES = 60
+# how near the mean edge must come to what is wanted, and how often that is tried, each time a little off the last
+NEAR = 0.06
+TRIALS = 16
+STEP = 0.012
+# where to look [element sizes] for what lies beyond an outer face
+BEYOND = 0.4
+# by how many degrees the bars for the angles may be missed if no trial clears them
+EASIER = 7.0
+
+
+@dataclass(frozen=True, eq=False)
+class LabelMesh:
+    """A mesh made from labels.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+        [mm, RAS]
+    tetrahedra : (m, 4) int64 array
+    tissue : (m,) int64 array
+        Numbers of the assignment.
+    size : float
+        Wanted mean edge [mm].
+    labelled : dict of int to float
+        Volume [mm3] of the labels of each tissue.
+    labelled_cavity : float
+        The same of the cavities.
+    in_place : dict of int to float
+        Share of the voxels of each tissue that lie in that tissue of the mesh, before the cutting.
+    fields : LabelFields
+    notes : tuple of str
+        What was mended, left out or not reached.
+    """
+
+    points: Floats
+    tetrahedra: Integers
+    tissue: Integers
+    size: float
+    labelled: dict[int, float]
+    labelled_cavity: float
+    in_place: dict[int, float]
+    fields: LabelFields
+    notes: tuple[str, ...]
+
+    def opens(self, centres: Floats, normals: Floats) -> Bools:
+        """Whether outer faces, of centres (b, 3) [mm] and outward normals (b, 3), are walls of a cavity that opens."""
+        beyond = centres + BEYOND * self.size * normals
+        cavity, body = (self.fields.sample(field, beyond) for field in (self.fields.cavity, self.fields.body))
+        return (cavity > 0) & (body > 0)
+
+
+def mesh_labels(
+    image: LabelImage,
+    assignment: Assignment,
+    size: float | None = None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> LabelMesh:
+    """Mesh a segmentation.
+
+    Parameters
+    ----------
+    image : LabelImage
+    assignment : Assignment
+        What each label is.
+    size : float, optional
+        Wanted mean edge [mm]; by default what gives about 5,000 nodes.
+    progress : callable
+        Called with one line of text whenever something is begun.
+
+    Raises
+    ------
+    InputError
+        If the labels cannot be those of a brain, the size does not suit them, or no good mesh is found.
+    """
+    regions = make_regions(image, assignment)
+    tissue_volume = regions.voxel_volume * float(((regions.codes != 0) & (regions.codes != CAVITY)).sum())
+    if tissue_volume == 0:
+        raise BuildError(f"{image.path}: no tissue is left in the largest piece of the labels")
+    chosen = _size_of(tissue_volume, NODES) if size is None else size
+    _check_size(tissue_volume, chosen)
+    progress(f"smoothing the labels for elements of {chosen:.3g} mm")
+    fields = make_fields(regions, chosen)
+    progress("cutting the lattice along the surfaces")
+    notes = list(regions.notes)
+    cells = first_pass(_discretised(fields, assignment, chosen, notes), FIRST_EDGE * chosen)
+    progress("meshing")
+    made = _made(cells, chosen, notes)
+    numbers = np.array([0, *assignment.tissues])
+    by_number = {code: number for code, number in enumerate(numbers.tolist()) if code}
+    return LabelMesh(
+        made.points,
+        made.tetrahedra,
+        numbers[made.labels],
+        chosen,
+        {number: regions.labelled.get(code, 0.0) for code, number in by_number.items()},
+        regions.labelled.get(CAVITY, 0.0),
+        {number: fields.in_place.get(code, 0.0) for code, number in by_number.items()},
+        fields,
+        tuple(notes),
+    )
+
+
+def _size_of(volume: float, nodes: float) -> float:
+    return float((volume / (nodes * TETRAHEDRA_A_NODE * TETRAHEDRON)) ** (1 / 3))
+
+
+def _check_size(volume: float, size: float) -> None:
+    """`BuildError` if elements of a size [mm] are too many or too few for a volume [mm3]."""
+    nodes = volume / (TETRAHEDRA_A_NODE * TETRAHEDRON * size**3)
+    if nodes > MOST_NODES:
+        least = _size_of(volume, MOST_NODES)
+        raise BuildError(
+            f"--size {size:g}: about {nodes:.2g} nodes; {least:.2g} mm would be {MOST_NODES}, the most here"
+        )
+    if nodes < FEWEST_NODES:
+        most = _size_of(volume, FEWEST_NODES)
+        raise BuildError(f"--size {size:g}: too large for {volume / 1000:.3g} cm3 of tissue: at most {most:.2g} mm")
+
+
+def _discretised(fields: LabelFields, assignment: Assignment, size: float, notes: list[str]) -> Cells:
+    """The lattice cut along every surface; labels are 1, 2, ... in the order of the assignment."""
+    crumb, spacing = CRUMB * size**3, LATTICE * size
+    lower, upper = fields.box()
+    points, tetrahedra = bcc_lattice(lower - 1.5 * spacing, upper + 1.5 * spacing, spacing)
+    # its least value is that of the far outside
+    near = fields.sample(fields.body, points) > 0.8 * float(fields.body.min())
+    points, tetrahedra = compact(points, tetrahedra[near[tetrahedra].any(axis=1)])
+    labels = np.zeros(len(tetrahedra), dtype=np.int64)
+
+    points, tetrahedra, labels, body = cut(points, tetrahedra, labels, partial(fields.sample, fields.body))
+    pockets = small_pieces(points, tetrahedra, ~body, keep_largest=True)
+    if (filled := float(signed_volumes(points, tetrahedra[pockets]).sum())) > crumb / 2:
+        notes.append(f"clefts narrower than an element close: {filled / 1000:.3g} cm3 of outside become tissue")
+    body = body | pockets
+    body = _in_one_piece(points, tetrahedra, body, notes, "pieces that hang together by less than an element")
+    body = opened_out(tetrahedra, body)
+    tetrahedra, labels = tetrahedra[body], labels[body]
+
+    points, tetrahedra, labels, fluid = cut(points, tetrahedra, labels, partial(fields.sample, fields.cavity))
+    fluid &= ~small_pieces(points, tetrahedra, fluid, smallest=crumb)
+    tissue = _in_one_piece(points, tetrahedra, ~fluid, notes, "pieces of tissue that float in a cavity")
+    tissue = opened_out(tetrahedra, tissue)
+    tetrahedra, labels = tetrahedra[tissue], labels[tissue]
+
+    for code in range(1, len(fields.tissues)):
+        rest = np.max(fields.tissues[code:], axis=0)
+        ahead = fields.tissues[code - 1] - rest
+        points, tetrahedra, labels, first = cut(points, tetrahedra, labels, partial(fields.sample, ahead))
+        labels[first & (labels == 0)] = code
+    labels[labels == 0] = len(fields.tissues)
+    labels = crumbs_given_away(points, tetrahedra, labels, crumb)
+    for code, name in enumerate(assignment.tissues.values(), start=1):
+        if not (labels == code).any():
+            raise BuildError(
+                f"'{name}' is too small or thin for elements of {size:.3g} mm: choose a smaller --size, or give its "
+                "labels to another tissue"
+            )
+    return Cells(*compact(points, tetrahedra), labels)
+
+
+def _in_one_piece(points: Floats, tetrahedra: Integers, region: Bools, notes: list[str], what: str) -> Bools:
+    """The largest piece of a region; what is dropped is noted if it can be seen."""
+    dropped = small_pieces(points, tetrahedra, region, keep_largest=True)
+    lost = float(signed_volumes(points, tetrahedra[dropped]).sum())
+    share = lost / float(signed_volumes(points, tetrahedra[region]).sum())
+    if share > 1e-4:
+        notes.append(f"{what} are left out: {lost / 1000:.3g} cm3 ({100 * share:.2g} %)")
+    return region & ~dropped
+
+
+def _made(cells: Cells, size: float, notes: list[str]) -> Cells:
+    """A good mesh whose mean edge is about the wanted size, or else one that is nearly good."""
+    nearly: Cells | None = None
+    edge = LARGEST_EDGE * size
+    for trial in range(TRIALS):
+        made = remesh(cells, edge)
+        ratio = 1.0 if made is None else _mean_edge(made) / size
+        if made is None or abs(ratio - 1) < NEAR:
+            if made is not None:
+                if (done := finished(made, cavities=None)) is not None:
+                    return done
+                nearly = nearly or finished(made, cavities=None, easier=EASIER)
+            # MMG gives up, or leaves a needle, at some sizes and not at their neighbours
+            edge *= 1 - STEP if trial % 2 else 1 + 0.7 * STEP
+        else:
+            edge /= min(max(ratio, 0.6), 1.6)
+    if nearly is None:
+        raise BuildError(f"MMG found no good mesh with elements of about {size:.3g} mm: try another --size")
+    notes.append("some elements are sharper than those of the shipped meshes: another --size may do better")
+    return nearly
+
+
+def _mean_edge(cells: Cells) -> float:
+    ends = np.unique(np.sort(cells.tetrahedra[:, EDGES].reshape(-1, 2), axis=1), axis=0)
+    return float(np.linalg.norm(cells.points[ends[:, 0]] - cells.points[ends[:, 1]], axis=1).mean())

@@ -1,0 +1,149 @@
+"""Which label is which tissue: what the user says with `--tissue`, and what is done with what was not said."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from warpbrain.errors import InputError
+
+#: Names that are no tissue: an open cavity inside the body, and what lies outside of it.
+VENTRICLE = "ventricle"
+OUTSIDE = ("ignore", "background")
+#: Labels that become tissues of their own without being named; more need `--tissue`.
+MOST_UNNAMED = 8
+#: Tissues of one mesh.
+MOST_TISSUES = 40
+_USUAL = {
+    "grey": "grey matter",
+    "gray": "grey matter",
+    "gray matter": "grey matter",
+    "white": "white matter",
+}
+_NAME = re.compile(r"[^\W_](?:[\w ().+/-]{0,58}[\w)])?")
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """Names of labels.
+
+    Attributes
+    ----------
+    tissues : mapping of int to str
+        Tissues of the mesh by their number, which is the first label that was given their name.
+    number : mapping of int to int
+        From every label of the volume that is tissue to the number of its tissue.
+    cavity : tuple of int
+        Labels that are open cavities.
+    outside : tuple of int
+        Labels that lie outside the body.
+    """
+
+    tissues: Mapping[int, str]
+    number: Mapping[int, int]
+    cavity: tuple[int, ...] = ()
+    outside: tuple[int, ...] = ()
+
+
+def parse_names(arguments: Sequence[str]) -> dict[int, str]:
+    """Names by label, from arguments such as ``"2=grey,41=grey"``, in the order given.
+
+    Raises
+    ------
+    InputError
+        For anything that is not LABEL=NAME, a label named twice, and a name that could be meant in two ways.
+    """
+    names: dict[int, str] = {}
+    for pair in (piece.strip() for argument in arguments for piece in argument.split(",")):
+        label, equals, name = (part.strip() for part in pair.partition("="))
+        if not equals or not re.fullmatch("[0-9]{1,9}", label):
+            raise InputError(f"--tissue: expected LABEL=NAME pairs such as 2=grey,3=white, found '{pair}'")
+        number = int(label)
+        if number == 0:
+            raise InputError("--tissue: label 0 is always outside the body, it cannot be named")
+        if number in names:
+            raise InputError(f"--tissue: label {number} is named twice, '{names[number]}' and '{name}'")
+        names[number] = usual_name(name)
+    return names
+
+
+def usual_name(name: str) -> str:
+    """The name in the form that is used throughout: ``"gray"`` is ``"grey matter"``."""
+    low = " ".join(name.lower().split())
+    if low == VENTRICLE or low in OUTSIDE:
+        return low
+    # a misspelt cavity would be meshed as a solid
+    if re.search("ventric|csf|fluid", low):
+        raise InputError(
+            f"--tissue: '{name}' could be inside or outside the brain: write {VENTRICLE} (an open cavity inside, not "
+            f"meshed) or {OUTSIDE[0]} (outside, not meshed)"
+        )
+    if not _NAME.fullmatch(name):
+        raise InputError(f"--tissue: '{name}' cannot be the name of a tissue: use letters, digits, spaces and ().+/-")
+    return _USUAL.get(low, name)
+
+
+def assign(volumes: Mapping[int, float], names: Mapping[int, str], others: str | None) -> Assignment:
+    """Decide what every label is.
+
+    Parameters
+    ----------
+    volumes : mapping of int to float
+        Volume [mm3] of each label there is.
+    names : mapping of int to str
+        What the user named; if empty, every label becomes a tissue of its own.
+    others : str or None
+        Name of every label that `names` leaves out.
+
+    Raises
+    ------
+    InputError
+        If a name was given to a label that is not there, a label is left without one, or there is no tissue.
+    """
+    if absent := [label for label in names if label not in volumes]:
+        raise InputError(f"--tissue: the volume has no label {_listed(absent)}; it has {_listed(sorted(volumes))}")
+    complete = dict(names)
+    left = [label for label in volumes if label not in names]
+    if others is not None:
+        complete |= dict.fromkeys(left, usual_name(others))
+    elif not names and len(left) <= MOST_UNNAMED:
+        complete = {label: f"tissue {label}" for label in left}
+    elif left:
+        unnamed = "that --tissue does not name" if names else "and --tissue does not say which tissue each is"
+        raise InputError(
+            f"the volume has {len(left)} labels {unnamed}: {_with_volumes(volumes, left)}. For example "
+            f"--tissue {_example(volumes, left)}; --others ignore leaves out what --tissue does not name"
+        )
+    number: dict[str, int] = {}
+    for label, name in complete.items():
+        number.setdefault(name, label)
+    tissues = {n: name for name, n in sorted(number.items(), key=lambda pair: pair[1]) if not _special(name)}
+    if not tissues:
+        raise InputError("--tissue: no label is left that is a tissue")
+    if len(tissues) > MOST_TISSUES:
+        raise InputError(f"--tissue: {len(tissues)} tissues are more than {MOST_TISSUES}: give several labels one name")
+    return Assignment(
+        tissues,
+        {label: number[name] for label, name in complete.items() if not _special(name)},
+        tuple(label for label, name in complete.items() if name == VENTRICLE),
+        tuple(label for label, name in complete.items() if name in OUTSIDE),
+    )
+
+
+def _special(name: str) -> bool:
+    return name == VENTRICLE or name in OUTSIDE
+
+
+def _listed(labels: Iterable[int]) -> str:
+    return ", ".join(str(label) for label in labels)
+
+
+def _with_volumes(volumes: Mapping[int, float], labels: Sequence[int], most: int = 60) -> str:
+    shown = ", ".join(f"{label} ({volumes[label] / 1000:.3g} cm3)" for label in labels[:most])
+    return shown + (f" and {len(labels) - most} more" if len(labels) > most else "")
+
+
+def _example(volumes: Mapping[int, float], labels: Sequence[int]) -> str:
+    largest = sorted(labels, key=lambda label: -volumes[label])
+    return ",".join(f"{label}={name}" for label, name in zip(largest, ("grey", "white", VENTRICLE), strict=False))

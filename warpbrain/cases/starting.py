@@ -1,0 +1,246 @@
+"""A new case folder, ready to run, from a segmentation or from a mesh."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from warpbrain.atomic import check_new_folder, whole_folder
+from warpbrain.cases.building.errors import BuildError, require_extra
+from warpbrain.cases.building.first_sets import first_sets
+from warpbrain.cases.building.label_image import read_labels
+from warpbrain.cases.building.labels import LabelMesh, mesh_labels
+from warpbrain.cases.building.plausible import check_volume_in, cm3
+from warpbrain.cases.building.tissue_names import OUTSIDE, VENTRICLE, assign, parse_names
+from warpbrain.cases.case_template import case_text
+from warpbrain.errors import InputError
+from warpbrain.frame import Frame
+from warpbrain.mesh import Quality, TetMesh, components, measure, ordered, read_mesh, split_boundary, write_mesh
+from warpbrain.mesh.surface import face_vectors
+
+# how far the volume of a tissue may be from that of its labels before it is said
+FAITHFUL = 0.10
+# what share of the voxels of a tissue must lie in that tissue of the mesh before it is said that most do not
+IN_PLACE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class StartedCase:
+    """What was written.
+
+    Attributes
+    ----------
+    folder : Path
+    mesh : TetMesh
+    tissues : dict of int to str
+        Names by number.
+    quality : Quality
+    labelled : dict of int to float, or None
+        Volume [m3] of the labels of each tissue, if it was made from labels.
+    in_place : dict of int to float, or None
+        Share of the voxels of each tissue that lie in that tissue of the mesh.
+    cavity : float
+        Volume [m3] of the closed cavities of the mesh.
+    labelled_cavity : float
+        Volume [m3] of the labels of cavities.
+    notes : tuple of str
+        What was mended, left out or not reached.
+    """
+
+    folder: Path
+    mesh: TetMesh
+    tissues: dict[int, str]
+    quality: Quality
+    labelled: dict[int, float] | None
+    in_place: dict[int, float] | None
+    cavity: float
+    labelled_cavity: float
+    notes: tuple[str, ...]
+
+
+def start_from_labels(
+    folder: Path,
+    labels: Path,
+    names: Sequence[str] = (),
+    others: str | None = None,
+    size: float | None = None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> StartedCase:
+    """Make a case folder from a label volume.
+
+    Parameters
+    ----------
+    folder : Path
+        Must not be there yet, or be empty.
+    labels : Path
+        See `read_labels`.
+    names : sequence of str
+        Arguments of `--tissue`, see `parse_names`.
+    others : str, optional
+        Name of every label that `names` leaves out.
+    size : float, optional
+        Wanted mean edge [mm]; by default what gives about 5,000 nodes.
+    progress : callable
+        Called with one line of text whenever something is begun.
+
+    Raises
+    ------
+    InputError
+        If the folder is not empty, or anything is wrong with the labels or their names; nothing is written then.
+    """
+    check_new_folder(folder)
+    if size is not None and not 0 < size < np.inf:
+        raise InputError(f"--size: found {size:g}, expected a positive length [mm]")
+    given = parse_names(names)
+    require_extra(("mmgpy", "nibabel", "scipy", "meshio"))
+    progress(f"reading {labels}")
+    image = read_labels(labels)
+    assignment = assign(image.volumes(), given, others)
+    made = mesh_labels(image, assignment, size, progress)
+    sets = first_sets(made.points, made.tetrahedra, made.opens)
+    notes = [*image.notes, *made.notes]
+    mesh = ordered(TetMesh(made.points * 1e-3, made.tetrahedra.astype(np.int32), made.tissue.astype(np.int32), sets))
+    cavity = _cavity_volume(mesh)
+    tissues = dict(assignment.tissues)
+    notes += _unfaithful(made, mesh, tissues)
+    if (wanted := made.labelled_cavity * 1e-9) > 0 and abs(cavity / wanted - 1) > FAITHFUL:
+        notes.append(
+            f"{VENTRICLE}: {cm3(cavity)} closed in the mesh, {cm3(wanted)} in the labels: it is in part thinner than "
+            "an element, or opens to the outside; a smaller --size shows more of it"
+        )
+    _write(folder, mesh, tissues, labels)
+    return StartedCase(
+        folder,
+        mesh,
+        tissues,
+        measure(mesh),
+        {number: volume * 1e-9 for number, volume in made.labelled.items()},
+        made.in_place,
+        cavity,
+        made.labelled_cavity * 1e-9,
+        tuple(notes),
+    )
+
+
+def start_from_mesh(
+    folder: Path, file: Path, frame: Frame, names: Sequence[str] = (), array: str | None = None
+) -> StartedCase:
+    """Make a case folder from a volume mesh.
+
+    Parameters
+    ----------
+    folder : Path
+        Must not be there yet, or be empty.
+    file : Path
+        Any tetrahedral mesh that meshio reads; its node and element sets are kept.
+    frame : Frame
+        Unit and axes of the file.
+    names : sequence of str
+        Arguments of `--tissue`: names of the labels of the mesh.
+    array : str, optional
+        Cell array of the labels; by default `tissue`, and one tissue if there is none.
+
+    Raises
+    ------
+    InputError
+        If the folder is not empty or the mesh cannot be used; nothing is written then.
+    """
+    check_new_folder(folder)
+    given = parse_names(names)
+    # meshio prints lines of its own where it gives up; the error says it
+    with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+        raw = read_mesh(file, frame.unit, array)
+    check_volume_in(f"{file}: the mesh", raw.volume, frame.unit)
+    pieces = int(components(raw.tetrahedra).max()) + 1
+    if pieces > 1:
+        raise BuildError(f"{file}: expected one body, found {pieces} pieces that share no face")
+    numbers = np.unique(raw.tissue).tolist()
+    if numbers[0] < 0:
+        raise BuildError(f"{file}: expected tissue labels of 0 or more, found {numbers[0]}")
+    if absent := [str(label) for label in given if label not in numbers]:
+        raise InputError(f"--tissue: the mesh has no tissue {', '.join(absent)}; it has {', '.join(map(str, numbers))}")
+    for label, name in given.items():
+        if name == VENTRICLE or name in OUTSIDE:
+            raise InputError(f"--tissue: {label}={name}: the cells of a mesh are all tissue, name what they are")
+    points = raw.points * frame.signs
+    notes = []
+    if len(numbers) == 1 and array is None:
+        notes.append("one tissue: if there are more, --array names the cell array of their labels")
+    sets = {**first_sets(points, raw.tetrahedra), **raw.node_sets}
+    mesh = ordered(TetMesh(points, raw.tetrahedra, raw.tissue, sets, raw.element_sets))
+    tissues = {label: given.get(label, f"tissue {label}") for label in numbers}
+    _write(folder, mesh, tissues, file)
+    return StartedCase(folder, mesh, tissues, measure(mesh), None, None, _cavity_volume(mesh), 0.0, tuple(notes))
+
+
+def summary(case: StartedCase) -> list[str]:
+    """What a user should read about a new case, as lines of text."""
+    quality = case.quality
+    lines = [
+        f"mesh      {quality.nodes} nodes, {quality.tetrahedra} tetrahedra, "
+        f"mean edge {1000 * quality.mean_edge:.3g} mm",
+        f"angles    smallest dihedral {quality.min_dihedral:.1f}, first percentile "
+        f"{quality.first_percentile_dihedral:.1f} degrees",
+    ]
+    for number, name in case.tissues.items():
+        line = f"tissue {number:<3d} {name}: {cm3(_tissue_volume(case.mesh, number))}"
+        if case.labelled is not None and case.in_place is not None:
+            line += f" (labels {cm3(case.labelled[number])}, {100 * case.in_place[number]:.0f} % of them in place)"
+        lines.append(line)
+    if case.cavity or case.labelled_cavity:
+        labels = f" (labels {cm3(case.labelled_cavity)})" if case.labelled is not None else ""
+        lines.append(f"cavities  {cm3(case.cavity)}{labels}")
+    counts = ", ".join(f"{name} {int(members.sum())}" for name, members in case.mesh.node_sets.items())
+    lines.append(f"node sets {counts}")
+    lines += [f"note      {note}" for note in case.notes]
+    return [
+        *lines,
+        f"written to {case.folder}",
+        "Held at the node set 'base', the outer nodes that face down in the lower third: a first guess, check it.",
+        f"next: warpbrain cases check {case.folder}",
+        f"      warpbrain cases show {case.folder}",
+        f"      warpbrain run --case {case.folder}",
+    ]
+
+
+def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path) -> None:
+    if not mesh.node_sets["base"].any():
+        raise BuildError(f"{source}: found no outer nodes that face down in the lower third: is its z axis up?")
+    name = folder.resolve().name
+    with whole_folder(folder) as place:
+        write_mesh(place / "mesh.vtu", mesh, unit="mm")
+        text = case_text(name, source.name, tissues, "ventricle" in mesh.node_sets)
+        (place / "case.toml").write_text(text, encoding="utf-8")
+        (place / "recordings").mkdir()
+
+
+def _unfaithful(made: LabelMesh, mesh: TetMesh, tissues: Mapping[int, str]) -> list[str]:
+    """What to say about tissues that the mesh shows with another volume, or elsewhere."""
+    notes = []
+    for number, name in tissues.items():
+        wanted, got = made.labelled[number] * 1e-9, _tissue_volume(mesh, number)
+        if abs(got / wanted - 1) > FAITHFUL:
+            notes.append(
+                f"{name}: {cm3(got)} in the mesh, {cm3(wanted)} in the labels ({100 * (got / wanted - 1):+.0f} %): "
+                "parts are thinner than an element; a smaller --size shows more of them"
+            )
+        elif made.in_place[number] < IN_PLACE:
+            notes.append(f"{name}: most of its voxels are thinner than an element and lie in other tissue in the mesh")
+    return notes
+
+
+def _tissue_volume(mesh: TetMesh, number: int) -> float:
+    return float(mesh.volumes[mesh.tissue == number].sum())
+
+
+def _cavity_volume(mesh: TetMesh) -> float:
+    """Volume [m3] that the closed surfaces inside exclude."""
+    xyz = mesh.points - mesh.points.mean(axis=0)
+    walls = split_boundary(mesh.points, mesh.tetrahedra)[1]
+    # by the divergence theorem; normals point into the cavity
+    return -sum(float((xyz[wall[:, 0]] * face_vectors(xyz, wall)).sum()) / 3 for wall in walls) if walls else 0.0
