@@ -83,7 +83,13 @@ def test_what_is_imported_is_declared():
                 imported.add(node.module.split(".")[0])
     project = (Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8")
     foreign = imported - set(sys.stdlib_module_names) - {"warpbrain"}
-    declared = {re.split(r"[^\w.-]", line)[0].lower().replace("-", "_") for line in tomllib.loads(project)["project"]["dependencies"]}
+    dependencies = tomllib.loads(project)["project"]["dependencies"]
+    declared = {_plain(re.split(r"[^\w.-]", line)[0]) for line in dependencies}
     owners = packages_distributions()
     for module in sorted(foreign):
-        assert declared & {name.lower().replace("-", "_") for name in owners[module]}, f"{module} is imported but not declared"
+        assert declared & set(map(_plain, owners[module])), f"{module} is imported but not declared"
+
+
+def _plain(name: str) -> str:
+    """A distribution's name as all its spellings have it."""
+    return name.lower().replace("-", "_")

@@ -85,6 +85,11 @@ def _run(options: argparse.Namespace) -> None:
     start_warp_quietly()
     find_device(options.device)
     case = _case(options)
+    if case.specimen is not None:
+        from warpbrain.cli import run_specimen
+
+        run_specimen.run(options, case, say)
+        return
     model, _ = model_of(case)
     described = tables.describe_case(case, model)
     say(*tables.case_lines(described), sep="\n")

@@ -80,7 +80,7 @@ class Comparison:
     ----------
     name, kind, role : str
         Of the recording.
-    unit : {"m", "N", "N m"}
+    unit : {"m", "N", "N m", "Pa"}
         Of errors and residuals.
     rows : (n,) int array
         Rows of the recording that were compared.

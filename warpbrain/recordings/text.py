@@ -17,11 +17,9 @@ LISTED = 20
 
 @contextmanager
 def collected(path: Path, problems: Problems) -> Iterator[Problems]:
-    """Problems of one file: at the end the first `LISTED` are added to `problems`, and the number of the others;
-    remarks are passed on."""
+    """Problems of one file: at the end the first `LISTED` go to `problems` with the number of the others, and remarks."""
     found = Problems()
     yield found
-    problems.remarks.extend(found.remarks)
     problems.found.extend(found.found[:LISTED])
     problems.remarks.extend(found.remarks)
     others = len(found.found) - LISTED

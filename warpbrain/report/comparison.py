@@ -17,7 +17,7 @@ from warpbrain.report.files import MILLIMETRES
 from warpbrain.simulation.observation import Observed
 
 #: Units as people read them: of a comparison, the factor and the name.
-_SHOWN = {"m": (MILLIMETRES, "mm"), "N": (1.0, "N"), "N m": (1.0, "N m")}
+_SHOWN = {"m": (MILLIMETRES, "mm"), "N": (1.0, "N"), "Pa": (1.0, "Pa"), "N m": (1.0, "N m")}
 
 
 def describe_comparisons(observed: Observed) -> dict[str, Any]:

@@ -27,10 +27,11 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
     Raises
     ------
     InputError
-        If the case assumes what cannot be simulated, or leaves a law to the generative model.
+        If the case assumes what cannot be simulated, or leaves a law to the generative model; of a specimen, which
+        `warpbrain.simulation.specimen` simulates test by test.
     """
     if case.specimen is not None:
-        raise InputError(f"{case.path}: [specimen]: laboratory specimens cannot be simulated yet")
+        raise InputError(f"{case.path}: [specimen]: a specimen has no one state; its tests are run by a Rig")
     mesh, nodes = case.remaining
     constrained = np.zeros(mesh.points.shape, dtype=bool)
     prescribed = np.zeros(mesh.points.shape)

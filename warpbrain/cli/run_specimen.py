@@ -1,0 +1,107 @@
+"""`warpbrain run` of a case with a specimen: simulate its tests, print and write how far they are from the records."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from warpbrain.errors import InputError
+from warpbrain.terminal.progress import Progress
+
+if TYPE_CHECKING:
+    from warpbrain.cases.case import Case
+    from warpbrain.recordings.recording import TestRecording
+    from warpbrain.report.specimen_text import Tested
+    from warpbrain.simulation.specimen import Rig
+
+
+def run(options: argparse.Namespace, case: Case, say: Callable[..., None]) -> None:
+    """Simulate every test of a case.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of `warpbrain run`, checked.
+    case : Case
+        With a specimen, as the options change it.
+    say : callable
+        `print`, or what stands for it.
+
+    Raises
+    ------
+    InputError
+        If the options ask for motion, nothing was tested, or a test is not possible.
+    SolveError
+        If a state of a test is not found.
+    """
+    tests = _tests(options, case)
+
+    from warpbrain.atomic import output_folder
+    from warpbrain.report import specimen_text as text
+    from warpbrain.report.comparison import describe_comparisons
+    from warpbrain.report.files import safe_name, write_summary
+    from warpbrain.report.specimen_picture import write_tests_picture
+    from warpbrain.report.summary import machine, timing_lines
+    from warpbrain.simulation.equilibrium import EquilibriumOptions
+    from warpbrain.simulation.observation import Observed
+    from warpbrain.simulation.specimen import Rig
+
+    rig = Rig(case, options.device, options.precision, EquilibriumOptions(tolerance=options.tolerance))
+    for recording in tests:
+        rig.check(recording)
+    system = rig.system
+    described = text.describe_specimen(case, rig.specimen, system.model)
+    say(*text.specimen_lines(described), sep="\n")
+    out = output_folder(options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}"))
+    say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
+
+    seconds = {"pre-processing": system.seconds, "loading kernels": system.load_kernels()}
+    done = [_simulate(rig, recording, options.quiet) for recording in tests]
+    seconds |= rig.solver.clock.seconds
+    say("", *text.tested_lines(done), sep="\n")
+    say("", *timing_lines(seconds, rig.solver.clock.counts), sep="\n")
+
+    law = next(iter(case.tissues.values())).known_law
+    subtitle = f"{rig.specimen.grips} ends, {law.name}, mu = {law.shear_modulus:g} Pa, nu = {case.poisson:g}; elastic"
+    write_tests_picture(out / "tests.png", done, case.title, subtitle)
+    text.write_tests(out / "comparison.csv", done)
+    summary = {
+        "case": described,
+        "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
+        "solution": {"kind": "tests", "tolerance": rig.solver.tolerance, "tests": text.describe_tests(done)},
+        "recordings": describe_comparisons(Observed(tuple(test.comparison for test in done), ())),
+        "seconds_by_phase": seconds,
+        "calls_by_phase": rig.solver.clock.counts,
+        "versions": machine(),
+    }
+    write_summary(out / "summary.json", summary)
+    say("", f"written to {out}: summary.json, comparison.csv, tests.png", sep="\n")
+
+
+def _tests(options: argparse.Namespace, case: Case) -> list[TestRecording]:
+    """What is to be simulated, if that is what the options ask for."""
+    from warpbrain.recordings.recording import TestRecording
+
+    for option, given in (("--steps", options.steps is not None), ("--to-rest", options.to_rest)):
+        if given:
+            raise InputError(
+                f"{option}: {case.path} has a [specimen], whose tests are quasi-static: there is no motion"
+            )
+    tests = [recording for recording in case.recordings if isinstance(recording, TestRecording)]
+    if not tests:
+        raise InputError(f"{case.path}: no [[recording]] of kind 'test': nothing is imposed on the [specimen]")
+    return tests
+
+
+def _simulate(rig: Rig, recording: TestRecording, quiet: bool) -> Tested:
+    from warpbrain.report.specimen_text import Tested
+    from warpbrain.simulation.specimen import compare_test
+
+    progress = Progress("tests", quiet)
+    try:
+        result = rig.run(recording, on_state=lambda share: progress.show(share, recording.name))
+    finally:
+        progress.clear()
+    return Tested(recording, result, compare_test(recording, result))
