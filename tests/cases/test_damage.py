@@ -8,7 +8,7 @@ import pytest
 from folders import write_recorded
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from test_writing import assert_same
+from same_case import assert_same
 
 from warpbrain.cases.reading import read_case
 from warpbrain.errors import InputError

@@ -7,7 +7,7 @@ from importlib.resources import files
 import jsonschema
 import pytest
 from folders import CASE, RECORDINGS, changed
-from test_reading import WRONG
+from wrong_cases import WRONG
 
 from warpbrain.cases.format.schema import FILE, case_schema, schema_text
 from warpbrain.cases.shipped import SHIPPED

@@ -1,20 +1,20 @@
 """A case that is written reads back as the same case, whatever its units and axes."""
 
 import re
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
 from folders import write_recorded
+from same_case import assert_same
 
 from warpbrain.cases.reading import read_case
 from warpbrain.cases.shipped import SHIPPED, find_case
 from warpbrain.cases.writing import write_case
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
-from warpbrain.mesh import TetMesh
 
 EVERYTHING = [
     ('axes = "RAS"', 'axes = "LPS"\ngravity_axis = [0.5, 1.0, 0.25]'),
@@ -58,28 +58,6 @@ def everything(folder: Path) -> Path:
         flipped = re.sub(r"(?m)^((?:\w,)?)(\d+),(\d+),", r"\1-\2,-\3,", path.read_text())
         path.write_text(flipped)
     return folder
-
-
-def assert_same(a, b, where="case"):
-    """Equal as far as the files hold it: lengths to rounding."""
-    if is_dataclass(a) and not isinstance(a, type):
-        assert type(a) is type(b), where
-        for field in fields(a):
-            # where it came from, and what was said of that file
-            if field.name not in ("path", "mesh_file", "file", "moved_file", "remarks"):
-                assert_same(getattr(a, field.name), getattr(b, field.name), f"{where}.{field.name}")
-    elif isinstance(a, str | bool | type(None) | Path):
-        assert a == b, where
-    elif isinstance(a, TetMesh) or hasattr(a, "keys"):
-        assert sorted(a) == sorted(b), where
-        for key in a:
-            assert_same(a[key], b[key], f"{where}[{key}]")
-    elif isinstance(a, tuple | list) and any(not isinstance(item, int | float) for item in a):
-        assert len(a) == len(b), where
-        for number, (x, y) in enumerate(zip(a, b, strict=True)):
-            assert_same(x, y, f"{where}[{number}]")
-    else:
-        np.testing.assert_allclose(np.asarray(a), np.asarray(b), rtol=1e-14, atol=1e-17, err_msg=where)
 
 
 def test_everything_comes_back(tmp_path):

@@ -90,7 +90,7 @@ def test_arguments(folder, tmp_path, arguments, expected):
         ["run", "--case", "0529", "--mu"],
         ["run", "--case", "0529", "--nonsense"],
         ["run", "--case", "0529", "extra"],
-        ["cases"],
+        ["cases", "paint"],
         ["cases", "build"],
     ],
 )
@@ -130,11 +130,11 @@ def test_single_tissue_of_a_folder_that_has_none(folder):
     ("change", "expected"),
     [
         (("poisson = 0.45", "poisson = nan"), "[body] poisson: expected a finite number, found nan"),
-        (("-0.05]", "nan]"), "[boundary 2] total: expected 3 finite numbers, found [0.01, 0.02, nan]"),
+        (("-0.05]", "nan]"), "[boundary 2] total: expected 3 finite numbers [N], found [0.01, 0.02, nan]"),
         (("poisson", "poison"), "[body] poison: unknown key (did you mean 'poisson'?)"),
         (('"mesh.vtu"', '"../../mesh.vtu"'), "[mesh] file: '../../mesh.vtu' leaves the case folder"),
         (('"top"', '"nobody"'), "[boundary 2] nodes: node set 'nobody' is empty"),
-        (('"fixed"', '"contact"'), "[boundary 1] kind: 'contact' cannot be simulated yet"),
+        (('"fixed"', '"contact"'), "[boundary 1] surface: missing (expected the name of a file in this folder)"),
     ],
 )
 def test_a_case_that_is_wrong(tmp_path, change, expected):

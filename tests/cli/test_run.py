@@ -113,8 +113,8 @@ def test_summary_file(block_run, folder):
     ran, out = block_run()
     said = summary(out)
     assert set(said) == {
-        "case", "device", "solution", "result", "recordings", "seconds_by_phase", "calls_by_phase", "seconds_to_first_step",
-        "versions",
+        "case", "device", "solution", "result", "recordings", "seconds_by_phase", "calls_by_phase",
+        "seconds_to_first_step", "versions",
     }  # fmt: skip
     case = said["case"]
     assert (case["name"], case["title"], case["origin"]) == ("block", "A block of gel", "synthetic")

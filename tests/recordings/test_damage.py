@@ -3,9 +3,9 @@
 import meshio
 import numpy as np
 import pytest
+from landmark_files import START, TAG, fcsv, markup
 from recording_files import messages, read
-from test_landmarks import START, TAG, fcsv, markup
-from test_surfaces import POINTS, TRIANGLES, vtp
+from surface_files import POINTS, TRIANGLES, vtp
 
 FILES = {
     "points.csv": b"x,y,z,ux,uy,uz,t,id,sigma,weight\n1,2,3,4,5,6,0,a,1,1\n1,2,3,4,5,6,1,a,1,1\n",

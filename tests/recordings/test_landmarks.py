@@ -1,22 +1,11 @@
 """Landmarks from other programs: MNI tags and 3D Slicer markups."""
 
-import json
-
 import numpy as np
 import pytest
+from landmark_files import START, TAG, fcsv, markup
 from recording_files import messages, read, read_content
 
 from warpbrain.frame import Frame
-
-TAG = """MNI Tag Point File
-Volumes = 2;
-%Volume: before.mnc
-% Volume: after.mnc
-
-Points =
- 1 2 3 1 2 4 0 -1 -1 "one"
- -4 5 6 -3 5 6 0 -1 -1 "the second";
-"""
 
 
 def test_tags(tmp_path):
@@ -58,23 +47,6 @@ def test_tags_that_are_refused(tmp_path, old, new, message):
     assert message in messages(problems)
 
 
-def markup(*points, **keys) -> str:
-    controls = [{"label": label, "position": position} for label, position in points]
-    head = {"type": "Fiducial", "coordinateSystem": "LPS", "coordinateUnits": "mm"} | keys
-    return json.dumps({"@schema": "...", "markups": [{**head, "controlPoints": controls}]})
-
-
-def fcsv(*points, system: str = "# CoordinateSystem = LPS\n") -> str:
-    rows = "".join(f"{i},{x},{y},{z},0,0,0,1,1,1,0,{label},,\n" for i, (label, (x, y, z)) in enumerate(points))
-    return (
-        "# Markups fiducial file version = 4.11\n"
-        + system
-        + "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n"
-        + rows
-    )
-
-
-START = (("F-1", [1, 2, 3]), ("F-2", [4, 5, 6]))
 END = (("F-2", [4, 5, 7]), ("F-1", [1, 3, 3]))
 
 

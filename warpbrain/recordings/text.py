@@ -17,7 +17,7 @@ LISTED = 20
 
 @contextmanager
 def collected(path: Path, problems: Problems) -> Iterator[Problems]:
-    """Problems of one file: at the end the first `LISTED` go to `problems` with the number of the others, and remarks."""
+    """Problems of one file: in the end the first `LISTED` and the number of the others go to `problems`."""
     found = Problems()
     yield found
     problems.found.extend(found.found[:LISTED])
