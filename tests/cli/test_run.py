@@ -12,6 +12,7 @@ import pytest
 from command import Ran, run
 from folders import SIDE, block, write_folder
 
+from warpbrain.cases.shipped import SHIPPED
 from warpbrain.mesh import TetMesh, write_mesh
 
 FILES = ["deformation.png", "result.vtu", "summary.json"]
@@ -331,9 +332,23 @@ def test_clinical_case(tmp_path):
     moved = said["result"]["displacement_mm"]
     assert {"ventricle", "resection", "surface", "fixed"} <= set(moved)
     assert moved["fixed"]["largest"] == 0.0
-    # a brain that sinks by millimetres, as one does
-    assert 1.0 < moved["ventricle"]["mean"] < 20.0
+    # a brain that sinks by tenths of a millimetre to millimetres, as far as its fluid drained
+    assert 0.1 < moved["ventricle"]["mean"] < 20.0
     file = meshio.read(tmp_path / "result.vtu")
     assert (file.cell_data["J"][0] > 0.0).all()
     # along gravity, to the back
-    assert file.point_data["displacement"][:, 1].mean() < -1.0
+    assert file.point_data["displacement"][:, 1].mean() < -0.1
+
+
+@pytest.mark.parametrize("tissue", ["single", "multi"])
+@pytest.mark.parametrize("name", [name for name in SHIPPED if not name.startswith("phantom")])
+def test_every_stand_in_runs_and_is_compared(tmp_path, name, tissue):
+    ran = run(name, "--tissue", tissue, "--out", tmp_path)
+    assert (ran.status, ran.err) == (0, "")
+    compared = summary(tmp_path)["recordings"]["compared"]
+    assert [entry["name"] for entry in compared] == ["ventricles", "cavity"]
+    for entry in compared:
+        assert re.search(rf"^  {entry['name']} +{entry['count']}( +\d+\.\d{{3}}){{3}} mm$", ran.out, re.MULTILINE)
+        assert entry["before"]["root_mean_square"] > 2.0 * entry["noise_root_mean_square"] / 3.0**0.5
+        # what is declared is not all that acted: no simulation of it comes down to the noise
+        assert entry["after"]["root_mean_square"] > entry["noise_root_mean_square"]

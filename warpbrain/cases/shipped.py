@@ -13,8 +13,10 @@ _DATA = Path(__file__).parent / "data"
 
 #: Files of each shipped case by tissue mode, relative to the data folder.
 SHIPPED = {
-    "0529": {"multi": "0529/case.toml", "single": "0529/case-single.toml"},
-    "phantom": {"multi": "phantom/case.toml", "single": "phantom/case-single.toml"},
+    **{
+        name: {"multi": f"{name}/case.toml", "single": f"{name}/case-single.toml"}
+        for name in ("0529", "0614", "0660", "0685", "0535", "0555", "0603", "0684", "phantom")
+    },
     "phantom-fine": {"multi": "phantom/case-fine.toml", "single": "phantom/case-single-fine.toml"},
 }
 

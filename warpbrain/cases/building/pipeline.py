@@ -41,7 +41,7 @@ def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], 
     Parameters
     ----------
     name : str
-        ``"phantom"`` or ``"0529"``.
+        ``"phantom"`` or one of the clinical cases, ``"0529"``; `NAMES` has them all.
     out_dir : path
         The folder ``out_dir/name`` receives the meshes (VTU, millimetres) and ``meshes.json``, their record.
     progress : callable
@@ -70,7 +70,7 @@ def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], 
         size = wanted.size(tetrahedra)
         progress(f"{wanted.file}: looking for {size.at_least} to {size.at_most} {size.of}")
         cells = fit_size(start[wanted.multi], size, 13.0, finished)
-        mesh = _to_mesh(cells, recipe)
+        mesh = named_mesh(cells, recipe)
         tetrahedra[wanted.file] = len(mesh.tetrahedra)
         write_mesh(folder / f"{wanted.file}.vtu", mesh, unit="mm")
         quality = measure(mesh)
@@ -111,11 +111,21 @@ def _rounded(value: Any) -> Any:
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
-def discretise(anatomy: Anatomy, recipe: CaseRecipe, multi: bool) -> Cells:
-    """The lattice cut along every surface; labels are grey 1 and white 2, plus 10 in resected tissue."""
+def discretise(anatomy: Anatomy, recipe: CaseRecipe, multi: bool, spacing: float = LATTICE) -> Cells:
+    """The lattice cut along every surface; labels are grey 1 and white 2, plus 10 in resected tissue.
+
+    Parameters
+    ----------
+    anatomy : Anatomy
+    recipe : CaseRecipe
+    multi : bool
+        Cut along the interface of grey and white matter too.
+    spacing : float
+        Of the lattice [mm, template].
+    """
     inside = np.argwhere(anatomy.brain > 0)
-    lower, upper = (anatomy.origin + end for end in (inside.min(axis=0) - LATTICE, inside.max(axis=0) + LATTICE))
-    points, tetrahedra = bcc_lattice(lower, upper, LATTICE)
+    lower, upper = (anatomy.origin + end for end in (inside.min(axis=0) - spacing, inside.max(axis=0) + spacing))
+    points, tetrahedra = bcc_lattice(lower, upper, spacing)
     tetrahedra = tetrahedra[(anatomy.sample(anatomy.brain, points)[tetrahedra] > -0.3).any(axis=1)]
     points, tetrahedra = compact(points, tetrahedra)
     labels = np.full(len(tetrahedra), GREY, dtype=np.int64)
@@ -147,7 +157,7 @@ def discretise(anatomy: Anatomy, recipe: CaseRecipe, multi: bool) -> Cells:
     return Cells(points, tetrahedra, labels)
 
 
-def _to_mesh(cells: Cells, recipe: CaseRecipe) -> TetMesh:
+def named_mesh(cells: Cells, recipe: CaseRecipe) -> TetMesh:
     """Scale to the wanted volume, name the sets, and number so that neighbours are near in memory."""
     tetrahedra, resected = cells.tetrahedra, cells.labels >= RESECTED
     sets = node_sets(cells.points, tetrahedra)

@@ -72,7 +72,43 @@ def _about(nodes: int) -> tuple[int, int]:
     return int(nodes * 0.98) + 1, int(nodes * 1.02)
 
 
-# Volumes: the published values for the phantom and for the clinical case. The fine meshes have as many more
+@dataclass(frozen=True)
+class _Clinical:
+    """What the paper publishes of a clinical case (Tables 4 and 5)."""
+
+    volume: float
+    side: str
+    single: int
+    multi: int
+
+
+# volume [m3], side of the temporal lobe, nodes of the mesh of one tissue and of two
+CLINICAL: dict[str, _Clinical] = {
+    "0529": _Clinical(1.1654e-3, "left", 3619, 5060),
+    "0614": _Clinical(1.0617e-3, "left", 2692, 4112),
+    "0660": _Clinical(1.1344e-3, "left", 2795, 4308),
+    "0685": _Clinical(1.0899e-3, "left", 2425, 4093),
+    "0535": _Clinical(1.2388e-3, "right", 2662, 4225),
+    "0555": _Clinical(1.1706e-3, "right", 2221, 3932),
+    "0603": _Clinical(1.0601e-3, "right", 2742, 4348),
+    "0684": _Clinical(1.1865e-3, "right", 2250, 3930),
+}
+
+
+def _stand_in(name: str, published: _Clinical) -> CaseRecipe:
+    return CaseRecipe(
+        volume=published.volume,
+        meshes=(
+            MeshRecipe("single", multi=False, nodes=_about(published.single)),
+            MeshRecipe("multi", multi=True, nodes=_about(published.multi)),
+        ),
+        # an individual of its own for every case, the same at every build
+        seed=int(name),
+        resection=published.side,
+    )
+
+
+# Volumes: the published values for the phantom and for the clinical cases. The fine meshes have as many more
 # tetrahedra than the coarse ones as the published fine assemblies took longer, scaled by node throughput.
 RECIPES: dict[str, CaseRecipe] = {
     "phantom": CaseRecipe(
@@ -84,13 +120,5 @@ RECIPES: dict[str, CaseRecipe] = {
             MeshRecipe("multi-fine", multi=True, finer_than=("multi-coarse", 136.8 / 55.43)),
         ),
     ),
-    "0529": CaseRecipe(
-        volume=1.1654e-3,
-        meshes=(
-            MeshRecipe("single", multi=False, nodes=_about(3619)),
-            MeshRecipe("multi", multi=True, nodes=_about(5060)),
-        ),
-        seed=529,
-        resection="left",
-    ),
+    **{name: _stand_in(name, published) for name, published in CLINICAL.items()},
 }
