@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -90,6 +91,11 @@ def check_new_folder(path: Path) -> None:
         raise InputError(f"{parent}: cannot be written to: no such folder")
     if not os.access(parent, os.W_OK | os.X_OK):
         raise InputError(f"{parent}: cannot be written to")
+
+
+def safe_name(name: str) -> str:
+    """A file name made from free text: it must not become a path, nor be too long for one."""
+    return re.sub(r"[^\w.-]+", "-", name)[:80] or "unnamed"
 
 
 def check_writable(path: Path) -> None:

@@ -94,11 +94,11 @@ def test_a_density_in_another_unit(tmp_path):
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
-        ("0\n1\n27\n", r"ids.csv: row 3: found node 27, but the mesh has nodes 0 to 26"),
+        ("0\n1\n27\n", r"ids.csv: row 3: found node '27', but the mesh has nodes 0 to 26"),
         ("0\n-1\n", r"ids.csv: row 2: expected the number of a node, found '-1'"),
         ("node\n0.5\n", r"ids.csv: row 2: expected the number of a node, found '0.5'"),
         ("node\n# nobody\n", r"ids.csv: the file names no node: the set is empty"),
-        (b"\xff\xfe0", r"ids.csv: not UTF-8 text \(byte 0\)"),
+        (b"\xff\xfe0", r"ids.csv: row 1: found byte 0xff at position 0, expected UTF-8"),
     ],
 )
 def test_node_numbers_in_a_file(tmp_path, content, expected):
@@ -267,3 +267,31 @@ def test_files_of_no_size_and_of_a_gigabyte(tmp_path, name, size):
     message = problems(folder)[0]
     assert name.rsplit("/", 1)[-1] in message
     assert re.search("empty|0 bytes" if size == 0 else r"1\d\d\d MB, expected", message), message
+
+
+def test_a_number_of_thousands_of_digits_and_faults_without_end(tmp_path):
+    folder = write_folder(tmp_path, ('nodes = "bottom"', 'nodes = "ids.csv"'))
+    (folder / "ids.csv").write_text("9" * 5000 + "\n" + "x\n" * 1000)
+    found = problems(folder)
+    assert len(found) == 21 and all(len(problem) < 300 for problem in found)
+    assert "981 more problems" in found[-1]
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+@pytest.mark.parametrize("name", ["beads", "lid"])
+def test_a_recording_in_another_unit_than_the_mesh(tmp_path, name, scale):
+    """Metres read as millimetres lie in a dot, which may well be inside the body; the other way they lie far away."""
+    head = "x,y,z,ux,uy,uz" if name == "beads" else "x,y,z"
+    rest = ",0,0,0" if name == "beads" else ""
+    places = np.array([[5, 5, 29], [25, 5, 29], [5, 25, 29], [25, 25, 29], [15, 15, 29]]) * scale
+    rows = "".join(f"{x},{y},{z}{rest}\n" for x, y, z in places)
+    found = problems(write_recorded(tmp_path, files={f"recordings/{name}.csv": f"{head}\n{rows}"}))
+    assert any(f"{name}.csv" in problem and "in m" in problem for problem in found), found
+
+
+@pytest.mark.parametrize("value", ["1e155", "1e308", "-1e13"])
+def test_numbers_that_nothing_has(tmp_path, value):
+    files = {"recordings/beads.csv": f"x,y,z,ux,uy,uz\n1,1,1,0,0,{value}\n{value},1,1,0,0,0\n"}
+    found = problems(write_recorded(tmp_path, files=files))
+    assert any(f"row 2, column uz: found '{value}', expected a number of at most 1e+12" in problem for problem in found)
+    assert any(f"row 3, column x: found '{value}'" in problem for problem in found)

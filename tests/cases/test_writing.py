@@ -10,6 +10,7 @@ import pytest
 from folders import write_recorded
 from same_case import assert_same
 
+from warpbrain.cases.boundary import Displaced
 from warpbrain.cases.reading import read_case
 from warpbrain.cases.shipped import SHIPPED, find_case
 from warpbrain.cases.writing import write_case
@@ -82,3 +83,16 @@ def test_nothing_is_overwritten(tmp_path):
     with pytest.raises(InputError, match=r"case\.toml: there is a case already"):
         write_case(folder, read_case(folder))
     assert (folder / "case.toml").read_bytes() == before
+
+
+def test_names_that_make_one_file_name_do_not_share_a_file(tmp_path):
+    folder = write_recorded(tmp_path / "a")
+    case = read_case(folder)
+    beads = case.recordings[0]
+    pulls = [
+        Displaced(name=name, nodes=nodes, times=(0.0, 1.0), values=((0.0, 0.0, 0.0), (size, 0.0, 0.0)))
+        for name, nodes, size in (("b b", "bottom", 1e-3), ("b-b", "top", 2e-3), ("B b", "top", 2e-3))
+    ]
+    recordings = tuple(replace(beads, name=name, points=beads.points * k) for name, k in (("x y", 1.0), ("X-y", 0.5)))
+    case = replace(case, boundaries=tuple(pulls), recordings=recordings)
+    assert_same(case, read_case(write_case(tmp_path / "b", case)))

@@ -3,6 +3,7 @@
 import meshio
 import numpy as np
 import pytest
+from shapes import box
 
 from warpbrain.mesh import MeshError, TetMesh, read_mesh, write_mesh
 
@@ -124,3 +125,19 @@ def test_a_reader_that_would_wait_for_ever_is_stopped(tmp_path, monkeypatch, end
     (tmp_path / "mesh.node").write_text("# cut off\n")
     with pytest.raises(MeshError, match=f"mesh.{ending}: not a mesh that meshio can read"):
         read_mesh(path)
+
+
+def test_xdmf(tmp_path):
+    mesh = box((2, 2, 2), (1.0, 1.0, 1.0))
+    raw = meshio.Mesh(mesh.points, [("tetra", mesh.tetrahedra)], point_data={"low": (mesh.points[:, 2] == 0.0) * 1})
+    meshio.write(tmp_path / "mesh.xdmf", raw)
+    read = read_mesh(tmp_path / "mesh.xdmf")
+    np.testing.assert_allclose(read.points, mesh.points)
+    np.testing.assert_array_equal(read.node_sets["low"], mesh.points[:, 2] == 0.0)
+
+
+def test_sets_of_abaqus(tmp_path):
+    mesh = box((1, 1, 1), (1.0, 1.0, 1.0))
+    raw = meshio.Mesh(mesh.points, [("tetra", mesh.tetrahedra)], point_sets={"LOW": [0, 2, 3]})
+    meshio.write(tmp_path / "mesh.inp", raw)
+    assert np.flatnonzero(read_mesh(tmp_path / "mesh.inp").node_sets["LOW"]).tolist() == [0, 2, 3]

@@ -14,7 +14,6 @@ from warpbrain.recordings.comparison import (
     compare_force,
     compare_points,
     compare_surface,
-    compare_torque,
     faces_of_set,
     legacy_error,
     root_mean_square,
@@ -141,12 +140,8 @@ def test_forces():
     assert compared.noise == pytest.approx(np.sqrt(2) * 0.1)
     assert compare_force(force(), [1, 0, 2], time=1.4).after.largest == 0
     twisted = force(force=np.full((3, 3), np.nan), torque=np.array([0.0, 1, 2]), sigma=0.5)
-    assert compare_torque(twisted, 1.5).after.largest == 0.5
-    assert compare_torque(twisted, 1.5).noise == 0.5
     with pytest.raises(InputError, match="only the torque"):
         compare_force(twisted, [0, 0, 0])
-    with pytest.raises(InputError, match="has no torque"):
-        compare_torque(force(), 0.0)
 
 
 TIMES = np.array([0.0, 0, 1, 1, 2, 3, 4])

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from folders import write_recorded
+from folders import write_folder, write_recorded
 
 from warpbrain.cases.reading import read_case
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, SurfaceRecording
@@ -67,3 +67,16 @@ def test_what_was_not_recorded_then_is_skipped_with_the_reason(solved):
     observed = observe(recorded(case, result), result, time=7.0)
     assert [c.name for c in observed.comparisons] == ["beads", "lid"]
     assert observed.skipped == ("recording 'cell' has nothing at 7 s: its times are 0 s to 1 s",)
+
+
+def test_what_holds_a_body_carries_the_loads_on_held_nodes_too(tmp_path):
+    """The base of a block under its own weight carries all of it, the share of the held nodes included."""
+    gravity = '[[mechanism]]\nkind = "gravity"\ncsf_level = -50.0\n[body]'
+    axis = 'axes = "RAS"\ngravity_axis = [0, 0, -1]'
+    case = read_case(write_folder(tmp_path, ("[body]", gravity), ('axes = "RAS"', axis), ("-0.05]", "-1e-9]")))
+    system = System(model_of(case)[0], "cpu")
+    solve_equilibrium(system)
+    result = result_of(system)
+    # all of it lies above the fluid: the buoyancy that it lost
+    expected = np.array([-0.01, -0.02, 1007.0 * 9.81 * case.mesh.volume])
+    np.testing.assert_allclose(result.reactions.sum(axis=0), expected, rtol=1e-6)

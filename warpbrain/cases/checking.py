@@ -19,6 +19,8 @@ BRAIN = (800.0, 1800.0)
 SOFT = (20.0, 100_000.0)
 #: Displacement [m] beyond any brain shift: the largest published ones are 25 mm (Miga et al. 2016).
 LARGEST_SHIFT = 0.05
+#: Displacement [m] that nobody would record: a tenth of the best tracking.
+SMALLEST_SHIFT = 1e-5
 #: Dihedral angles [degrees] below which elements make a solver slow and stresses wrong.
 SHARP = 5.0
 
@@ -66,6 +68,8 @@ def check_case(file: Path) -> Checked:
         quality = measure(case.mesh)
         plausible = volume_word(1e6 * quality.volume)
         remarks += _look_again(case, quality)
+        if not problems:
+            remarks += _nothing_there(case)
     return Checked(file, tuple(problems.found), tuple(remarks), case, quality, plausible)
 
 
@@ -103,10 +107,29 @@ def _look_again(case: Case, quality: Quality) -> list[str]:
         largest = float(np.linalg.norm(recording.displacement, axis=1).max())
         if largest > min(LARGEST_SHIFT, 0.5 * size):
             found.append(f"recording '{recording.name}': a point moves {1000.0 * largest:.3g} mm: is the unit right?")
+        if largest < SMALLEST_SHIFT:
+            found.append(f"recording '{recording.name}': no point moves more than {1000.0 * largest:.2g} mm")
+        if _wandering(recording):
+            found.append(f"recording '{recording.name}': one id starts at several places; x, y, z are where it began")
         if len(np.unique(recording.points, axis=0)) < len(recording.points) and recording.time is None:
             found.append(f"recording '{recording.name}': a point is recorded twice")
+    return found
+
+
+def _nothing_there(case: Case) -> list[str]:
+    found = []
     if not case.boundaries and case.specimen is None:
         found.append("no [[boundary]]: nothing holds the body, so it cannot be simulated")
     if not case.recordings:
         found.append("no [[recording]]: there is nothing to compare a simulation with")
     return found
+
+
+def _wandering(recording: PointsRecording) -> bool:
+    """Whether an id has more than one start: the place at the time was given where the first place belongs."""
+    if recording.ids is None:
+        return False
+    starts: dict[str, object] = {}
+    return any(
+        starts.setdefault(name, tuple(x)) != tuple(x) for name, x in zip(recording.ids, recording.points, strict=True)
+    )

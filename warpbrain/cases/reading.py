@@ -16,10 +16,11 @@ from warpbrain.cases.parts.mechanisms import read_mechanisms
 from warpbrain.cases.parts.node_sets import NodeSets
 from warpbrain.cases.parts.recordings import read_recordings
 from warpbrain.cases.parts.tissues import read_body, read_tissues
+from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.problems import Problems
-from warpbrain.recordings.inside import check_points_inside
-from warpbrain.recordings.recording import PointsRecording
+from warpbrain.recordings.inside import check_points_inside, check_surface_near
+from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 
 
 def read_case(path: str | os.PathLike[str]) -> Case:
@@ -101,4 +102,9 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     for recording in recordings:
         if isinstance(recording, PointsRecording):
             check_points_inside(recording, left, file.parent / recording.file, problems)
+        elif isinstance(recording, SurfaceRecording):
+            try:
+                check_surface_near(recording, left, file.parent / recording.file, problems)
+            except InputError as error:  # the set has no face
+                problems.add(file, "[[recording]]", str(error))
     return case

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.atomic import output_folder, whole_file
+from warpbrain.atomic import output_folder, safe_name, whole_file
 from warpbrain.cases.boundary import Boundary, Contact, Displaced, Fixed, Forced, Pressed, Sliding
 from warpbrain.cases.case import Case, Mechanism, Tissue
 from warpbrain.cases.format.tables import PRIOR
@@ -70,9 +71,7 @@ def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
     if case.mechanisms:
         tables["mechanism"] = [_mechanism(mechanism) for mechanism in case.mechanisms]
     if case.recordings:
-        tables["recording"] = [
-            _recording(folder, number, recording, frame) for number, recording in enumerate(case.recordings, 1)
-        ]
+        tables["recording"] = [_recording(folder, recording, frame) for recording in case.recordings]
     import tomli_w
 
     with whole_file(target) as temporary:
@@ -116,7 +115,7 @@ def _boundary(folder: Path, boundary: Boundary, frame: Frame) -> dict[str, Any]:
     if isinstance(boundary, Pressed):
         return table | {"value": boundary.value, **_ramp(boundary.ramp)}
     if isinstance(boundary, Contact):
-        name = f"surfaces/{_safe(boundary.name)}.vtu"
+        name = _new_file(folder, "surfaces", boundary.name, ".vtu")
         _write_surface(folder / name, boundary, frame)
         return table | {"surface": name, "friction": boundary.friction}
     assert isinstance(boundary, Fixed | Sliding)
@@ -131,8 +130,7 @@ def _displacement(folder: Path, boundary: Displaced, frame: Frame) -> dict[str, 
     values = frame.file_lengths(boundary.values)
     if not boundary.has_history:
         return {"value": _plain(values[0])}
-    name = f"boundaries/{_safe(boundary.name)}.csv"
-    (folder / name).parent.mkdir(exist_ok=True)
+    name = _new_file(folder, "boundaries", boundary.name, ".csv")
     rows = "".join(
         ",".join(repr(float(v)) for v in (time, *value)) + "\n"
         for time, value in zip(boundary.times, values, strict=True)
@@ -145,7 +143,6 @@ def _displacement(folder: Path, boundary: Displaced, frame: Frame) -> dict[str, 
 def _write_surface(path: Path, contact: Contact, frame: Frame) -> None:
     import meshio
 
-    path.parent.mkdir(exist_ok=True)
     surface = meshio.Mesh(frame.file_lengths(contact.points), [("triangle", contact.faces)])
     with whole_file(path) as temporary:
         meshio.write(temporary, surface, file_format="vtu", binary=True, compression="zlib")
@@ -158,11 +155,9 @@ def _mechanism(mechanism: Mechanism) -> dict[str, Any]:
     return {"kind": "resection", "elements": mechanism.elements}
 
 
-def _recording(folder: Path, number: int, recording: Recording, frame: Frame) -> dict[str, Any]:
-    name = f"recordings/{_safe(recording.name)}{'.vtu' if getattr(recording, 'faces', None) is not None else '.csv'}"
-    if (folder / name).exists():  # two names that are one file name
-        name = name.replace("recordings/", f"recordings/{number}-")
-    (folder / name).parent.mkdir(exist_ok=True)
+def _recording(folder: Path, recording: Recording, frame: Frame) -> dict[str, Any]:
+    ending = ".vtu" if getattr(recording, "faces", None) is not None else ".csv"
+    name = _new_file(folder, "recordings", recording.name, ending)
     table: dict[str, Any] = {"name": recording.name, "kind": recording.kind, "file": name, "role": recording.role}
     length = isinstance(recording, PointsRecording | SurfaceRecording)
     if recording.sigma is not None:
@@ -177,9 +172,14 @@ def _recording(folder: Path, number: int, recording: Recording, frame: Frame) ->
     return table | more[type(recording)](recording)
 
 
-def _safe(name: str) -> str:
-    """A file name made from free text."""
-    return "".join(c if c.isalnum() or c in "-_" else "-" for c in name)[:60] or "unnamed"
+def _new_file(folder: Path, room: str, name: str, ending: str) -> str:
+    """A file of the case that is not there yet, relative to its folder, named after free text; its room is made."""
+    (folder / room).mkdir(exist_ok=True)
+    # disks that do not tell A from a
+    taken = {path.name.casefold() for path in (folder / room).iterdir()}
+    stem = safe_name(name)
+    names = (f"{stem}{'' if number == 1 else f'-{number}'}{ending}" for number in itertools.count(1))
+    return f"{room}/{next(name for name in names if name.casefold() not in taken)}"
 
 
 def _plain(value: Any) -> Any:

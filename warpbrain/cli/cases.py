@@ -67,11 +67,10 @@ def _list(options: argparse.Namespace) -> None:
 
 
 def _show(options: argparse.Namespace) -> None:
-    from warpbrain.atomic import check_writable
+    from warpbrain.atomic import check_writable, safe_name
     from warpbrain.cases.shipped import find_case
     from warpbrain.report.case_picture import write_case_picture
     from warpbrain.report.case_text import show_lines
-    from warpbrain.report.files import safe_name
 
     case = find_case(options.name, options.tissue)
     path = options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}.png")
@@ -86,12 +85,14 @@ def _check(options: argparse.Namespace) -> None:
     from warpbrain.cases.shipped import files_of
     from warpbrain.errors import InputError
     from warpbrain.report.case_text import check_lines
+    from warpbrain.simulation.readiness import why_not
 
     wrong = 0
     for file in files_of(options.folder):
         checked = check_case(file)
         wrong += len(checked.problems)
-        print(*check_lines(checked), sep="\n")
+        cannot = why_not(checked.case) if checked.case is not None and not checked.problems else ""
+        print(*check_lines(checked, cannot), sep="\n")
     if wrong:
         raise InputError(f"{options.folder}: {wrong} problem{'s' if wrong > 1 else ''}, listed above")
 

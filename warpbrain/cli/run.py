@@ -27,8 +27,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     parser = commands.add_parser(
         "run",
         help="simulate a case",
-        description="Simulates a case and writes result.vtu, summary.json and deformation.png. Without --steps or "
-        "--to-rest it finds the static equilibrium.",
+        description="Simulates a case and writes result.vtu, summary.json, deformation.png and comparison.csv. "
+        "Without --steps or --to-rest it finds the static equilibrium.",
     )
     add = parser.add_argument
     add(
@@ -74,10 +74,10 @@ def _run(options: argparse.Namespace) -> None:
     _check(options)
     say: Callable[..., None] = _silent if options.quiet else print
 
-    from warpbrain.atomic import output_folder
+    from warpbrain.atomic import output_folder, safe_name
     from warpbrain.report import summary as tables
     from warpbrain.report.comparison import comparison_lines, describe_comparisons, write_comparisons
-    from warpbrain.report.files import safe_name, write_result, write_summary
+    from warpbrain.report.files import write_result, write_summary
     from warpbrain.simulation.of_case import model_of
     from warpbrain.simulation.system import System, find_device
     from warpbrain.terminal.quiet import start_warp_quietly
@@ -108,7 +108,7 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.simulation.observation import observe
     from warpbrain.simulation.result import result_of
 
-    result = result_of(system)
+    result = result_of(system, outcome.get("time_s", math.inf))
     observed = observe(case, result, outcome.get("time_s"))
     said = tables.describe_result(result)
     compared = describe_comparisons(observed)
@@ -172,7 +172,11 @@ def _case(options: argparse.Namespace) -> Case:
     if not options.allow_unstable:
         for label, tissue in sorted(case.tissues.items()):
             try:
-                require_stable(tissue.known_law, case.poisson, tissue.formulation)
+                law = tissue.known_law
+            except InputError as error:
+                raise InputError(f"{case.path}: [tissue.{label}] {error}") from None
+            try:
+                require_stable(law, case.poisson, tissue.formulation)
             except UnstableLawError as error:
                 raise UnstableLawError(
                     f"{case.path}: [tissue.{label}] {error}; --allow-unstable computes with it all the same"

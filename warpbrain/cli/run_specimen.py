@@ -38,10 +38,10 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None]) -> No
     """
     tests = _tests(options, case)
 
-    from warpbrain.atomic import output_folder
+    from warpbrain.atomic import output_folder, safe_name
     from warpbrain.report import specimen_text as text
     from warpbrain.report.comparison import describe_comparisons
-    from warpbrain.report.files import safe_name, write_summary
+    from warpbrain.report.files import write_summary
     from warpbrain.report.specimen_picture import write_tests_picture
     from warpbrain.report.summary import machine, timing_lines
     from warpbrain.simulation.equilibrium import EquilibriumOptions

@@ -3,8 +3,8 @@
 Conventions of the files
     * tetrahedra of first order; of second-order ones the corners are taken;
     * tissue labels: an integer cell array, ``tissue`` unless the caller says otherwise;
-    * node sets: every point array of one column that is integer, boolean, or real with no values but 0 and 1; non-zero
-      = member;
+    * node sets: named lists of nodes (Abaqus), and every point array of one column that is integer, boolean, or real
+      with no values but 0 and 1; non-zero = member;
     * element sets: every such cell array whose name starts with ``set_``; the set's name is the rest.
 """
 
@@ -117,7 +117,7 @@ def _from_meshio(raw: Any, scale: float, tissue: str | None) -> MeshInFile:
     points = np.asarray(raw.points, dtype=np.float64)
     # the corners come first in every numbering of second-order tetrahedra that meshio knows
     tetrahedra = np.concatenate([raw.cells[b].data[:, :4] for b in blocks])
-    node_sets = _members(raw.point_data, "")
+    node_sets = _members(raw.point_data, "") | _named(raw.point_sets, len(points))
     numbers = np.arange(len(points))
     if middles := [raw.cells[b].data[:, 4:] for b in blocks if kinds[b] == "tetra10"]:
         # nodes on edges go; one that no tetrahedron has stays, to be found and named
@@ -136,6 +136,16 @@ def _from_meshio(raw: Any, scale: float, tissue: str | None) -> MeshInFile:
         _members({name: data for name, data in cells.items() if name != label}, ELEMENT_SET_PREFIX),
     )
     return MeshInFile(mesh, numbers, len(raw.points))
+
+
+def _named(sets: Mapping[str, Any], count: int) -> dict[str, NDArray[np.bool_]]:
+    """Sets that a file holds as lists of nodes, as Abaqus' NSET."""
+    found = {}
+    for name, ids in (sets or {}).items():
+        members = np.zeros(count, dtype=bool)
+        members[np.asarray(ids, dtype=np.int64)] = True
+        found[name] = members
+    return found
 
 
 def _members(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[np.bool_]]:

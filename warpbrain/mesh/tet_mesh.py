@@ -17,6 +17,10 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 
+#: A coordinate [m] beyond this is no place.
+LARGEST = 1e12
+
+
 class MeshError(InputError):
     """A mesh that cannot be computed with; the message is one line that says what is wrong and where.
 
@@ -222,7 +226,7 @@ def signed_volumes(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
 def _defects(points: Floats, tetrahedra: Ints) -> list[str]:
     """Everything that makes points and tetrahedra no body, one line each."""
     found = []
-    bad = np.asarray(~np.isfinite(points).all(axis=1))
+    bad = np.asarray(~(np.abs(points) <= LARGEST).all(axis=1))
     if bad.any():
         found.append(f"{bad.sum()} node(s) with a coordinate that is not finite: node {_ids(bad)}")
     count = len(points)
@@ -239,7 +243,7 @@ def _defects(points: Floats, tetrahedra: Ints) -> list[str]:
         found.append(f"{repeated.sum()} tetrahedra name a node twice: tetrahedron {_ids(repeated)}")
     unused = np.bincount(tetrahedra[~outside].ravel(), minlength=count) == 0
     if unused.any():
-        found.append(f"{unused.sum()} node(s) belong to no tetrahedron: node {_ids(unused)}")
+        found.append(f"{unused.sum()} node(s) belong to no tetrahedron: node {_ids(unused)}; take them out")
     whole = np.flatnonzero(~outside & ~repeated)
     return found + _flat_or_inverted(points, tetrahedra[whole], whole, bad)
 
@@ -258,6 +262,7 @@ def _flat_or_inverted(points: Floats, tetrahedra: Ints, numbers: NDArray[np.int6
         found.append(f"{flat.sum()} tetrahedra have zero volume: tetrahedron {_ids(numbers[flat])}")
     if inverted.any():
         found.append(
-            f"{inverted.sum()} tetrahedra are inverted (negative volume): tetrahedron {_ids(numbers[inverted])}"
+            f"{inverted.sum()} tetrahedra are inverted (negative volume): tetrahedron {_ids(numbers[inverted])}; "
+            "swap two nodes of each"
         )
     return found

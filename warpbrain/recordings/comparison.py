@@ -212,7 +212,7 @@ def compare_force(recording: ForceRecording, reaction: ArrayLike, time: float | 
     Raises
     ------
     InputError
-        If no component of the force was recorded (see `compare_torque`), or nothing at that time.
+        If no component of the force was recorded, or nothing at that time.
     """
     rows = rows_at(recording, time)
     before = recording.force[rows]
@@ -231,30 +231,6 @@ def compare_force(recording: ForceRecording, reaction: ArrayLike, time: float | 
         residuals_before=before,
         residuals_after=after,
         noise=None if recording.sigma is None else float(np.sqrt(recorded.sum())) * recording.sigma,
-    )
-
-
-def compare_torque(recording: ForceRecording, torque: float, time: float | None = None) -> Comparison:
-    """Compare the torque [N m] of a boundary on the tissue; otherwise as `compare_force`.
-
-    The residuals have one column. `sigma` is the torque's only where no force was recorded with it.
-    """
-    rows = rows_at(recording, time)
-    if recording.torque is None:
-        raise InputError(f"recording '{recording.name}' has no torque")
-    before = recording.torque[rows, None]
-    after = before - torque
-    return Comparison(
-        name=recording.name,
-        kind=recording.kind,
-        role=recording.role,
-        unit="N m",
-        rows=rows,
-        before=Error.of(before, "N m"),
-        after=Error.of(after, "N m"),
-        residuals_before=before,
-        residuals_after=after,
-        noise=recording.sigma if np.isnan(recording.force).all() else None,
     )
 
 

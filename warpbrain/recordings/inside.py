@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from warpbrain.mesh.tet_mesh import TetMesh
 from warpbrain.problems import Problems
+from warpbrain.recordings.closest import closest_points
+from warpbrain.recordings.comparison import faces_of_set
 from warpbrain.recordings.location import Location, locate
-from warpbrain.recordings.recording import PointsRecording
+from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.recordings.text import collected, shown
 
 Floats = NDArray[np.float64]
@@ -26,6 +28,8 @@ _MISTAKES = (
 )
 #: Of the extent of the mesh: points nearer together than this say nothing of a unit.
 _DOT = 0.02
+#: Of the size of the mesh: a surface farther away than this is not a moved surface of it.
+_FAR = 0.25
 #: Points that are enough to try it on.
 _SAMPLE = 1000
 
@@ -58,15 +62,24 @@ def check_points_inside(
     if recording.outside == "nearest":
         return place
     far = np.flatnonzero(place.distance > place.edge)
+    inside = len(far) <= len(place) / 2
+    if inside and recording.time is None and len(place) > 3 and _is_dot(recording.points, mesh):
+        size = 1000.0 * float(np.ptp(recording.points, axis=0).max())
+        problems.add(
+            path,
+            "",
+            f"all {len(place)} points lie within {size:.3g} mm of each other, a dot in the body",
+            "multiplied by 1000 they would not: is one of mesh and recording in m, the other in mm?",
+        )
+        return place
     if len(far) == 0:
         return place
     far = far[np.argsort(-place.distance[far], kind="stable")]
-    many = len(far) > len(place) / 2
-    cure = _mistake(recording.points[far], mesh) if many else ""
+    cure = "" if inside else _mistake(recording.points[far], mesh)
     cure = cure or 'check units and axes, or write outside = "nearest" for this recording'
     with collected(path, problems) as found:
         named: set[str] = set()
-        for row in far[:1] if many else far:
+        for row in far if inside else far[:1]:
             place_name = _name(recording, int(row))
             if place_name in named:
                 continue
@@ -81,6 +94,33 @@ def check_points_inside(
     return place
 
 
+def _is_dot(points: Floats, mesh: TetMesh) -> bool:
+    """Whether several points are so near each other that they can have been recorded in another unit only."""
+    return bool(np.ptp(points, axis=0).max() < _DOT * np.ptp(mesh.points, axis=0).max())
+
+
+def check_surface_near(recording: SurfaceRecording, mesh: TetMesh, path: Path, problems: Problems) -> None:
+    """Note as a problem a recorded surface that is nowhere near the faces that it is compared with."""
+    faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
+    sample = recording.points[:: -(-len(recording.points) // _SAMPLE)]
+    limit = _FAR * float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+
+    def away(points: Floats) -> float:
+        return float(np.median(closest_points(points, mesh.points, faces).distance))
+
+    distance = away(sample)
+    cure = next((text for factors, text in _MISTAKES if away(sample * np.array(factors)) < 0.1 * distance), "")
+    dot = len(sample) > 3 and _is_dot(sample, mesh)
+    if distance > limit or (dot and cure):
+        problems.add(
+            path,
+            "",
+            f"most points are {1000.0 * distance:.4g} mm or more from the faces of '{recording.nodes}'"
+            + (", all within a dot" if dot else ""),
+            cure.replace("most are inside", "they are near") or "check units and axes",
+        )
+
+
 def _name(recording: PointsRecording, row: int) -> str:
     return f"point {row + 1}" if recording.ids is None else f"id {shown(recording.ids[row])}"
 
@@ -93,7 +133,6 @@ def _mistake(points: Floats, mesh: TetMesh) -> str:
         undone = sample * np.array(factors)
         place = locate(mesh.points, mesh.tetrahedra, undone)
         # shrunk to a dot, any points lie inside a body that holds the origin: that tells nothing
-        dot = np.ptp(undone, axis=0).max() < _DOT * np.ptp(mesh.points, axis=0).max()
-        shares.append(0.0 if dot else float(np.mean(place.distance <= place.edge)))
+        shares.append(0.0 if _is_dot(undone, mesh) else float(np.mean(place.distance <= place.edge)))
     best = int(np.argmax(shares))
     return _MISTAKES[best][1] if shares[best] > 0.5 else ""

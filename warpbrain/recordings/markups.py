@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from warpbrain.frame import Frame
 from warpbrain.problems import Problems
+from warpbrain.recordings.tables import LARGEST
 from warpbrain.recordings.text import lines_of, read_text, shown
 
 Floats = NDArray[np.float64]
@@ -155,7 +156,7 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
                 position = [float(word) for word in words]
             except ValueError:
                 position = [math.nan]
-            if not all(math.isfinite(value) for value in position):
+            if not all(abs(value) <= LARGEST for value in position):
                 problems.add(path, f"row {row}", f"found position {shown(','.join(words))}, expected finite numbers")
                 continue
             positions.append(position)

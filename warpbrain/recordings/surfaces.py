@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from warpbrain.frame import AXES
 from warpbrain.mesh.patience import patience
 from warpbrain.problems import Problems
+from warpbrain.recordings.tables import LARGEST
 from warpbrain.recordings.text import is_readable, shown
 
 Floats = NDArray[np.float64]
@@ -109,7 +110,7 @@ def _checked(raw: SurfaceMesh, path: Path, problems: Problems) -> SurfaceMesh | 
     if count == 0:
         problems.add(path, "", "found no points")
         return None
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(points) <= LARGEST).all(axis=1))
     if len(bad):
         problems.add(path, f"point {bad[0]}", f"found a coordinate that is not finite ({len(bad)} such points in all)")
         return None

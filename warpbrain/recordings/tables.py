@@ -23,6 +23,10 @@ from warpbrain.recordings.text import lines_of, read_text, shown, without_commen
 Floats = NDArray[np.float64]
 
 
+#: No length, time, force or stress that anybody records is larger, in whatever unit; squares of it are still numbers.
+LARGEST = 1e12
+
+
 class Table:
     """A table as it was read: cells that are asked for are checked, and what is wrong is added to `problems`.
 
@@ -83,12 +87,13 @@ class Table:
         for index, row in enumerate(self._cells):
             cell = row[column]
             value = _number(cell)
-            if value is not None and math.isfinite(value):
+            if value is not None and abs(value) <= LARGEST:
                 values[index] = value
             elif not cell:
                 self.problem(index, name, "found nothing, expected a number", "leave out rows that were not recorded")
             elif value is not None:
-                self.problem(index, name, f"found {shown(cell)}, expected a finite number")
+                what = f"a number of at most {LARGEST:g}" if math.isfinite(value) else "a finite number"
+                self.problem(index, name, f"found {shown(cell)}, expected {what}")
             else:
                 comma = _number(cell.replace(",", ".")) is not None
                 cure = "write decimals with a point" if comma else ""

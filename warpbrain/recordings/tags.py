@@ -9,13 +9,13 @@ or weight, structure, patient and label. ``%`` and ``#`` start comments. The wei
 from __future__ import annotations
 
 import csv
-import math
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.problems import Problems
+from warpbrain.recordings.tables import LARGEST
 from warpbrain.recordings.text import lines_of, read_text, shown, without_comment
 
 Floats = NDArray[np.float64]
@@ -94,7 +94,7 @@ def _read_record(
     except ValueError:
         problems.add(path, place, f"found {shown(' '.join(words[:6]))}, expected 6 numbers")
         return
-    if not all(math.isfinite(value) for value in values):
+    if not all(abs(value) <= LARGEST for value in values):
         problems.add(path, place, f"found {shown(' '.join(words[:6]))}, expected finite numbers")
         return
     numbers.append(values)

@@ -93,8 +93,8 @@ def recording_line(recording: Recording) -> str:
     return f"{head}rows of a test in {recording.mode}: {' and '.join(recording.quantities)}{noise}{role}"
 
 
-def check_lines(checked: Checked) -> list[str]:
-    """What checking found, as printed: problems first."""
+def check_lines(checked: Checked, cannot: str) -> list[str]:
+    """What checking found, as printed: problems first; `cannot` says why a sound case cannot be run yet."""
     lines = [str(checked.file)]
     for problem in checked.problems:
         place = f"{problem.file.name}: {problem.place}: " if problem.place else f"{problem.file.name}: "
@@ -106,6 +106,8 @@ def check_lines(checked: Checked) -> list[str]:
         lines.append(f"  plausible {1e6 * checked.quality.volume:.4g} cm3: {checked.plausible}")
         lines += [f"  recorded  {sentence}" for sentence in map(recording_line, checked.case.recordings)]
     lines += [f"  look at   {sentence}" for sentence in checked.remarks]
+    if cannot:
+        lines.append(f"  not yet   it cannot be run as it stands: {cannot}")
     if not checked.problems:
-        lines.append("  nothing is wrong with it")
+        lines.append("  nothing is wrong with it" + (" otherwise" if cannot else ""))
     return lines

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +13,6 @@ from warpbrain.simulation.result import Result
 
 #: Millimetres of one metre: lengths are converted where they leave the program, and nowhere else.
 MILLIMETRES = 1000.0
-
-
-def safe_name(name: str) -> str:
-    """A file name made from free text: it must not become a path."""
-    return re.sub(r"[^\w.-]+", "-", name)
 
 
 def write_result(path: Path, result: Result) -> None:

@@ -51,6 +51,8 @@ def observe(case: Case, result: Result, time: float | None = None) -> Observed:
             comparisons.append(_compare(case, recording, result, at))
         except InputError as error:
             skipped.append(f"{error}")
+        if isinstance(recording, ForceRecording) and recording.torque is not None:
+            skipped.append(f"torque of '{recording.name}': a boundary has no axis that it could be about")
     return Observed(tuple(comparisons), tuple(skipped))
 
 

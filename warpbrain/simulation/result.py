@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -42,7 +43,8 @@ class Result:
     von_mises, pressure : (m,) array
         Of the Cauchy stress [Pa]; pressure is positive in compression.
     reactions : (n, 3) array
-        Internal forces on the constrained components [N], zero elsewhere.
+        What holds the constrained components [N]: their internal forces less the loads that act on them; zero
+        elsewhere.
     """
 
     mesh: TetMesh
@@ -70,8 +72,15 @@ def _statistics(sizes: Floats) -> Statistics:
     )
 
 
-def result_of(system: System) -> Result:
-    """Evaluate a system at its present displacement."""
+def result_of(system: System, time: float = math.inf) -> Result:
+    """Evaluate a system at its present displacement.
+
+    Parameters
+    ----------
+    system : System
+    time : float
+        Of the state [s], for loads with a ramp; by default long after every one.
+    """
     system.evaluate_forces()
     system.gather_forces()
     F = system.deformation_gradients()
@@ -87,5 +96,5 @@ def result_of(system: System) -> Result:
         principal_stretches=np.asarray(np.linalg.svd(F, compute_uv=False), dtype=np.float64),
         von_mises=np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2))),
         pressure=pressure,
-        reactions=np.where(system.model.constrained, internal, 0.0),
+        reactions=np.where(system.model.constrained, internal - system.model.external_forces(time), 0.0),
     )

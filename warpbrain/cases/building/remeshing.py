@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.building.errors import BuildError
+from warpbrain.cases.building.mmg import run_mmg
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -52,26 +53,17 @@ def remesh(cells: Cells, edge: float) -> Cells | None:
     edge : float
         Largest edge [mm].
     """
-    from mmgpy import MmgMesh3D
-
-    mesh = MmgMesh3D()
-    mesh.set_mesh_size(vertices=len(cells.points), tetrahedra=len(cells.tetrahedra))
-    mesh.set_vertices(cells.points)
-    mesh.set_tetrahedra(cells.tetrahedra.astype(np.int32), cells.labels.astype(np.int64))
-    try:
-        # no ridge detection: a brain has no edges, and what looks like one is left over from the cutting
-        mesh.remesh(
-            hmax=edge,
-            hmin=SMALLEST_EDGE * edge,
-            hausd=SURFACE_TOLERANCE * edge,
-            hgrad=GRADATION,
-            angle=0,
-            verbose=-1,
-        )
-    except RuntimeError:
-        return None
-    tetrahedra, labels = mesh.get_elements_with_refs()
-    return Cells(mesh.get_vertices(), np.asarray(tetrahedra, dtype=np.int64), np.asarray(labels, dtype=np.int64))
+    # no ridge detection: a brain has no edges, and what looks like one is left over from the cutting
+    options = {
+        "hmax": edge,
+        "hmin": SMALLEST_EDGE * edge,
+        "hausd": SURFACE_TOLERANCE * edge,
+        "hgrad": GRADATION,
+        "angle": 0,
+        "verbose": -1,
+    }
+    made = run_mmg(cells.points, cells.tetrahedra, cells.labels, options)
+    return None if made is None else Cells(*made)
 
 
 def fit_size(cells: Cells, size: Size, edge: float, good: Callable[[Cells], Cells | None]) -> Cells:

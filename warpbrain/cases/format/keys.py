@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+#: Characters of a name, which stands in tables and names files.
+LONGEST_NAME = 100
 #: What a value can be, and how a message calls it.
 KINDS = {
     "text": "text",
@@ -70,6 +72,8 @@ class Key:
                 return f"found '{value}', expected {self.expected()}"
             if "\0" in value:
                 return f"expected {self.expected()}, found {short(value)}"
+            if self.name == "name" and not (value.strip() and value.isprintable() and len(value) <= LONGEST_NAME):
+                return f"expected 1 to {LONGEST_NAME} printable characters, found {short(value)}"
         elif not isinstance(value, list) and not self.above < value < self.below:
             return f"found {value:g}, expected {self._limits()}"
         return ""

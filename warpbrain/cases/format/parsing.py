@@ -45,7 +45,7 @@ def file_of(folder: Path, name: str) -> tuple[Path | None, str]:
         if not path.exists():
             return None, f"no such file: {path}"
         if not path.is_file():
-            return None, f"no such file: {path} is a folder"
+            return None, f"no such file: {path} is {'a folder' if path.is_dir() else 'not a plain file'}"
     except (OSError, ValueError, RuntimeError) as error:  # a name too long, a link to itself
         return None, f"no such file: {path} ({error})"
     return path, ""

@@ -50,7 +50,9 @@ class Reading:
             if name not in keys:
                 self._refuse(table, name, list(keys))
             elif fault := keys[name].fault(value):
-                near = difflib.get_close_matches(value, keys[name].choices, 1) if isinstance(value, str) else []
+                # a unit or axes that look alike are others all the same
+                guess = isinstance(value, str) and name not in ("units", "axes")
+                near = difflib.get_close_matches(value, keys[name].choices, 1) if guess else []
                 self.problem(name, fault, f"did you mean '{near[0]}'?" if near else keys[name].hint)
             else:
                 self._good[name] = value

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpbrain.cases.format.tables import MESH, SPECIMEN
 from warpbrain.cases.parts.context import Context
@@ -121,47 +120,3 @@ def _sound(context: Context, path: Path, found: MeshInFile) -> MeshInFile | None
             f"the surface touches itself at {len(pinched)} node(s), first at node {found.node_numbers[pinched[0]]}",
         )
     return found
-
-
-def node_ids(context: Context, path: Path, found: MeshInFile) -> NDArray[np.bool_] | None:
-    """Members (n,) of a node set given as a .csv of node numbers, one a line, from 0; None if something is wrong."""
-    problems = context.problems
-    try:
-        if path.stat().st_size > 64 << 20:
-            problems.add(path, "", f"found {path.stat().st_size / 1e6:.0f} MB, expected a list of node numbers")
-            return None
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError as error:
-        problems.add(path, "", f"not UTF-8 text (byte {error.start})", "save it as UTF-8")
-        return None
-    except OSError as error:
-        problems.add(path, "", f"cannot be read: {error.strerror}")
-        return None
-    where = np.full(found.file_nodes, -1, dtype=np.int64)
-    where[found.node_numbers] = np.arange(len(found.node_numbers))
-    members = np.zeros(len(found.mesh.points), dtype=bool)
-    good, header = True, True
-    for number, line in enumerate(lines, 1):
-        text = line.split("#")[0].strip().rstrip(",;")
-        if not text:
-            continue
-        fault = ""
-        if not text.isascii() or not text.isdigit():
-            if header and text.lower() in ("id", "ids", "node", "nodes"):
-                header = False
-                continue
-            fault = f"expected the number of a node, found '{text[:40]}'"
-        elif int(text) >= found.file_nodes:
-            fault = f"found node {text[:20]}, but the mesh has nodes 0 to {found.file_nodes - 1}"
-        elif where[int(text)] < 0:
-            fault = f"node {text} is on an edge of a second-order tetrahedron, and only corners are used"
-        else:
-            members[where[int(text)]] = True
-        header = False
-        if fault:
-            problems.add(path, f"row {number}", fault)
-            good = False
-    if good and not members.any():
-        problems.add(path, "", "the file names no node: the set is empty")
-        return None
-    return members if good else None

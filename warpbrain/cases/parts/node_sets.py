@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.format.table import Reading
-from warpbrain.cases.parts.anatomy import node_ids
 from warpbrain.cases.parts.context import Context
 from warpbrain.mesh import MeshInFile, TetMesh
+from warpbrain.problems import Problems
+from warpbrain.recordings.text import collected, lines_of, read_text, shown, without_comment
 
 Bools = NDArray[np.bool_]
 
@@ -50,7 +52,7 @@ class NodeSets:
 
     def _from_file(self, table: Reading, key: str) -> str | None:
         path = self.context.path(table, key)
-        members = None if path is None else node_ids(self.context, path, self.found)
+        members = None if path is None else _read_numbers(path, self.found, self.context.problems)
         if path is None or members is None:
             return None
         name = path.stem
@@ -70,3 +72,43 @@ class NodeSets:
             return mesh
         sets = {**mesh.node_sets, **self.added}
         return TetMesh(mesh.points, mesh.tetrahedra, mesh.tissue, sets, mesh.element_sets)
+
+
+def _read_numbers(path: Path, found: MeshInFile, problems: Problems) -> Bools | None:
+    """Members (n,) of a set given as a file of node numbers, one a line, from 0; None if something is wrong."""
+    text = read_text(path, problems)
+    if text is None:
+        return None
+    where = np.full(found.file_nodes, -1, dtype=np.int64)
+    where[found.node_numbers] = np.arange(len(found.node_numbers))
+    members = np.zeros(len(found.mesh.points), dtype=bool)
+    with collected(path, problems) as wrong:
+        first = True
+        for number, line in enumerate(lines_of(text), 1):
+            word = without_comment(line).strip().rstrip(",;")
+            if not word:
+                continue
+            header, first = first and word.lower() in ("id", "ids", "node", "nodes"), False
+            if header:
+                continue
+            fault = _fault(word, where)
+            if fault:
+                wrong.add(path, f"row {number}", fault)
+            else:
+                members[where[int(word)]] = True
+    if not wrong and not members.any():
+        problems.add(path, "", "the file names no node: the set is empty")
+        return None
+    return None if wrong else members
+
+
+def _fault(word: str, where: NDArray[np.int64]) -> str:
+    """What is wrong with the number of a node; empty if nothing is."""
+    if not (word.isascii() and word.isdigit()):
+        return f"expected the number of a node, found {shown(word)}"
+    # a number of thousands of digits is not turned into one
+    if len(word) > 12 or int(word) >= len(where):
+        return f"found node {shown(word)}, but the mesh has nodes 0 to {len(where) - 1}"
+    if where[int(word)] < 0:
+        return f"node {word} is on an edge of a second-order tetrahedron, and only corners are used"
+    return ""

@@ -40,7 +40,10 @@ def read_tissues(context: Context) -> dict[int, Tissue]:
             tissues[int(key)] = tissue
     if context.mesh is not None:
         there = set(np.unique(context.mesh.tissue).tolist())
-        for label in sorted(there - labels):
+        for label in sorted(label for label in there if label < 0):
+            found = f"the mesh has tissue {label}, expected labels from 0"
+            context.problems.add(context.file, "[tissue]", found, "number the labels of the mesh anew")
+        for label in sorted(label for label in there - labels if label >= 0):
             count = int((context.mesh.tissue == label).sum())
             found = f"missing, but the mesh has tissue {label} ({count} tetrahedra)"
             context.problems.add(context.file, f"[tissue.{label}]", found, "add the table")

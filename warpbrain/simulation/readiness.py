@@ -1,0 +1,25 @@
+"""Can a case be simulated? What `warpbrain cases check` says beside what is wrong with the files."""
+
+from __future__ import annotations
+
+from warpbrain.cases.case import Case
+from warpbrain.errors import InputError
+from warpbrain.recordings.recording import TestRecording
+from warpbrain.simulation.held import require_held
+from warpbrain.simulation.of_case import model_of
+
+
+def why_not(case: Case) -> str:
+    """Why a sound case cannot be run as it stands; empty if it can."""
+    try:
+        if case.specimen is None:
+            require_held(model_of(case)[0])
+            return ""
+        for tissue in case.tissues.values():
+            _ = tissue.known_law
+    except InputError as error:
+        return str(error).removeprefix(f"{case.path}: ")
+    for recording in case.recordings:
+        if isinstance(recording, TestRecording) and recording.mode != "axial" and case.specimen.grips == "lubricated":
+            return f"recording '{recording.name}': lubricated grips transmit no {recording.mode}"
+    return ""
