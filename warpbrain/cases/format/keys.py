@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from warpbrain.values import finite, short
+
 #: Characters of a name, which stands in tables and names files.
 LONGEST_NAME = 100
 #: What a value can be, and how a message calls it.
@@ -104,22 +106,6 @@ def kind_of(value: Any) -> str | None:
     if all(isinstance(item, list) and len(item) == 2 and all(map(finite, item)) for item in value):
         return "pairs"
     return None
-
-
-def finite(value: Any) -> bool:
-    """Whether it is a number of TOML that a float can hold (its integers may have any number of digits)."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:
-        return False
-
-
-def short(value: Any) -> str:
-    """A value as an error message shows it, on one line of a length that can be read."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ import difflib
 from pathlib import Path
 from typing import Any
 
-from warpbrain.cases.format.keys import Table, short
+from warpbrain.cases.format.keys import Table
 from warpbrain.problems import Problems
+from warpbrain.values import short
 
 
 class Reading:

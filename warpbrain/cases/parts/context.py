@@ -6,12 +6,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from warpbrain.cases.format.keys import Table, short
+from warpbrain.cases.format.keys import Table
 from warpbrain.cases.format.parsing import file_of
 from warpbrain.cases.format.table import Reading
 from warpbrain.frame import Frame
 from warpbrain.mesh import TetMesh
 from warpbrain.problems import Problems
+from warpbrain.values import short
 
 
 @dataclass

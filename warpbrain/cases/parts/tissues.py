@@ -7,12 +7,12 @@ import re
 import numpy as np
 
 from warpbrain.cases.case import Tissue
-from warpbrain.cases.format.keys import short
 from warpbrain.cases.format.table import Reading
 from warpbrain.cases.format.tables import BODY, PRIOR, PRIOR_GROUPS, TISSUE
 from warpbrain.cases.parts.context import Context
 from warpbrain.errors import InputError
 from warpbrain.physics.laws import LAWS, Law
+from warpbrain.values import short
 
 #: Densities [kg/m3] that a tissue, gel or foam can have: wide, and too narrow for g/cm3.
 LIGHTEST, HEAVIEST = 20.0, 30000.0

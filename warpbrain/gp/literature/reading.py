@@ -27,9 +27,10 @@ from warpbrain.gp.literature.conventions import Convention, Parameters
 from warpbrain.gp.literature.forms import FORMS
 from warpbrain.gp.literature.groups import GROUPS, STRETCHES, usual_form
 from warpbrain.gp.literature.study import Study
-from warpbrain.gp.literature.values import fault, is_number, nearest, shown
+from warpbrain.gp.literature.values import fault, nearest
 from warpbrain.problems import Problems
 from warpbrain.recordings.text import read_text
+from warpbrain.values import finite, short
 
 #: Moduli may be given in these [Pa].
 UNITS = {"Pa": 1.0, "kPa": 1e3}
@@ -58,13 +59,13 @@ def read_entries(path: Path, problems: Problems) -> tuple[list[dict[str, Any]], 
             problems.add(path, key, "unknown key", nearest(key, ("study", "units")))
     units = content.get("units", "Pa")
     if not isinstance(units, str) or units not in UNITS:
-        problems.add(path, "units", f"found {shown(units)}, expected one of {', '.join(UNITS)}")
+        problems.add(path, "units", f"found {short(units)}, expected one of {', '.join(UNITS)}")
         units = "Pa"
     entries = content.get("study")
     if isinstance(entries, dict):
         problems.add(path, "study", "found one table, expected a list of them", "write [[study]] with two brackets")
     elif not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
-        found = "found none" if entries is None else f"found {shown(entries)}"
+        found = "found none" if entries is None else f"found {short(entries)}"
         problems.add(path, "study", f"{found}, expected at least one table [[study]]")
     else:
         return entries, UNITS[units]
@@ -104,12 +105,12 @@ class Entry:
         if change is None:
             return
         if not isinstance(change, dict):
-            self.problem("corrected", f"found {shown(change)}, expected a table")
+            self.problem("corrected", f"found {short(change)}, expected a table")
             return
         change = dict(change)
         reason, out = change.pop("reason", None), change.pop("out", False)
         if not isinstance(reason, str) or not reason.strip():
-            self.problem("corrected", f"found reason {shown(reason)}, expected text", "say why it differs")
+            self.problem("corrected", f"found reason {short(reason)}, expected text", "say why it differs")
             return
         if not isinstance(out, bool) or (out and change) or not (out or change):
             self.problem("corrected", "expected either out = true or keys that change")
@@ -137,7 +138,7 @@ class Entry:
             form = ""
         number = self.values.get("number")
         if number is not None and (isinstance(number, bool) or not isinstance(number, int) or number < 0):
-            self.problem("number", f"found {shown(number)}, expected a whole number of at least 0")
+            self.problem("number", f"found {short(number)}, expected a whole number of at least 0")
         stretch = self._stretch(group)
         if not form:
             return None  # what its keys should be is not known
@@ -166,19 +167,19 @@ class Entry:
         value = self.values.get(key, "")
         if isinstance(value, str) and (value.strip() or key not in self.values):
             return value
-        self.problem(key, f"found {shown(value)}, expected text")
+        self.problem(key, f"found {short(value)}, expected text")
         return ""
 
     def _stretch(self, group: str) -> tuple[float, float] | None:
         if "stretch" not in self.values:
             return STRETCHES.get(group)
         value = self.values["stretch"]
-        if isinstance(value, list) and len(value) == 2 and all(map(is_number, value)):
+        if isinstance(value, list) and len(value) == 2 and all(map(finite, value)):
             low, high = map(float, value)
             if 0.0 < low < 1.0 < high:
                 return low, high
         cure = "1 is rest: 0.9 is a tenth shorter" if isinstance(value, list) else ""
-        self.problem("stretch", f"found {shown(value)}, expected [low, high] with 0 < low < 1 < high", cure)
+        self.problem("stretch", f"found {short(value)}, expected [low, high] with 0 < low < 1 < high", cure)
         return None
 
     def _sides(self, form: str, named: str) -> tuple[str, Parameters, Parameters] | None:
@@ -187,7 +188,7 @@ class Entry:
         tables = {side: self.values[side] for side in _SIDES if side in self.values}
         for side, table in tables.items():
             if not isinstance(table, dict):
-                self.problem(side, f"found {shown(table)}, expected a table of the parameters on that side")
+                self.problem(side, f"found {short(table)}, expected a table of the parameters on that side")
                 return None
         given = list(dict.fromkeys([*common, *(key for table in tables.values() for key in table)]))
         known = FORMS[form].conventions

@@ -8,22 +8,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from warpbrain.gp.literature.conventions import Parameter
-
-
-def is_number(value: Any) -> bool:
-    """Whether it is a finite number; the integers of TOML may have any number of digits."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:
-        return False
-
-
-def shown(value: Any) -> str:
-    """A value as a message shows it: on one line, and short."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else f"{text[:57]}..."
+from warpbrain.values import finite, short
 
 
 def nearest(name: Any, names: Iterable[str]) -> str:
@@ -39,12 +24,12 @@ def fault(key: Parameter, value: Any) -> str:
     """What is wrong with a parameter, in words; empty if nothing is."""
     unit = f" [{key.unit}]" if key.unit else ""
     items = value if key.several and isinstance(value, list) else [value]
-    if not items or not all(is_number(item) for item in items):
+    if not items or not all(finite(item) for item in items):
         expected = "a finite number or a list of them" if key.several else "a finite number"
-        return f"found {shown(value)}, expected {expected}{unit}"
+        return f"found {short(value)}, expected {expected}{unit}"
     for item in items:
         if not key.zero and item == 0:
-            return f"found {shown(value)}, expected no 0"
+            return f"found {short(value)}, expected no 0"
         if not key.above < item < key.below:
             if math.isinf(key.below):
                 return f"found {item:g}, expected a number above {key.above:g}{unit}"
