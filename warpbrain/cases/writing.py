@@ -17,7 +17,7 @@ from warpbrain.cases.case import Case, Mechanism, Tissue
 from warpbrain.cases.format.tables import PRIOR
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
-from warpbrain.mesh import TetMesh, write_mesh
+from warpbrain.mesh import write_mesh
 from warpbrain.physics.gravity import Gravity
 from warpbrain.recordings.recording import (
     ForceRecording,
@@ -63,7 +63,8 @@ def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
     else:
         name = Path(case.mesh_file).with_suffix(".vtu").name
         tables["mesh"] = {"file": name, "tissue": "tissue"}
-        write_mesh(folder / name, _in_axes(case.mesh, frame), unit=frame.unit)
+        in_axes = replace(case.mesh, points=frame.directions(case.mesh.points))
+        write_mesh(folder / name, in_axes, unit=frame.unit)
     tables["tissue"] = {str(label): _tissue(tissue) for label, tissue in sorted(case.tissues.items())}
     tables["body"] = {"density": case.density, "poisson": case.poisson}
     if case.boundaries:
@@ -77,10 +78,6 @@ def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
     with whole_file(target) as temporary:
         temporary.write_text(_HEAD + tomli_w.dumps(tables), encoding="utf-8")
     return target
-
-
-def _in_axes(mesh: TetMesh, frame: Frame) -> TetMesh:
-    return TetMesh(frame.directions(mesh.points), mesh.tetrahedra, mesh.tissue, mesh.node_sets, mesh.element_sets)
 
 
 def _head(case: Case) -> dict[str, Any]:

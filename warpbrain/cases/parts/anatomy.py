@@ -13,7 +13,7 @@ from warpbrain.cases.format.tables import MESH, SPECIMEN
 from warpbrain.cases.parts.context import Context
 from warpbrain.cases.specimen import Specimen
 from warpbrain.frame import METRES
-from warpbrain.mesh import MeshError, MeshInFile, TetMesh, pinched_nodes, read_mesh_file
+from warpbrain.mesh import MeshError, MeshInFile, pinched_nodes, read_mesh_file
 from warpbrain.mesh.soundness import coincident_nodes
 from warpbrain.mesh.surface import boundary_faces
 
@@ -70,19 +70,12 @@ def _read_mesh(context: Context, path: Path, tissue: str | None) -> MeshInFile |
     mesh = found.mesh
     if not np.all(context.frame.signs > 0):
         # both axes conventions are right-handed: turning two axes keeps the orientation of the elements
-        points = context.frame.directions(mesh.points)
-        mesh = TetMesh(points, mesh.tetrahedra, mesh.tissue, mesh.node_sets, mesh.element_sets)
-    if found.file_nodes > len(mesh.points):
+        mesh = replace(mesh, points=context.frame.directions(mesh.points))
+    if left := found.file_nodes - len(mesh.points):
         context.problems.remark(
-            path,
-            f"tetrahedra of second order: their corners are used, {file_nodes_left(found)} nodes on edges are not",
+            path, f"tetrahedra of second order: their corners are used, {left} nodes on edges are not"
         )
     return _sound(context, path, replace(found, mesh=mesh))
-
-
-def file_nodes_left(found: MeshInFile) -> int:
-    """How many nodes of the file the mesh does not have."""
-    return found.file_nodes - len(found.node_numbers)
 
 
 def _sound(context: Context, path: Path, found: MeshInFile) -> MeshInFile | None:
