@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from published_process import STORED
 from scipy.stats import multivariate_normal
 
 from warpbrain.errors import InputError, SolveError
@@ -13,24 +14,6 @@ from warpbrain.gp.literature.dataset import dataset
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.parameters import TASKS, Parameters
 from warpbrain.gp.replicates import Replicates
-
-#: Noise that the log of the paper's code adds to every observation (GPy's exact inference).
-ADDED = 1e-8
-#: The optimum that its log prints: agranadoseu/Hyperelastic-Generative-Model, GaussianProcesses/data/new1.
-STORED = Parameters(
-    0.17952169955079822,
-    np.array([
-        135.62322427, 140.19158171, 139.05693858, 144.09968574, 132.12044589, 130.63714967, 132.04573204, 111.48076940,
-        162.41944820, 150.77294496, 1.14076632, 142.69312541,
-    ]),
-    np.array([
-        0.54158171, 1.31525233, 0.59139394, 4.79552641, 0.06334509, 1e-12, 0.09639896, 0.24035776, 9.95848127,
-        18.40784199, 47.73588957, 1.41217720,
-    ]),
-    ADDED + np.array([
-        0.24272512, 0.56619040, 0, 0, 0, 0, 1.32708317, 9.58898804, 0.13273581, 0.10883199, 0.80525181, 0,
-    ]),
-)  # fmt: skip
 
 
 def some(seed=0):
@@ -67,6 +50,44 @@ def test_gradient(kernel, seed):
         step = h * np.eye(len(vector))[k]
         ahead, behind = (likelihood.value(Parameters.from_vector(vector + s * step)) for s in (1, -1))
         assert gradient[k] == pytest.approx((ahead - behind) / (2 * h), rel=1e-6, abs=1e-7), k
+
+
+def test_average_information():
+    """`a^T K_i K^-1 K_j a / 2` with the derivatives of the covariance by differences, and the replicates' own part."""
+    task, x, y, parameters = some()
+    data = Replicates.of(task, x, y)
+    likelihood = Likelihood(data)
+    value, gradient, information = likelihood.value_gradient_and_information(parameters)
+    assert value == pytest.approx(likelihood.value(parameters), rel=1e-13)
+    np.testing.assert_array_equal(gradient, likelihood.value_and_gradient(parameters)[1])
+    vector, h = parameters.to_vector(), 1e-6
+    steps = h * np.eye(len(vector))
+    weights = likelihood.factor(parameters).weights
+
+    def K(at):
+        return likelihood.covariance(Parameters.from_vector(at))[0]
+
+    columns = np.stack([(K(vector + s) - K(vector - s)) / (2 * h) @ weights for s in steps], axis=1)
+    expected = 0.5 * columns.T @ np.linalg.solve(likelihood.covariance(parameters)[0], columns)
+    own = np.bincount(data.task, weights=data.scatter, minlength=TASKS) / parameters.noise
+    expected[np.arange(25, 37), np.arange(25, 37)] += 0.5 * own
+    np.testing.assert_allclose(information, expected, rtol=1e-6, atol=1e-7)
+
+
+def test_condition_number():
+    task, x, y, parameters = some()
+    likelihood = Likelihood(Replicates.of(task, x, y))
+    exact = np.linalg.cond(likelihood.covariance(parameters)[0], 1)
+    assert exact / 3 < likelihood.factor(parameters).condition < 1.01 * exact
+
+
+def test_thinned_replicates_are_every_so_many_of_each_task():
+    task, x, y, _ = some()
+    data = Replicates.of(task, x, y)
+    thinned = data.thinned(3)
+    for t in range(TASKS):
+        np.testing.assert_array_equal(thinned.x[thinned.task == t], np.sort(data.x[data.task == t])[::3])
+    assert data.thinned(1).size == data.size
 
 
 def test_parameters_come_back_from_their_vector():

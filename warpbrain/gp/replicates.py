@@ -61,3 +61,10 @@ class Replicates:
     def size(self) -> int:
         """How many means there are."""
         return len(self.x)
+
+    def thinned(self, step: int) -> Replicates:
+        """Every `step`-th stretch of each task, from its lowest: a cheap picture of the whole."""
+        order = np.lexsort((self.x, self.task))
+        place = np.arange(self.size) - np.searchsorted(self.task[order], self.task[order])
+        keep = order[place % step == 0]
+        return Replicates(self.task[keep], self.x[keep], self.mean[keep], self.count[keep], self.scatter[keep])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,6 +61,15 @@ class Study:
     def task(self) -> int:
         """Number of its group, 0 to 11."""
         return task_of(self.group)
+
+    @property
+    def paper(self) -> str:
+        """What its name ends with if that is an author and a year, as in "MRE-WM-Kruse1999"; else all of its name.
+
+        Studies of one paper share what a laboratory does to its numbers.
+        """
+        last = self.name.rpartition("-")[2]
+        return last if re.fullmatch(r"[^\W\d]+\d{4}", last) else self.name
 
     @property
     def split(self) -> bool:

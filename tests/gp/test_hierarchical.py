@@ -1,0 +1,134 @@
+"""The hierarchical model: its likelihood, its predictions and its draws."""
+
+import numpy as np
+import pytest
+
+from warpbrain.gp.hierarchical import Hierarchical, fit_hierarchy, negative_log_likelihood
+from warpbrain.gp.hierarchy import CENTRE, EFFECTS, Hierarchy, prior
+from warpbrain.gp.literature.studies import read_studies
+from warpbrain.gp.literature.study import Study
+from warpbrain.gp.observations import Places, observations
+from warpbrain.gp.secant import invariant, log_energy, log_secant_modulus
+from warpbrain.gp.trained import trained
+
+GREY, WHITE = "hyperelastic/grey matter", "hyperelastic/white matter"
+
+
+def neo_hookean(name, group, mu):
+    return Study(name, group, "neo-hookean", {"mu": mu}, {"mu": mu}, (0.9, 1.1))
+
+
+def modulus(model, groups, stretches, number, seed=0):
+    energy = np.exp(model.draw(groups, stretches, number, seed)) - 1e-4
+    return np.log(energy / invariant(stretches))
+
+
+@pytest.mark.parametrize("kernel", ["matern32", "matern52", "squared-exponential"])
+def test_gradient(kernel):
+    seen = observations(read_studies("corrected")[20:60:3])
+    vector = prior()[0] + 0.2 * np.random.default_rng(0).normal(size=len(EFFECTS) + 1)
+    _, gradient = negative_log_likelihood(Hierarchy.from_vector(vector, kernel), seen)
+    for k, step in enumerate(1e-5 * np.eye(len(vector))):
+        ahead, behind = (
+            negative_log_likelihood(Hierarchy.from_vector(v, kernel), seen)[0] for v in (vector + step, vector - step)
+        )
+        assert gradient[k] == pytest.approx((ahead - behind) / 2e-5, rel=1e-4, abs=1e-5), k
+
+
+def test_covariance_is_positive_for_any_places():
+    random = np.random.default_rng(1)
+    places = Places(*(random.integers(0, n, 80) for n in (20, 6, 12)), random.uniform(0.5, 1.5, 80))
+    # a study has one paper and one group
+    places = Places(places.study, places.study % 6, places.study % 12, places.stretch)
+    hierarchy = Hierarchy.from_vector(prior()[0])
+    assert np.linalg.eigvalsh(hierarchy.covariance(places, places)).min() > -1e-8
+    np.testing.assert_array_equal(hierarchy.covariance(places, places), hierarchy.covariance(places, places).T)
+
+
+def test_the_shipped_one_is_at_the_top():
+    """Refitting the corrected literature from where the shipped one stands moves it nowhere."""
+    model = trained()
+    hierarchy, fitted = fit_hierarchy(observations(model.studies), first=model.hierarchy)
+    assert fitted.converged and fitted.condition < 1e12
+    np.testing.assert_allclose(hierarchy.to_vector(), model.hierarchy.to_vector(), atol=0.05)
+
+
+def test_elastography_and_linear_studies_count_once():
+    seen = observations(read_studies("corrected"))
+    counts = np.bincount(seen.places.study)
+    curved = np.array([s.group.startswith("hyperelastic") for s in read_studies("corrected")])
+    assert set(counts[curved]) == {10} and set(counts[~curved]) == {1}
+    assert not np.any(np.abs(seen.places.stretch[seen.places.curved] - 1.0) < 1e-3)
+
+
+def test_secant_modulus_of_a_neo_hookean_solid_is_its_modulus_to_the_last_digit_near_rest():
+    stretches = 1.0 + np.array([-0.4, -1e-3, -1e-6, 1e-6, 0.4])
+    np.testing.assert_allclose(log_secant_modulus(stretches, 700.0 * invariant(stretches)), np.log(700.0), rtol=1e-14)
+    exact = 0.5 * (1e-6**2) * (3 - 2e-6)  # I = 3/2 e^2 - e^3 + ...
+    assert invariant(1.0 + 1e-6) == pytest.approx(exact, rel=1e-9)
+    assert log_energy(np.ones(1), np.zeros(1))[0] == np.log(1e-4)
+
+
+def test_many_studies_that_agree_outweigh_the_prior():
+    studies = tuple(neo_hookean(f"a-Author{2000 + i}", GREY, 700.0) for i in range(12))
+    hierarchy, _ = fit_hierarchy(observations(studies))
+    mean, covariance = Hierarchical(studies, hierarchy).modulus([GREY], np.array([0.95, 1.05]))
+    assert mean == pytest.approx(np.log(700.0), abs=0.05)
+    assert np.sqrt(covariance[0, 0]) < 0.5
+
+
+def test_a_new_group_is_told_by_its_relatives_and_is_less_certain():
+    model = trained()
+    rest = tuple(study for study in model.studies if study.group != WHITE)
+    without = Hierarchical(rest, model.hierarchy)
+    at = np.array([0.95])
+    (known, known_c), (unknown, unknown_c) = (m.modulus([WHITE], at) for m in (model, without))
+    assert unknown_c[0, 0] > known_c[0, 0]
+    assert abs(unknown[0, 0] - known[0, 0]) < 2 * np.sqrt(unknown_c[0, 0])
+
+
+def test_draws_have_the_mean_spread_and_correlation_of_the_model():
+    model, stretches = trained(), np.array([0.85, 0.95, 1.05, 1.15])
+    drawn = np.array([modulus(model, [GREY, WHITE], stretches, number).ravel() for number in range(600)])
+    mean, covariance = model.modulus([GREY, WHITE], stretches)
+    spread = np.sqrt(np.diag(covariance))
+    assert np.all(np.abs(drawn.mean(axis=0) - mean.ravel()) < 4 * spread / np.sqrt(600))
+    np.testing.assert_allclose(drawn.std(axis=0), spread, rtol=0.12)
+    expected = covariance / np.outer(spread, spread)
+    np.testing.assert_allclose(np.corrcoef(drawn.T), expected, atol=0.12)
+    # grey and white matter of one subject go together
+    assert expected[0, 4] > 0.4
+
+
+@pytest.mark.parametrize("kind", ["hierarchical", "coregionalised"])
+def test_a_draw_is_a_function_with_a_number(kind):
+    model, coarse, fine = trained(kind), np.linspace(0.8, 1.2, 5), np.linspace(0.8, 1.2, 81)
+    draw = model.draw([GREY], coarse, 3, seed=5)
+    np.testing.assert_allclose(model.draw([GREY], fine, 3, seed=5)[:, ::20], draw, atol=1e-6)
+    np.testing.assert_array_equal(model.draw([GREY], coarse, 3, seed=5), draw)
+    for other in (model.draw([GREY], coarse, 4, seed=5), model.draw([GREY], coarse, 3, seed=6)):
+        assert np.abs(other - draw).max() > 1e-3
+    assert np.abs(model.draw([GREY], coarse, (3, 1), seed=5) - draw).max() > 1e-3
+
+
+@pytest.mark.parametrize("group", ["MRE/grey matter", GREY, "hyperelastic/brain"])
+def test_far_from_the_data_it_is_neo_hookean_and_finite(group):
+    """Supplement Fig. 4: the energy keeps growing beyond the stretches that were measured."""
+    model = trained()
+    stretches = np.array([0.05, 0.1, 0.2, 4.0, 8.0, 16.0])
+    for k in (-2.0, 0.0, 2.0):
+        curve = model.curve(group, stretches, k)
+        assert np.isfinite(curve).all()
+        assert np.all(np.diff(curve[:3]) < 0.0) and np.all(np.diff(curve[3:]) > 0.0)
+        z = np.log((np.exp(curve) - 1e-4) / invariant(stretches))
+        np.testing.assert_allclose(z[3:], z[5], atol=1e-3)
+    drawn = np.array([modulus(model, [group], stretches, number) for number in range(20)])
+    assert np.isfinite(drawn).all()
+
+
+def test_the_overall_level_is_not_pulled_to_the_centre():
+    """It is only where the search begins: studies of another modulus decide."""
+    studies = tuple(neo_hookean(f"a-Author{2000 + i}", GREY, 4e4) for i in range(6))
+    hierarchy, _ = fit_hierarchy(observations(studies))
+    mean, _ = Hierarchical(studies, hierarchy).modulus([GREY], np.array([0.95]))
+    assert mean[0, 0] == pytest.approx(np.log(4e4), abs=0.15) and np.exp(CENTRE) == pytest.approx(1500.0)

@@ -1,0 +1,85 @@
+"""Scores of models on studies that they have not seen."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from warpbrain.gp.candidates import OF_CURVES, CoregionalisedCandidate, HierarchicalCandidate, Prediction, candidates
+from warpbrain.gp.hierarchy import EFFECTS
+from warpbrain.gp.leaving_out import leave_out
+from warpbrain.gp.literature.studies import read_studies
+from warpbrain.gp.literature.study import Study
+
+GREY = "hyperelastic/grey matter"
+SOME = [s for s in read_studies("corrected") if s.group in (GREY, "MRE/grey matter", "linear/brain")][::2]
+
+
+class Knows:
+    """Predicts that a study is one of 1000 Pa, and notes what it was fitted to."""
+
+    name = "knows"
+
+    def __init__(self):
+        self.seen = []
+
+    def fitted(self, studies):
+        self.seen.append([study.name for study in studies])
+        return self
+
+    def predict(self, study, stretches):
+        assert study.name not in self.seen[-1]
+        assert np.all(stretches != 1.0)
+        error = np.full(len(stretches), study.shear_moduli[0] - 1000.0)
+        return Prediction(norm.logpdf(error), error, error)
+
+
+def flat(name, mu):
+    return Study(name, GREY, "neo-hookean", {"mu": mu}, {"mu": mu}, (0.9, 1.1))
+
+
+def test_scores_are_means_over_studies_or_papers():
+    studies = [flat("A-One2001", 1000.0), flat("B-One2001", 1000.0), flat("C-Two2002", 1002.0)]
+    by_study = leave_out(Knows(), studies, "study")
+    assert by_study.values == pytest.approx((norm.logpdf(0), norm.logpdf(0), norm.logpdf(2.0)))
+    assert by_study.log_density == pytest.approx(np.mean(by_study.values))
+    assert by_study.rms_error == pytest.approx(np.sqrt(4 / 3))
+    by_paper = leave_out(Knows(), studies, "paper")
+    assert by_paper.values == pytest.approx((norm.logpdf(0), norm.logpdf(2.0)))
+    assert by_paper.coverage_50 == pytest.approx(2 / 3) and by_paper.coverage_95 == pytest.approx(2 / 3)
+
+
+def test_a_paper_is_left_out_with_all_its_studies():
+    knows = Knows()
+    leave_out(knows, [flat("A-One2001", 1.0), flat("B-One2001", 1.0), flat("C-Two2002", 1.0)], "paper")
+    assert knows.seen[1:] == [["C-Two2002"], ["A-One2001", "B-One2001"]]
+
+
+@pytest.mark.parametrize(
+    "candidate",
+    [
+        CoregionalisedCandidate("one a group", separate=True),
+        CoregionalisedCandidate("with a mean", mean_modulus=1500.0),
+        HierarchicalCandidate("hierarchical"),
+        HierarchicalCandidate("moduli only", without=OF_CURVES),
+    ],
+    ids=lambda candidate: candidate.name,
+)
+def test_candidates_predict_densities_that_integrate_to_one(candidate):
+    """The density of a log energy at one stretch, over all moduli that the study might have had."""
+    fitted = candidate.fitted(SOME)
+    moduli = np.exp(np.linspace(-30.0, 45.0, 6001))
+    at = np.array([1.06])
+    energies = np.log([flat("x", mu).energy(at)[0] + 1e-4 for mu in moduli])
+    density = np.exp([fitted.predict(flat("x", mu), at).log_density[0] for mu in moduli])
+    # the log energy has a floor, ln 1e-4, that a normal density of it does not know
+    assert np.trapezoid(density, energies) == pytest.approx(1.0, abs=0.01)
+
+
+def test_candidates_lack_what_they_should():
+    assert set(OF_CURVES) <= set(EFFECTS)
+    separate = CoregionalisedCandidate("one a group", separate=True).fitted(SOME)
+    assert not separate.model.parameters.w.any()
+    flat_only = HierarchicalCandidate("moduli only", without=OF_CURVES).fitted(SOME)
+    assert all(flat_only.model.hierarchy.spread[name] == pytest.approx(1e-6) for name in OF_CURVES)
+    names = [candidate.name for candidate in candidates()]
+    assert len(set(names)) == len(names) >= 10

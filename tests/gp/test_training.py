@@ -1,0 +1,74 @@
+"""Training of the coregionalised process: what it finds, and what it says of the way."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from published_process import OBJECTIVE
+
+from warpbrain.errors import SolveError
+from warpbrain.gp.likelihood import Likelihood
+from warpbrain.gp.parameters import TASKS, Parameters
+from warpbrain.gp.replicates import Replicates
+from warpbrain.gp.trained import trained
+from warpbrain.gp.training import climb, start, train
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    """Three groups drawn from a known process: two share a curve, the third goes its own way."""
+    random = np.random.default_rng(4)
+    x = np.repeat(np.linspace(0.8, 1.2, 30), 4)
+    task = np.repeat([0, 4, 10], len(x))
+    stretch = np.tile(x, 3)
+    w, kappa, noise = np.ones(TASKS), np.full(TASKS, 0.1), np.full(TASKS, 0.01)
+    w[10], kappa[10] = 1e-3, 4.0
+    parameters = Parameters(0.2, 3.0 * w, kappa, noise)
+    r = np.sqrt(3.0) * np.abs(stretch[:, None] - stretch) / 0.2
+    K = parameters.coregionalisation[np.ix_(task, task)] * (1 + r) * np.exp(-r)
+    y = np.linalg.cholesky(K + 1e-10 * np.eye(len(K))) @ random.normal(size=len(K)) + 0.1 * random.normal(size=len(K))
+    return Replicates.of(task, stretch, y), parameters
+
+
+def test_it_ends_at_least_as_well_as_the_truth_and_without_a_slope(drawn):
+    data, truth = drawn
+    told = []
+    training = train(data, step=2, progress=lambda part, said: told.append(part))
+    best = training.best
+    assert best.converged and best.value < Likelihood(data).value(truth)
+    assert best.gradient < 0.3 and best.gain < 1e-2 and 1.0 < best.condition < 1e12
+    assert best.parameters.noise[[0, 4, 10]] == pytest.approx(0.01, rel=0.3)
+    assert {one.apart for one in training.starts} == {None, 0, 4, 10}
+    values = [one.climb.value for one in training.starts]
+    assert values == sorted(values)
+    assert told == sorted(told) and told[0] >= 0.0 and told[-1] <= 1.0
+
+
+def test_a_climb_goes_down_only(drawn):
+    data, _ = drawn
+    values = []
+    climb(Likelihood(data, jitter=1e-8), start(data), 1e-2, 50, lambda iteration, value: values.append(value))
+    assert all(after <= before for before, after in pairwise(values))
+
+
+def test_that_nothing_can_be_factored_is_said():
+    x = np.linspace(0.9, 1.1, 50)
+    data = Replicates.of(np.zeros(50, dtype=int), x, np.zeros(50))
+    with pytest.raises(SolveError, match="not positive definite in double precision"):
+        train(data, "squared-exponential", jitter=-1.0)
+
+
+def test_the_shipped_process_is_at_least_as_likely_as_the_published_one():
+    model = trained("coregionalised", "as_published")
+    data, factored = model._seen
+    assert data.count.sum() == 7300 and model.jitter == 1e-8
+    value = Likelihood(data, jitter=model.jitter).value(model.parameters)
+    assert value < OBJECTIVE
+    assert value == pytest.approx(7093.15, abs=0.1)
+    assert 1e14 < factored.condition < 1e16
+
+
+@pytest.mark.slow
+def test_training_from_scratch_reaches_the_published_likelihood():
+    data, _ = trained("coregionalised", "as_published")._seen
+    assert train(data).best.value < OBJECTIVE

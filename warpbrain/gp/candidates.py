@@ -1,0 +1,177 @@
+"""Models that are compared by what they say of studies they have not seen.
+
+Every candidate predicts the log energies `y = ln(Psi + 1e-4)` of a study of a group, at any stretch, one by one. The
+coregionalised ones learn from 20 points a study here, not 100, so that each can be trained again for every study that
+is left out; each training goes on from the one on all studies. A group of which the only study is left out keeps the
+parameters that it had with it: a favour to these models, which could not predict it otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.gp.coregionalised import Coregionalised, training_points
+from warpbrain.gp.hierarchical import Hierarchical, fit_hierarchy
+from warpbrain.gp.hierarchy import CENTRE
+from warpbrain.gp.likelihood import Likelihood
+from warpbrain.gp.literature.dataset import OFFSET
+from warpbrain.gp.literature.study import Study
+from warpbrain.gp.observations import observations
+from warpbrain.gp.parameters import TASKS
+from warpbrain.gp.secant import invariant
+from warpbrain.gp.training import JITTER, climb, start, train
+
+Floats = NDArray[np.float64]
+
+#: Of each study, for the coregionalised candidates.
+POINTS = 20
+#: Effects that a hierarchical candidate can lack.
+OF_PAPERS = ("paper", "curve, paper", "asymmetry, paper")
+OF_CURVES = ("curve", "curve, anatomy", "curve, paper", "curve, study", "asymmetry, paper", "asymmetry, study")
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Of one study that was left out.
+
+    Attributes
+    ----------
+    log_density : (n,) array
+        Of its log energies, each by itself [nats].
+    deviation : (n,) array
+        How many standard deviations it is from the mean.
+    error : (n,) array
+        Log energy minus predicted mean.
+    """
+
+    log_density: Floats
+    deviation: Floats
+    error: Floats
+
+
+class Candidate(Protocol):
+    """A kind of model, fitted or not."""
+
+    @property
+    def name(self) -> str:
+        """What it is, in a few words."""
+        ...
+
+    def fitted(self, studies: Sequence[Study]) -> Candidate:
+        """The same kind fitted to studies, from where it stands."""
+        ...
+
+    def predict(self, study: Study, stretches: Floats) -> Prediction:
+        """What it says of a study that it was not fitted to."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class CoregionalisedCandidate:
+    """The paper's process, or one like it.
+
+    Attributes
+    ----------
+    name, kernel : str
+    mean_modulus : float
+        See `Coregionalised`.
+    separate : bool
+        Groups share nothing but a length scale.
+    model : Coregionalised or None
+        None before the first fit.
+    """
+
+    name: str
+    kernel: str = "matern32"
+    mean_modulus: float = 0.0
+    separate: bool = False
+    model: Coregionalised | None = None
+
+    def fitted(self, studies: Sequence[Study]) -> CoregionalisedCandidate:
+        """See `Candidate`."""
+        data = training_points(studies, self.mean_modulus, POINTS)
+        likelihood = Likelihood(data, self.kernel, JITTER)
+        if self.model is not None:
+            parameters = climb(likelihood, self.model.parameters, 1e-2, 60).parameters
+        elif self.separate:
+            # no gradient leads away from w = 0
+            apart = replace(start(data), w=np.zeros(TASKS), kappa=np.full(TASKS, 1e2))
+            parameters = climb(likelihood, apart, 1e-3, 300).parameters
+        else:
+            parameters = train(data, self.kernel, step=1, gain=1e-3).best.parameters
+        model = Coregionalised(tuple(studies), parameters, "", self.kernel, JITTER, self.mean_modulus, POINTS)
+        return replace(self, model=model)
+
+    def predict(self, study: Study, stretches: Floats) -> Prediction:
+        """See `Candidate`."""
+        assert self.model is not None
+        mean, spread = self.model.log_energy(study.group, stretches)
+        error = np.log(study.energy(stretches) + OFFSET) - mean
+        return Prediction(_normal(error, spread), error / spread, error)
+
+
+@dataclass(frozen=True, eq=False)
+class HierarchicalCandidate:
+    """The hierarchical model, or one that lacks some of its effects.
+
+    Attributes
+    ----------
+    name, kernel : str
+    without : tuple of str
+        Effects that it lacks.
+    hierarchy : Hierarchy or None
+        None before the first fit.
+    model : Hierarchical or None
+    """
+
+    name: str
+    kernel: str = "matern52"
+    without: tuple[str, ...] = ()
+    model: Hierarchical | None = None
+
+    def fitted(self, studies: Sequence[Study]) -> HierarchicalCandidate:
+        """See `Candidate`."""
+        first = None if self.model is None else self.model.hierarchy
+        hierarchy, _ = fit_hierarchy(observations(studies), self.kernel, first, self.without)
+        return replace(self, model=Hierarchical(tuple(studies), hierarchy, ""))
+
+    def predict(self, study: Study, stretches: Floats) -> Prediction:
+        """See `Candidate`."""
+        assert self.model is not None
+        means, covariance = self.model.modulus([study.group], stretches)
+        spread = np.sqrt(np.diag(covariance))
+        energy, core = study.energy(stretches), invariant(stretches)
+        error = np.log(energy / core) - means[0]
+        # the density of y = ln(Psi + 1e-4) is that of z = ln(Psi / I) times dz/dy
+        slope = np.log((energy + OFFSET) / energy)
+        away = np.log(energy + OFFSET) - np.log(core * np.exp(means[0]) + OFFSET)
+        return Prediction(_normal(error, spread) + slope, error / spread, away)
+
+
+def candidates() -> tuple[Candidate, ...]:
+    """All that are compared, the paper's first."""
+    modulus = float(np.exp(CENTRE))
+    neo_hookean = "neo-Hookean mean"
+    return (
+        CoregionalisedCandidate("coregionalised (the paper's)"),
+        CoregionalisedCandidate("coregionalised, Matern 1/2", "matern12"),
+        CoregionalisedCandidate("coregionalised, Matern 5/2", "matern52"),
+        CoregionalisedCandidate("coregionalised, squared exponential", "squared-exponential"),
+        CoregionalisedCandidate(f"coregionalised, {neo_hookean}", mean_modulus=modulus),
+        CoregionalisedCandidate("one process a group", separate=True),
+        CoregionalisedCandidate(f"one process a group, {neo_hookean}", mean_modulus=modulus, separate=True),
+        HierarchicalCandidate("hierarchical (the default)"),
+        HierarchicalCandidate("hierarchical, Matern 3/2", "matern32"),
+        HierarchicalCandidate("hierarchical, squared exponential", "squared-exponential"),
+        HierarchicalCandidate("hierarchical, papers not told apart", without=OF_PAPERS),
+        HierarchicalCandidate("hierarchical, moduli only", without=OF_CURVES),
+    )
+
+
+def _normal(error: Floats, spread: Floats) -> Floats:
+    return -0.5 * (error / spread) ** 2 - np.log(spread) - 0.5 * np.log(2.0 * np.pi)

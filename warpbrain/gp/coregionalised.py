@@ -1,0 +1,150 @@
+"""The paper's process: twelve groups of log energies that share one curve, with noise at every stretch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.gp.drawing import Anchored, standard_normal
+from warpbrain.gp.kernels import KERNELS
+from warpbrain.gp.likelihood import Factored, Likelihood
+from warpbrain.gp.literature.dataset import dataset
+from warpbrain.gp.literature.groups import GROUPS, task_of
+from warpbrain.gp.literature.study import Study
+from warpbrain.gp.parameters import Parameters
+from warpbrain.gp.replicates import Replicates
+from warpbrain.gp.secant import log_energy
+
+Floats = NDArray[np.float64]
+
+#: Stretches at which draws are drawn; between them they are the mean given these values.
+ANCHORS = np.linspace(0.4, 1.8, 141)
+
+
+@dataclass(frozen=True, eq=False)
+class Coregionalised:
+    """The coregionalised process of a set of studies (a `warpbrain.gp.process.Process`).
+
+    Attributes
+    ----------
+    studies : tuple of Study
+    parameters : Parameters
+    variant : str
+        Of the literature.
+    kernel : str
+        One of `warpbrain.gp.kernels.KERNELS`.
+    jitter : float
+        Variance added to the diagonal of the covariance.
+    mean_modulus : float
+        Shear modulus [Pa] of the neo-Hookean energy that is its mean; 0 for the paper's mean of zero.
+    points : int
+        How many points of each study it learns from.
+    """
+
+    studies: tuple[Study, ...]
+    parameters: Parameters
+    variant: str = "as_published"
+    kernel: str = "matern32"
+    jitter: float = 1e-8
+    mean_modulus: float = 0.0
+    points: int = 100
+    name = "coregionalised"
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Groups that it has seen studies of."""
+        seen = {study.group for study in self.studies}
+        return tuple(group for group in GROUPS if group in seen)
+
+    def log_energy(self, group: str, stretches: ArrayLike) -> tuple[Floats, Floats]:
+        """Mean and standard deviation (n,) of `ln(Psi + 1e-4)`, the noise of the group included, as in the paper."""
+        l = np.asarray(stretches, dtype=np.float64)
+        mean, covariance = self._predict([group], l, l)
+        variance = np.diag(covariance) + self.parameters.noise[task_of(group)]
+        return mean, np.sqrt(np.maximum(variance, 0.0))
+
+    def curve(self, group: str, stretches: ArrayLike, k: float = 0.0) -> Floats:
+        """The curve `k` standard deviations from the mean, see `Process`."""
+        mean, spread = self.log_energy(group, stretches)
+        return mean + k * spread
+
+    def draw(self, groups: Sequence[str], stretches: ArrayLike, number: int | tuple[int, ...], seed: int = 0) -> Floats:
+        """Draw `number` of a seed, see `Process`.
+
+        The noise of a group is one number a curve: it stands for what studies differ by, and moves a whole curve as the
+        paper's `k` does. Independent noise at every stretch would be no function.
+        """
+        l = np.asarray(stretches, dtype=np.float64)
+        anchored = self._anchored(tuple(groups))
+        normal = standard_normal(len(anchored.mean) + len(groups), number, seed)
+        mean, cross = self._from_anchors(tuple(groups), l)
+        latent = (mean + cross @ anchored.weights(normal[len(groups) :])).reshape(len(groups), -1)
+        noise = np.sqrt(self.parameters.noise[[task_of(group) for group in groups]])
+        return latent + (noise * normal[: len(groups)])[:, None]
+
+    def _anchored(self, groups: tuple[str, ...]) -> Anchored:
+        if groups not in self._drawn:
+            self._drawn[groups] = Anchored(*self._predict(groups, ANCHORS, ANCHORS))
+        return self._drawn[groups]
+
+    def _from_anchors(self, groups: tuple[str, ...], stretches: Floats) -> tuple[Floats, Floats]:
+        """Mean and covariance with the anchors; the last ones are kept, for many draws at the same stretches."""
+        key = groups, stretches.tobytes()
+        if key not in self._last:
+            self._last.clear()
+            self._last[key] = self._predict(groups, stretches, ANCHORS)
+        return self._last[key]
+
+    @cached_property
+    def _drawn(self) -> dict[tuple[str, ...], Anchored]:
+        return {}
+
+    @cached_property
+    def _last(self) -> dict[tuple[tuple[str, ...], bytes], tuple[Floats, Floats]]:
+        return {}
+
+    def _predict(self, groups: Sequence[str], at: Floats, other: Floats) -> tuple[Floats, Floats]:
+        """Mean of the shared curve at (groups * n,) and covariance with other stretches, given the studies."""
+        from scipy.linalg import solve_triangular
+
+        data, factored = self._seen
+        tasks = np.array([task_of(group) for group in groups], dtype=np.int64)
+
+        def places(stretches: Floats) -> tuple[NDArray[np.int64], Floats]:
+            return np.repeat(tasks, len(stretches)), np.tile(stretches, len(tasks))
+
+        here, there = places(at), places(other)
+        k = self._covariance((data.task, data.x), here)
+        whitened = solve_triangular(factored.cholesky, k, lower=True)
+        if other is at:
+            to = whitened
+        else:
+            to = solve_triangular(factored.cholesky, self._covariance((data.task, data.x), there), lower=True)
+        mean = prior_mean(here[1], self.mean_modulus) + k.T @ factored.weights
+        return mean, self._covariance(here, there) - whitened.T @ to
+
+    def _covariance(self, a: tuple[NDArray[np.int64], Floats], b: tuple[NDArray[np.int64], Floats]) -> Floats:
+        distance = np.abs(a[1][:, None] - b[1][None, :])
+        k = KERNELS[self.kernel](distance, self.parameters.length_scale)[0]
+        return self.parameters.coregionalisation[np.ix_(a[0], b[0])] * k
+
+    @cached_property
+    def _seen(self) -> tuple[Replicates, Factored]:
+        data = training_points(self.studies, self.mean_modulus, self.points)
+        return data, Likelihood(data, self.kernel, self.jitter).factor(self.parameters)
+
+
+def training_points(studies: Sequence[Study], mean_modulus: float = 0.0, count: int = 100) -> Replicates:
+    """What the process learns from: `count` log energies of each study minus their prior mean, replicates reduced."""
+    points = dataset(studies, count)
+    away = points.log_energy - prior_mean(points.stretch, mean_modulus)
+    return Replicates.of(points.task, points.stretch, away)
+
+
+def prior_mean(stretches: Floats, modulus: float) -> Floats:
+    """Log energy (n,) of a neo-Hookean solid of a shear modulus [Pa], or zero for none."""
+    return log_energy(stretches, np.log(modulus)) if modulus else np.zeros_like(stretches)

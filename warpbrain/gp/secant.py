@@ -1,0 +1,31 @@
+"""The secant shear modulus: a strain energy seen as the neo-Hookean one of the same value.
+
+On the incompressible uniaxial path a neo-Hookean solid has `Psi = mu I(l)`, `I(l) = (l^2 + 2/l - 3) / 2`. Dividing any
+other energy by `I` leaves `mu(l)`, smooth through `l = 1`, where energies vanish and their logarithms do not exist. Its
+logarithm `z` is what the hierarchical model describes: constant for a neo-Hookean solid, curved for one that stiffens.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.gp.literature.dataset import OFFSET
+
+Floats = NDArray[np.float64]
+
+
+def invariant(stretches: ArrayLike) -> Floats:
+    """`I(l) = (l^2 + 2/l - 3) / 2`, in the form `(l - 1)^2 (l + 2) / (2 l)` that keeps all digits near 1."""
+    l = np.asarray(stretches, dtype=np.float64)
+    return 0.5 * (l - 1.0) ** 2 * (l + 2.0) / l
+
+
+def log_secant_modulus(stretches: ArrayLike, energies: ArrayLike) -> Floats:
+    """`z = ln(Psi / I)` with moduli in Pa, at stretches other than 1."""
+    return np.log(np.asarray(energies, dtype=np.float64) / invariant(stretches))
+
+
+def log_energy(stretches: ArrayLike, log_modulus: ArrayLike) -> Floats:
+    """`y = ln(Psi + 1e-4)`, as the paper trains on it, of `z`; any stretches > 0."""
+    return np.log(invariant(stretches) * np.exp(np.asarray(log_modulus, dtype=np.float64)) + OFFSET)

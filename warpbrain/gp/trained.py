@@ -1,0 +1,161 @@
+"""Trained models: those that ship, and those of a user.
+
+A model is a folder with `model.json`, which holds the parameters, the variant of the literature they are of and how
+they were found, and with `studies.toml`, the studies that a user added, if any. Factors are computed when they are
+first needed.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from warpbrain.atomic import whole_file
+from warpbrain.errors import InputError
+from warpbrain.gp.coregionalised import Coregionalised
+from warpbrain.gp.hierarchical import Hierarchical
+from warpbrain.gp.hierarchy import EFFECTS, Hierarchy
+from warpbrain.gp.kernels import KERNELS
+from warpbrain.gp.literature.studies import VARIANTS, Variant, read_studies
+from warpbrain.gp.parameters import TASKS, Parameters
+from warpbrain.gp.process import Process
+from warpbrain.values import finite
+
+Kind = Literal["hierarchical", "coregionalised"]
+#: Kinds of models, the default first.
+KINDS: tuple[Kind, ...] = ("hierarchical", "coregionalised")
+
+MODEL, STUDIES = "model.json", "studies.toml"
+
+
+@cache
+def trained(kind: Kind = "hierarchical", variant: Variant = "corrected") -> Process:
+    """A model that ships.
+
+    Raises
+    ------
+    InputError
+        If there is no such kind or variant.
+
+    Examples
+    --------
+    >>> trained().groups[0]
+    'MRE/grey matter'
+    """
+    for name, value, known in (("kind", kind, KINDS), ("variant", variant, VARIANTS)):
+        if value not in known:
+            raise InputError(f"{name} {value!r}: expected one of {', '.join(known)}")
+    with as_file(files("warpbrain.gp") / "models" / f"{kind}-{variant}") as folder:
+        return read_model(folder)
+
+
+def find_model(name: str | Path, variant: Variant = "corrected") -> Process:
+    """A model that ships, by its kind, or one of a user's, by its folder."""
+    if name in KINDS:
+        return trained(name, variant)
+    if not Path(name).exists():
+        raise InputError(
+            f"{name}: no such generative model: expected {', '.join(KINDS)} or a folder of warpbrain gp fit"
+        )
+    return read_model(Path(name))
+
+
+def read_model(folder: Path) -> Process:
+    """A model that was written by `write_model`.
+
+    Raises
+    ------
+    InputError
+        With file and key, if something is missing or is not what it should be.
+    """
+    path = folder / MODEL
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from None
+    except json.JSONDecodeError as error:
+        raise InputError(f"{path}: not JSON ({error})") from None
+    if not isinstance(table, dict):
+        raise InputError(f"{path}: found {type(table).__name__}, expected a table")
+    kind = _choice(path, table, "kind", KINDS)
+    variant: Variant = _choice(path, table, "variant", VARIANTS)
+    kernel = _choice(path, table, "kernel", tuple(KERNELS))
+    added = folder / STUDIES
+    studies = read_studies(variant, added if added.exists() else None)
+    given = table.get("parameters")
+    if not isinstance(given, dict):
+        raise InputError(f"{path}: parameters: expected a table")
+    if kind == "hierarchical":
+        spread = {name: _positive(path, given, name) for name in EFFECTS}
+        hierarchy = Hierarchy(spread, _positive(path, given, "length scale"), kernel)
+        return Hierarchical(studies, hierarchy, variant)
+    arrays = {name: _numbers(path, given, name) for name in ("w", "kappa", "noise")}
+    try:
+        parameters = Parameters(_positive(path, given, "length scale"), **arrays)
+    except InputError as error:
+        raise InputError(f"{path}: parameters: {error}") from None
+    return Coregionalised(studies, parameters, variant, kernel, _positive(path, given, "jitter"))
+
+
+def write_model(folder: Path, model: Process, record: dict[str, Any], added: Path | None = None) -> None:
+    """Write a model with the record of its training, and the user's studies if any.
+
+    Parameters
+    ----------
+    folder : Path
+        Is there already.
+    model : Hierarchical or Coregionalised
+    record : dict
+        What JSON can hold.
+    added : Path, optional
+    """
+    if isinstance(model, Hierarchical):
+        hierarchy = model.hierarchy
+        parameters: dict[str, Any] = {**hierarchy.spread, "length scale": hierarchy.length_scale}
+        kernel = hierarchy.kernel
+    elif isinstance(model, Coregionalised):
+        own = model.parameters
+        parameters = {"length scale": own.length_scale, "jitter": model.jitter}
+        parameters |= {name: getattr(own, name).tolist() for name in ("w", "kappa", "noise")}
+        kernel = model.kernel
+    else:
+        raise TypeError(f"{type(model).__name__} is not a model that can be written")
+    table = {
+        "kind": model.name,
+        "variant": model.variant,
+        "kernel": kernel,
+        "parameters": parameters,
+        "training": record,
+    }
+    # the studies first: a model without them would be another one
+    if added is not None:
+        text = added.read_text(encoding="utf-8")
+        with whole_file(folder / STUDIES) as path:
+            path.write_text(text, encoding="utf-8")
+    with whole_file(folder / MODEL) as path:
+        path.write_text(json.dumps(table, indent=2) + "\n", encoding="utf-8")
+
+
+def _choice(path: Path, table: dict[str, Any], key: str, known: tuple[Any, ...]) -> Any:
+    if table.get(key) not in known:
+        raise InputError(f"{path}: {key} = {table.get(key)!r}: expected one of {', '.join(known)}")
+    return table[key]
+
+
+def _positive(path: Path, table: dict[str, Any], key: str) -> float:
+    value = table.get(key)
+    if value is None or not finite(value) or not value > 0.0:
+        raise InputError(f"{path}: parameters: {key} = {value!r}: expected a positive number")
+    return float(value)
+
+
+def _numbers(path: Path, table: dict[str, Any], key: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    values = table.get(key)
+    if not isinstance(values, list) or len(values) != TASKS or not all(map(finite, values)):
+        raise InputError(f"{path}: parameters: {key}: expected {TASKS} finite numbers")
+    return np.array(values, dtype=np.float64)
