@@ -1,10 +1,16 @@
 """The stability conditions of the supplement's Table 2."""
 
+import re
+from dataclasses import replace
+
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from material_point import LAWS
 
 from warpbrain.errors import InputError
-from warpbrain.physics.laws import Law, MooneyRivlin, NeoHookean, Ogden
+from warpbrain.physics.laws import FORMULATIONS, Law, MooneyRivlin, NeoHookean, Ogden
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 
 
@@ -43,3 +49,127 @@ def test_a_law_that_softens_is_refused() -> None:
     """Ogden with 0 < alpha < 1: the energy is convex at rest, then bends over in tension."""
     with pytest.raises(UnstableLawError, match="d2Psi/dl2 is not positive"):
         require_stable(Ogden((2000.0 / 0.5,), (0.5,)))
+
+
+# -- stable and unstable functions, as in the supplement's Fig. 2 -------------------------------------------------
+
+
+def first_stretch(caught: pytest.ExceptionInfo[UnstableLawError]) -> float:
+    """The stretch that a message names."""
+    found = re.search(r" l = ([\d.]+)", str(caught.value))
+    assert found
+    return float(found[1])
+
+
+def ogden(alpha: float, shear_modulus: float = 1000.0) -> Ogden:
+    return Ogden((2.0 * shear_modulus / alpha,), (alpha,))
+
+
+@given(alpha=st.one_of(st.floats(1.05, 50.0), st.floats(-50.0, -2.1)), modulus=st.floats(1e-2, 1e7))
+def test_ogden_is_stable_outside_a_band_of_exponents(alpha: float, modulus: float) -> None:
+    require_stable(ogden(alpha, modulus))
+
+
+@given(alpha=st.one_of(st.floats(-1.95, -0.01), st.floats(0.01, 1.0)))
+def test_ogden_is_unstable_in_a_band_of_exponents(alpha: float) -> None:
+    """`-2 <= alpha <= 1`, which the paper's search leaves out but for 0.1 to 1: the slope has a ceiling or falls."""
+    with pytest.raises(UnstableLawError, match=r"d2Psi/dl2 is not positive|the slope does not grow"):
+        require_stable(ogden(alpha))
+
+
+@given(C1=st.floats(1e-2, 1e5), C2=st.floats(1e-2, 1e5))
+def test_mooney_rivlin_of_positive_coefficients_is_stable(C1: float, C2: float) -> None:
+    require_stable(MooneyRivlin(C1, C2))
+
+
+def test_a_published_set_that_is_unstable() -> None:
+    """Basal ganglia in tension (Budday 2017), C1 and C2 exchanged as in the paper's source: good where it was fitted.
+
+    The curvature `2 C1 (1 + 2 l^-3) + C2 6 l^-4` turns at l = 3.5, the slope farther out.
+    """
+    C1, C2 = -5.0, 290.0
+    l = np.linspace(1.0, 10.0, 100001)
+    turns = l[np.argmax(2.0 * C1 * (1.0 + 2.0 * l**-3) + 6.0 * C2 * l**-4 <= 0.0)]
+    with pytest.raises(UnstableLawError, match="d2Psi/dl2 is not positive") as caught:
+        require_stable(MooneyRivlin(C1, C2))
+    assert first_stretch(caught) == pytest.approx(turns, rel=0.02)
+    require_stable(MooneyRivlin(C2, -C1))
+
+
+# -- in three dimensions ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("poisson", [0.3, 0.4, 0.45, 0.49, 0.4999])
+@pytest.mark.parametrize(
+    "law",
+    [*LAWS.values(), MooneyRivlin(500.0, 0.1), *(ogden(a) for a in (1.1, 2.0, 8.0, 50.0, -2.1, -3.0, -10.0, -50.0))],
+    ids=str,
+)
+def test_usual_laws_are_stable_in_space(law: Law, poisson: float, formulation: str) -> None:
+    require_stable(law, poisson, formulation)
+
+
+@pytest.mark.parametrize("alpha", [-2.1, -4.7, -8.0])
+def test_softening_in_confined_tension(alpha: float) -> None:
+    """What the path does not show: `- sum mu_p ln J` is concave where the coefficients are negative."""
+    law = ogden(alpha)
+    require_stable(law, 0.45)
+    require_stable(law, 0.2, "uncoupled")
+    expected = (
+        r"coupled, at the Poisson ratio 0.2 is unstable at the stretch l = 1.[89]\d? along \(l, 1, 1\): d2Psi/dl2"
+    )
+    with pytest.raises(UnstableLawError, match=expected):
+        require_stable(law, 0.2)
+
+
+def test_softening_in_confined_tension_by_the_formula() -> None:
+    """The first stretch that is named is where the curvature, written out, turns."""
+    alpha, nu = -4.7, 0.2
+    mu, lam = 2.0 / alpha, 2.0 * nu / (1.0 - 2.0 * nu)
+
+    def curvature(l: float) -> float:
+        return mu * (alpha - 1.0) * l ** (alpha - 2.0) + (mu + lam * (1.0 - np.log(l))) / l**2
+
+    l = np.linspace(1.0, 2.0, 2001)
+    turns = l[np.argmax(curvature(l) <= 0.0)]
+    with pytest.raises(UnstableLawError) as caught:
+        require_stable(ogden(alpha, 1.0), nu)
+    assert first_stretch(caught) == pytest.approx(turns, rel=0.02)
+
+
+class Soft(MooneyRivlin):
+    """A law whose volumetric modulus has the wrong sign: no Poisson ratio in (-1, 1/2) does this to ours."""
+
+    def volumetric_modulus(self, poisson: float, formulation: str) -> float:
+        return -1000.0
+
+
+def test_softening_in_volume() -> None:
+    with pytest.raises(UnstableLawError, match=r"unstable in \w+ along \(l, 1, 1\)"):
+        require_stable(Soft(300.0, 200.0), 0.45, "uncoupled")
+
+
+class Stressed(NeoHookean):
+    """Energy at rest."""
+
+    def energy(self, stretches: np.ndarray) -> np.ndarray:
+        return super().energy(stretches) + 1.0
+
+
+def test_energy_at_rest() -> None:
+    with pytest.raises(UnstableLawError, match="is not at rest at l = 1: energy 1 Pa, slope"):
+        require_stable(Stressed(1000.0))
+
+
+@given(factor=st.floats(1e-3, 1e3))
+def test_units_do_not_matter(factor: float) -> None:
+    """A law and the same one stiffer fail alike."""
+    law = MooneyRivlin(300.0, -100.0)
+    other = replace(law, C1=factor * law.C1, C2=factor * law.C2)
+    said = []
+    for one in (law, other):
+        with pytest.raises(UnstableLawError) as caught:
+            require_stable(one)
+        said.append(str(caught.value).removeprefix(repr(one)))
+    assert said[0] == said[1]

@@ -1,9 +1,22 @@
 """Is a set of parameters stable? The conditions of the supplement's Table 2, checked before a law is used.
 
 They are read on the incompressible uniaxial path `(l, l^-1/2, l^-1/2)` of supplement eq. (2), on which the laws are
-fitted and compared in the paper: at rest no energy and no stress; `dPsi/dl` negative in compression and positive in
-tension; `d2Psi/dl2 > 0` throughout; energy and slope growing without bound at both ends. At rest the volumetric part
-adds `mu0 > 0` and `-1 < nu < 1/2`, which the laws check themselves.
+fitted and compared in the paper: no energy and no stress at rest; `dPsi/dl` negative in compression and positive in
+tension; `d2Psi/dl2 > 0` throughout; energy and slope growing without bound at both ends.
+
+They are read in three dimensions too, with the volumetric part, until the volume has doubled or halved: along uniaxial
+strain `(l, 1, 1)`, where `d2Psi/dl2` is the table's `d2Psi/dl_1^2`, and along dilation `(l, l, l)`. The Hessian at rest
+has `a` on its diagonal and `b` beside it, so its eigenvalues are `a - b` and `a + 2 b`: two thirds of the curvature at
+rest along the first path and a third of that along dilation. If both are positive, it is positive definite.
+
+Farther out the table cannot hold, by construction of the volumetric parts. `lam/2 (ln J)^2` is concave from `J = e` on:
+along `(l, 1, 1)` one-term Ogden laws with negative exponents lose convexity at `l` = 2.1 to 2.6 if the Poisson ratio is
+0.3, at 2.6 to 2.7 if it is 0.45, and nearly every law does at 2.72 if it is 0.4999. `K/2 (l^3 - 1)^2` is concave in `l`
+below `J = 2/5`. For `J` from 1/2 to 2 the table holds for neo-Hookean, Mooney-Rivlin with positive coefficients (unless
+`lam` is negative, see below), and one-term Ogden laws with exponents above 1 or below -2, to 50 each way, at Poisson
+ratios from 0.3 to 0.4999; at smaller ones coupled Ogden laws with negative exponents soften, and are refused.
+
+A negative `lam` is refused as well: the energy of a coupled law then falls without bound as `J -> 0`.
 """
 
 from __future__ import annotations
@@ -13,13 +26,26 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
 from warpbrain.physics.laws.law import Law
+from warpbrain.physics.laws.paths import Path, derivatives
+from warpbrain.physics.laws.total_energy import total_energy
 
 Floats = NDArray[np.float64]
 
-#: Stretches at which slope and curvature are looked at: a factor of ten each way, far outside what tissue survives.
-_STRETCHES = np.geomspace(0.1, 10.0, 401)
-#: Decades over which the growth at the two ends is judged.
-_ENDS = {"l -> 0": (1e-3, 1e-4), "l -> infinity": (1e3, 1e4)}
+#: A factor of ten each way, far outside what tissue survives.
+_UNIAXIAL = Path((1.0, -0.5, -0.5), reach=10.0, steps=200)
+#: Twice and half the volume, by their names in a message.
+_IN_SPACE = {
+    " along (l, 1, 1)": Path((1.0, 0.0, 0.0), reach=2.0, steps=60),
+    " along (l, l, l)": Path((1.0, 1.0, 1.0), reach=2.0 ** (1.0 / 3.0), steps=20),
+}
+#: So near to rest that differences see no more than the slope there, for exponents of some hundreds.
+_REST = Path((1.0, 0.0, 0.0), reach=1.0 + 2e-4, steps=1)
+#: Where the growth at the two ends is judged: so far out that a part of a millionth comes to light if it grows.
+_ENDS = {"l -> 0": (1e-3, 1e-9), "l -> infinity": (1e3, 1e9)}
+_END_STEP = 1e-2
+#: `ln l` there (end, near or far, 1), and stretches around for differences (end, near or far, 7, 3).
+_LOG_ENDS = np.log(list(_ENDS.values()))[..., None]
+_AROUND_ENDS = np.exp((_LOG_ENDS + _END_STEP * np.arange(-3, 4))[..., None] * np.array(_UNIAXIAL.exponents))
 
 
 class UnstableLawError(InputError):
@@ -29,74 +55,76 @@ class UnstableLawError(InputError):
 def require_stable(law: Law, poisson: float = 0.45, formulation: str = "coupled") -> None:
     """Raise `UnstableLawError` if the law breaks a condition of the supplement's Table 2.
 
+    Parameters
+    ----------
+    law : Law
+    poisson : float
+        Poisson ratio at rest.
+    formulation : str
+        One of `FORMULATIONS`.
+
+    Raises
+    ------
+    UnstableLawError
+        Naming the law, the stretch and the condition.
+    InputError
+        If the Poisson ratio is outside (-1, 0.5) or the formulation is unknown.
+
     Examples
     --------
     >>> from warpbrain.physics.laws import MooneyRivlin
     >>> require_stable(MooneyRivlin(300.0, 200.0))
     """
     volumetric = law.volumetric_modulus(poisson, formulation)
+    whole = f"{law!r}, {formulation}, at the Poisson ratio {poisson:g}"
     if formulation == "coupled" and volumetric < 0.0:
         raise UnstableLawError(
-            f"{_describe(law)}, coupled, at the Poisson ratio {poisson:g} has lam = {volumetric:.3g} Pa: its energy "
-            "falls without bound as J -> 0 (supplement Table 2); the uncoupled formulation does not"
+            f"{whole} has lam = {volumetric:.3g} Pa: its energy falls without bound as J -> 0 (supplement Table 2); "
+            "the uncoupled formulation does not"
         )
-    logs = np.log(_STRETCHES)
-    slope, curvature = _derivatives(law, logs)
-    scale = law.shear_modulus
-    rest_energy = float(_energy(law, np.zeros(1))[0])
-    rest_slope = float(_derivatives(law, np.zeros(1))[0][0])
-    if abs(rest_energy) > 1e-9 * scale or abs(rest_slope) > 1e-6 * scale:
-        raise UnstableLawError(
-            f"{_describe(law)} is not at rest at l = 1: energy {rest_energy:.3g} Pa, slope {rest_slope:.3g} Pa"
-        )
-    wrong = (slope * logs <= 0.0) & (np.abs(logs) > 1e-9)
+    _require_rest(whole, law.shear_modulus, total_energy(law, _REST.stretches, poisson, formulation))
+    _require_rising_and_convex(repr(law), "", _UNIAXIAL, law.energy(_UNIAXIAL.stretches))
+    _require_growth(law)
+    for along, path in _IN_SPACE.items():
+        _require_rising_and_convex(whole, along, path, total_energy(law, path.stretches, poisson, formulation))
+
+
+def _require_rest(subject: str, shear_modulus: float, energy: Floats) -> None:
+    """By the symmetry of the energy its three slopes are the same: one along `(l, 1, 1)` stands for the gradient."""
+    slope = float(_REST.derivatives(energy)[0][_REST.steps])
+    rest = float(energy[len(energy) // 2])
+    if abs(rest) > 1e-9 * shear_modulus or abs(slope) > 1e-6 * shear_modulus:
+        raise UnstableLawError(f"{subject} is not at rest at l = 1: energy {rest:.3g} Pa, slope {slope:.3g} Pa")
+
+
+def _require_rising_and_convex(subject: str, along: str, path: Path, energy: Floats) -> None:
+    with np.errstate(over="ignore", invalid="ignore"):
+        slope, curvature = path.derivatives(energy)
+    wrong = (slope * path.logs <= 0.0) & (path.logs != 0.0)
     if wrong.any():
-        l = _nearest_to_rest(wrong)
+        l = _nearest_to_rest(path, wrong)
         side, sign = ("compression", "negative") if l < 1.0 else ("tension", "positive")
         raise UnstableLawError(
-            f"{_describe(law)} is unstable in {side}: dPsi/dl at l = {l:.3g} is not {sign} (supplement Table 2)"
+            f"{subject} is unstable in {side}{along}: dPsi/dl at l = {l:.3g} is not {sign} (supplement Table 2)"
         )
     if (curvature <= 0.0).any():
-        l = _nearest_to_rest(curvature <= 0.0)
+        l = _nearest_to_rest(path, curvature <= 0.0)
         raise UnstableLawError(
-            f"{_describe(law)} is unstable at the stretch l = {l:.3g}: d2Psi/dl2 is not positive (supplement Table 2)"
+            f"{subject} is unstable at the stretch l = {l:.3g}{along}: d2Psi/dl2 is not positive (supplement Table 2)"
         )
-    for end, (near, far) in _ENDS.items():
-        ends = np.log(np.array([near, far]))
-        with np.errstate(over="ignore", invalid="ignore"):
-            energy, (end_slope, _) = _energy(law, ends), _derivatives(law, ends)
-            # an overflow is growth; otherwise a decade must add a visible part
-            bounded = [
-                name
-                for name, v in (("energy", energy), ("slope", np.abs(end_slope)))
-                if np.isfinite(v).all() and v[1] < 1.01 * v[0]
-            ]
-        if bounded:
-            raise UnstableLawError(
-                f"{_describe(law)}: the {bounded[0]} does not grow without bound as {end} (supplement Table 2)"
-            )
 
 
-def _energy(law: Law, logs: Floats) -> Floats:
-    path = np.stack([logs, -0.5 * logs, -0.5 * logs], axis=-1)
-    return law.energy(np.exp(path))
-
-
-def _derivatives(law: Law, logs: Floats) -> tuple[Floats, Floats]:
-    """`dPsi/dl` and `d2Psi/dl2` along the path, by sixth-order differences in `ln l`."""
-    h = 1e-2
+def _require_growth(law: Law) -> None:
     with np.errstate(over="ignore", invalid="ignore"):
-        e = [_energy(law, logs + k * h) for k in range(-3, 4)]
-        first = (-e[0] + 9 * e[1] - 45 * e[2] + 45 * e[4] - 9 * e[5] + e[6]) / (60 * h)
-        second = (2 * e[0] - 27 * e[1] + 270 * e[2] - 490 * e[3] + 270 * e[4] - 27 * e[5] + 2 * e[6]) / (180 * h * h)
-        stretch = np.exp(logs)
-        return first / stretch, (second - first) / stretch**2
+        energies = law.energy(_AROUND_ENDS)
+        slopes = np.abs(derivatives(energies, _LOG_ENDS, _END_STEP)[0][..., 0])
+    for end, energy, slope in zip(_ENDS, energies[..., 3], slopes, strict=True):
+        for name, (near, far) in (("energy", energy), ("slope", slope)):
+            # an overflow is growth; otherwise six decades must add a visible part
+            if np.isfinite([near, far]).all() and far < 1.01 * near:
+                raise UnstableLawError(f"{law!r}: the {name} does not grow without bound as {end} (supplement Table 2)")
 
 
-def _nearest_to_rest(where: NDArray[np.bool_]) -> float:
-    found = _STRETCHES[where]
-    return float(found[np.argmin(np.abs(np.log(found)))])
-
-
-def _describe(law: Law) -> str:
-    return repr(law)
+def _nearest_to_rest(path: Path, where: NDArray[np.bool_]) -> float:
+    logs = path.logs[where]
+    return float(np.exp(logs[np.argmin(np.abs(logs))]))

@@ -1,0 +1,1 @@
+"""Meta-models: laws of one or two parameters, fitted to curves of strain energy."""
