@@ -132,3 +132,14 @@ def test_the_overall_level_is_not_pulled_to_the_centre():
     hierarchy, _ = fit_hierarchy(observations(studies))
     mean, _ = Hierarchical(studies, hierarchy).modulus([GREY], np.array([0.95]))
     assert mean[0, 0] == pytest.approx(np.log(4e4), abs=0.15) and np.exp(CENTRE) == pytest.approx(1500.0)
+
+
+def test_a_study_of_a_paper_that_is_known_is_known_better():
+    model, at = trained(), np.array([0.95])
+    group = "MRE/white matter"
+    sibling = neo_hookean("MRE-WM-Kruse1999", group, 1.0)
+    stranger = neo_hookean("MRE-WM-Nobody2030", group, 1.0)
+    (near, near_c), (far, far_c) = (model.modulus_of(study, at) for study in (sibling, stranger))
+    assert near_c[0, 0] < far_c[0, 0] and near[0] > far[0]  # what Kruse measured was stiff
+    mean, covariance = model.modulus([group], at)
+    np.testing.assert_allclose((far, far_c[0]), (mean[0], covariance[0]))

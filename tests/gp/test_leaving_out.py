@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from warpbrain.errors import InputError
 from warpbrain.gp.candidates import OF_CURVES, CoregionalisedCandidate, HierarchicalCandidate, Prediction, candidates
 from warpbrain.gp.hierarchy import EFFECTS
-from warpbrain.gp.leaving_out import leave_out
+from warpbrain.gp.leaving_out import folds, leave_out
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.literature.study import Study
+from warpbrain.gp.score_table import read_scores, score_lines, write_scores
 
 GREY = "hyperelastic/grey matter"
 SOME = [s for s in read_studies("corrected") if s.group in (GREY, "MRE/grey matter", "linear/brain")][::2]
@@ -83,3 +85,18 @@ def test_candidates_lack_what_they_should():
     assert all(flat_only.model.hierarchy.spread[name] == pytest.approx(1e-6) for name in OF_CURVES)
     names = [candidate.name for candidate in candidates()]
     assert len(set(names)) == len(names) >= 10
+
+
+def test_scores_come_back_from_their_file(tmp_path):
+    studies = [flat("A-One2001", 1000.0), flat("B-One2001", 1000.0), flat("C-Two2002", 1002.0)]
+    score, held, path = leave_out(Knows(), studies, "paper"), list(folds(studies, "paper")), tmp_path / "scores.csv"
+    assert read_scores(path, held) == []
+    write_scores(path, [score], held)
+    assert read_scores(path, held) == [score]
+    assert score.median == pytest.approx(np.median(score.values))
+    assert "knows" in score_lines([score])[1]
+    with pytest.raises(InputError, match="not a comparison of these studies"):
+        read_scores(path, ["other"])
+    path.write_text(path.read_text() + "cut,1.0\n")
+    with pytest.raises(InputError, match="line 3: cannot be read"):
+        read_scores(path, held)

@@ -143,13 +143,13 @@ class HierarchicalCandidate:
     def predict(self, study: Study, stretches: Floats) -> Prediction:
         """See `Candidate`."""
         assert self.model is not None
-        means, covariance = self.model.modulus([study.group], stretches)
+        mean, covariance = self.model.modulus_of(study, stretches)
         spread = np.sqrt(np.diag(covariance))
         energy, core = study.energy(stretches), invariant(stretches)
-        error = np.log(energy / core) - means[0]
+        error = np.log(energy / core) - mean
         # the density of y = ln(Psi + 1e-4) is that of z = ln(Psi / I) times dz/dy
         slope = np.log((energy + OFFSET) / energy)
-        away = np.log(energy + OFFSET) - np.log(core * np.exp(means[0]) + OFFSET)
+        away = np.log(energy + OFFSET) - np.log(core * np.exp(mean) + OFFSET)
         return Prediction(_normal(error, spread) + slope, error / spread, away)
 
 

@@ -19,7 +19,7 @@ from warpbrain.gp.drawing import Anchored, standard_normal
 from warpbrain.gp.hierarchy import CENTRE, EFFECTS, Hierarchy, prior
 from warpbrain.gp.literature.groups import GROUPS, task_of
 from warpbrain.gp.literature.study import Study
-from warpbrain.gp.observations import Observations, Places, observations
+from warpbrain.gp.observations import Observations, Places, observations, papers
 from warpbrain.gp.secant import log_energy
 
 Floats = NDArray[np.float64]
@@ -59,6 +59,15 @@ class Hierarchical:
         at = _new(groups, np.asarray(stretches, dtype=np.float64))
         mean, covariance = self._predict(at)
         return mean.reshape(len(groups), -1), covariance
+
+    def modulus_of(self, study: Study, stretches: ArrayLike) -> tuple[Floats, Floats]:
+        """Mean (n,) and covariance (n, n) of the log secant modulus of a study that it has not seen.
+
+        If it has seen others of the same paper, these count.
+        """
+        known = papers(self.studies)
+        source = known.index(study.paper) if study.paper in known else -1
+        return self._predict(_new([study.group], np.asarray(stretches, dtype=np.float64), source))
 
     def curve(self, group: str, stretches: ArrayLike, k: float = 0.0) -> Floats:
         """The curve `k` standard deviations from the mean, see `Process`."""
@@ -195,10 +204,10 @@ def negative_log_likelihood(hierarchy: Hierarchy, seen: Observations) -> tuple[f
     return value, np.array([float(np.sum(G * slope)) for slope in slopes])
 
 
-def _new(groups: Sequence[str], stretches: Floats) -> Places:
-    """Places (groups * n) of one new paper with one new study a group."""
+def _new(groups: Sequence[str], stretches: Floats, paper: int = -1) -> Places:
+    """Places (groups * n) of one paper, a new one unless it is given, with one new study a group."""
     count = len(groups)
     task = np.array([task_of(group) for group in groups], dtype=np.int64)
     study = -1 - np.arange(count)
-    source = np.full(count * len(stretches), -1)
+    source = np.full(count * len(stretches), paper)
     return Places(np.repeat(study, len(stretches)), source, np.repeat(task, len(stretches)), np.tile(stretches, count))

@@ -50,6 +50,31 @@ class Score:
     coverage_95: float
     values: tuple[float, ...]
 
+    @property
+    def median(self) -> float:
+        """Median of the log densities: one study that a model holds to be impossible does not decide it."""
+        return float(np.median(self.values))
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Log density, its error, its median, the root mean square error and both coverages."""
+        return (
+            self.log_density,
+            self.log_density_error,
+            self.median,
+            self.rms_error,
+            self.coverage_50,
+            self.coverage_95,
+        )
+
+
+def folds(studies: Sequence[Study], fold: Fold) -> dict[str, list[Study]]:
+    """What is left out together: each study by its name, or the studies of each paper by its."""
+    held: dict[str, list[Study]] = {}
+    for study in studies:
+        held.setdefault(study.name if fold == "study" else study.paper, []).append(study)
+    return held
+
 
 def leave_out(
     candidate: Candidate,
@@ -65,14 +90,11 @@ def leave_out(
         If a covariance cannot be factored.
     """
     whole = candidate.fitted(studies)
-    labels = [study.name if fold == "study" else study.paper for study in studies]
-    held = list(dict.fromkeys(labels))
+    held = folds(studies, fold)
     predictions: list[list[Prediction]] = []
-    for index, label in enumerate(held):
+    for index, left in enumerate(held.values()):
         progress(index / len(held))
-        rest = [study for study, own in zip(studies, labels, strict=True) if own != label]
-        without = whole.fitted(rest)
-        left = [study for study, own in zip(studies, labels, strict=True) if own == label]
+        without = whole.fitted([study for study in studies if study not in left])
         predictions.append([without.predict(study, _seen(study)) for study in left])
     values = np.array([np.mean([p.log_density.mean() for p in group]) for group in predictions])
     each = [np.mean([(p.error**2).mean() for p in group]) for group in predictions]

@@ -59,7 +59,7 @@ class Observations:
 
 def observations(studies: Sequence[Study]) -> Observations:
     """Secant moduli: `STRETCHES` for a hyperelastic study, one for another."""
-    names = sorted({study.paper for study in studies})
+    names = papers(studies)
     places, moduli = [], []
     for index, study in enumerate(studies):
         grid = _stretches(study)
@@ -73,6 +73,11 @@ def observations(studies: Sequence[Study]) -> Observations:
     whole = table[:, :3].astype(np.int64)
     at = Places(whole[:, 0], whole[:, 1], whole[:, 2], table[:, 3])
     return Observations(at, np.concatenate([*moduli, np.empty(0)]))
+
+
+def papers(studies: Sequence[Study]) -> list[str]:
+    """The papers that studies are from; the place of one is its number in `Places.source`."""
+    return sorted({study.paper for study in studies})
 
 
 def _stretches(study: Study) -> Floats:
