@@ -31,7 +31,12 @@ _HOMES = {
     "simulation.dynamics": ("Simulator",),
     "simulation.relaxation": ("relax_to_rest",),
     "simulation.result": ("Result", "result_of"),
+    "gp.literature.studies": ("read_studies",),
+    "gp.trained": ("find_model", "trained"),
+    "gp.sampling": ("draw_laws",),
+    "gp.prior": ("Prior",),
     "cases.case": ("Case",),
+    "cases.drawn": ("with_prior_draw",),
     "cases.reading": ("read_case",),
     "cases.shipped": ("find_case",),
     "cases.writing": ("write_case",),
@@ -56,6 +61,7 @@ __all__ = [
     "NeoHookean",
     "NodalForce",
     "Ogden",
+    "Prior",
     "Resection",
     "Result",
     "Simulator",
@@ -63,15 +69,20 @@ __all__ = [
     "System",
     "TetMesh",
     "check_case",
+    "draw_laws",
     "find_case",
+    "find_model",
     "model_of",
     "observe",
     "read_case",
     "read_mesh",
+    "read_studies",
     "relax_to_rest",
     "require_stable",
     "result_of",
     "solve_equilibrium",
+    "trained",
+    "with_prior_draw",
     "write_case",
     "write_mesh",
 ]
@@ -79,10 +90,15 @@ __all__ = [
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
     from warpbrain.cases.checking import check_case
+    from warpbrain.cases.drawn import with_prior_draw
     from warpbrain.cases.reading import read_case
     from warpbrain.cases.shipped import find_case
     from warpbrain.cases.writing import write_case
     from warpbrain.errors import InputError, SolveError
+    from warpbrain.gp.literature.studies import read_studies
+    from warpbrain.gp.prior import Prior
+    from warpbrain.gp.sampling import draw_laws
+    from warpbrain.gp.trained import find_model, trained
     from warpbrain.mesh import MeshError, TetMesh, read_mesh, write_mesh
     from warpbrain.physics.force import NodalForce
     from warpbrain.physics.gravity import Gravity

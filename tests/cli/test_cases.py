@@ -106,9 +106,9 @@ def test_run_refuses_what_cannot_be_simulated(tmp_path):
         done = run(folder, "--out", tmp_path / "out")
         assert done.status == 2
         assert f"[[boundary]] 'press' kind: '{kind.split(chr(34))[0]}' cannot be simulated yet" in done.err
-    prior = write_folder(tmp_path / "prior", ("mu = 1000.0", 'mu = "prior"\nprior = "linear/brain"'))
+    prior = write_folder(tmp_path / "prior", ("mu = 1000.0", 'mu = "prior"\nprior = "MRE/abnormal"'))
     done = run(prior, "--out", tmp_path / "out")
-    assert done.status == 2 and "generative model" in done.err
+    assert done.status == 2 and "[tissue.1] prior: the generative model" in done.err
     done = run(prior, "--mu", "1=900", "--out", tmp_path / "out")
     assert done.status == 0, done.err
 

@@ -229,7 +229,7 @@ def test_motion_is_refused(folder, tmp_path, arguments):
         ([('"glued"', '"lubricated"')], "[[recording]] 'slide' mode 'shear': lubricated grips slide"),
         ([(CASE[CASE.index("[[recording]]") :], "")], "no [[recording]] of kind 'test': nothing is imposed"),
         ([("height = 4.541", "height = 0.4")], "'press': found a displacement of -0.5 mm, expected more than -0.4 mm"),
-        ([("mu = 1000.0", 'mu = "prior"\nprior = "hyperelastic/grey matter"')], "gel"),
+        ([("mu = 1000.0", 'mu = "prior"\nprior = "MRE/abnormal"')], "[tissue.1] prior: the generative model"),
     ],
 )
 def test_what_is_refused_is_named(tmp_path, changes, message):

@@ -48,13 +48,15 @@ class Tissue:
 
     @property
     def known_law(self) -> Law:
-        """The law; `InputError` if there is none yet."""
-        if self.law is None:
-            raise InputError(
-                f"{self.name}: mu = \"prior\" asks the generative model '{self.prior}', which is not available yet: "
-                "give a shear modulus [Pa], in case.toml or with --mu"
-            )
-        return self.law
+        """The law, or that of the prior's middle curve; `InputError` if there are no studies of its group."""
+        if self.law is not None:
+            return self.law
+        from warpbrain.gp.sampling import middle_law
+
+        try:
+            return middle_law(self.prior, self.model)
+        except InputError as error:
+            raise InputError(f'{self.name}: mu = "prior": {error}') from None
 
 
 @dataclass(frozen=True)

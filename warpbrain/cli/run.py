@@ -15,6 +15,7 @@ from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
+    from warpbrain.cases.drawn import FromPrior
     from warpbrain.simulation.system import System
 
 
@@ -45,6 +46,13 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "(default: the case's own law)",
     )
     add("--mu", nargs="+", metavar="PA", default=[], help="shear modulus [Pa] of every tissue, or LABEL=PA for one")
+    add("--sample", type=int, metavar="N", help="draw number N (from 0) of the tissues' joint prior gives every law")
+    add("--seed", type=int, metavar="S", help="another sequence of draws for --sample (default: 0)")
+    add(
+        "--gp",
+        metavar="MODEL",
+        help='generative model of --sample and of mu = "prior": hierarchical (default), coregionalised or a folder',
+    )
     add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
     add("--precision", choices=("double", "single"), default="double", help="default: double")
@@ -78,21 +86,23 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.report import summary as tables
     from warpbrain.report.comparison import comparison_lines, describe_comparisons, write_comparisons
     from warpbrain.report.files import write_result, write_summary
+    from warpbrain.report.prior_text import describe_prior, prior_lines
     from warpbrain.simulation.of_case import model_of
     from warpbrain.simulation.system import System, find_device
     from warpbrain.terminal.quiet import start_warp_quietly
 
     start_warp_quietly()
     find_device(options.device)
-    case = _case(options)
+    case, found = _case(options)
+    prior = None if found is None else describe_prior(found)
     if case.specimen is not None:
         from warpbrain.cli import run_specimen
 
-        run_specimen.run(options, case, say)
+        run_specimen.run(options, case, say, prior)
         return
     model, _ = model_of(case)
     described = tables.describe_case(case, model)
-    say(*tables.case_lines(described), sep="\n")
+    say(*tables.case_lines(described), *prior_lines(prior), sep="\n")
     system = System(model, options.device, options.precision)
     out = output_folder(options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}"))
     say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
@@ -124,6 +134,7 @@ def _run(options: argparse.Namespace) -> None:
     write_picture(out / "deformation.png", result, case.mesh, names, case.title, _subtitle(case, outcome))
     summary = {
         "case": described,
+        **({} if prior is None else {"prior": prior}),
         "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
         "solution": outcome,
         "result": said,
@@ -154,10 +165,19 @@ def _check(options: argparse.Namespace) -> None:
     if not 0.0 < options.tolerance < 1.0:
         raise InputError(f"--tolerance {options.tolerance:g}: expected a number between 0 and 1")
     options.moduli = parse_moduli(options.mu)
+    for name, value in (("--sample", options.sample), ("--seed", options.seed)):
+        if value is not None and value < 0:
+            raise InputError(f"{name} {value}: expected a whole number of at least 0")
+    if options.sample is not None and options.mu:
+        raise InputError(
+            f"--sample {options.sample}: gives every law; --mu {' '.join(options.mu)} means nothing with it"
+        )
+    if options.sample is None and options.seed is not None:
+        raise InputError(f"--seed {options.seed}: means nothing without --sample")
 
 
-def _case(options: argparse.Namespace) -> Case:
-    """The case as the arguments change it."""
+def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
+    """The case as the arguments change it, and which of its laws are the generative model's, if any."""
     from warpbrain.cases.shipped import find_case
     from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 
@@ -169,19 +189,34 @@ def _case(options: argparse.Namespace) -> Case:
     case = case.with_shear_moduli(moduli)
     if options.poisson is not None:
         case = replace(case, poisson=options.poisson)
+    found = _from_prior(options, case)
+    if found is not None:
+        case = found.case
     if not options.allow_unstable:
         for label, tissue in sorted(case.tissues.items()):
             try:
-                law = tissue.known_law
-            except InputError as error:
-                raise InputError(f"{case.path}: [tissue.{label}] {error}") from None
-            try:
-                require_stable(law, case.poisson, tissue.formulation)
+                require_stable(tissue.known_law, case.poisson, tissue.formulation)
             except UnstableLawError as error:
                 raise UnstableLawError(
                     f"{case.path}: [tissue.{label}] {error}; --allow-unstable computes with it all the same"
                 ) from None
-    return case
+    return case, found
+
+
+def _from_prior(options: argparse.Namespace, case: Case) -> FromPrior | None:
+    """The case with the laws that the generative model is to give; None if it is to give none."""
+    if options.sample is None and all(tissue.law is not None for tissue in case.tissues.values()):
+        if options.gp is not None:
+            raise InputError(f'--gp {options.gp}: means nothing without --sample or a tissue of mu = "prior"')
+        return None
+
+    from warpbrain.cases.drawn import with_prior_draw, with_prior_middle
+    from warpbrain.gp.trained import find_model
+
+    model = find_model(options.gp or "hierarchical")
+    if options.sample is None:
+        return with_prior_middle(case, model)
+    return with_prior_draw(case, options.sample, options.seed or 0, model)
 
 
 def parse_moduli(values: list[str]) -> tuple[float | None, dict[int, float]]:

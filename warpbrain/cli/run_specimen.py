@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from warpbrain.errors import InputError
 from warpbrain.terminal.progress import Progress
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from warpbrain.simulation.specimen import Rig
 
 
-def run(options: argparse.Namespace, case: Case, say: Callable[..., None]) -> None:
+def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior: dict[str, Any] | None = None) -> None:
     """Simulate every test of a case.
 
     Parameters
@@ -28,6 +28,8 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None]) -> No
         With a specimen, as the options change it.
     say : callable
         `print`, or what stands for it.
+    prior : dict, optional
+        What is to be said of laws that the generative model gave.
 
     Raises
     ------
@@ -42,6 +44,7 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None]) -> No
     from warpbrain.report import specimen_text as text
     from warpbrain.report.comparison import describe_comparisons
     from warpbrain.report.files import write_summary
+    from warpbrain.report.prior_text import prior_lines
     from warpbrain.report.specimen_picture import write_tests_picture
     from warpbrain.report.summary import machine, timing_lines
     from warpbrain.simulation.equilibrium import EquilibriumOptions
@@ -53,7 +56,7 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None]) -> No
         rig.check(recording)
     system = rig.system
     described = text.describe_specimen(case, rig.specimen, system.model)
-    say(*text.specimen_lines(described), sep="\n")
+    say(*text.specimen_lines(described), *prior_lines(prior), sep="\n")
     out = output_folder(options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}"))
     say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
 
@@ -69,6 +72,7 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None]) -> No
     text.write_tests(out / "comparison.csv", done)
     summary = {
         "case": described,
+        **({} if prior is None else {"prior": prior}),
         "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
         "solution": {"kind": "tests", "tolerance": rig.solver.tolerance, "tests": text.describe_tests(done)},
         "recordings": describe_comparisons(Observed(tuple(test.comparison for test in done), ())),

@@ -27,8 +27,8 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
     Raises
     ------
     InputError
-        If the case assumes what cannot be simulated, or leaves a law to the generative model; of a specimen, which
-        `warpbrain.simulation.specimen` simulates test by test.
+        If the case assumes what cannot be simulated; of a specimen, which `warpbrain.simulation.specimen` simulates
+        test by test.
     """
     if case.specimen is not None:
         raise InputError(f"{case.path}: [specimen]: a specimen has no one state; its tests are run by a Rig")

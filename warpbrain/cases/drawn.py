@@ -1,0 +1,113 @@
+"""Laws of a case's tissues from the generative model: a draw of its prior, or the middle of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from warpbrain.cases.case import Case
+from warpbrain.errors import InputError, SolveError
+from warpbrain.gp.process import Process
+from warpbrain.gp.sampling import DrawnLaws, draw_laws, law_of_curve
+
+
+@dataclass(frozen=True)
+class FromPrior:
+    """Which laws of a case are the generative model's.
+
+    Attributes
+    ----------
+    case : Case
+        With these laws.
+    model : Process
+    labels : tuple of int
+        Tissues whose laws they are.
+    drawn : DrawnLaws or None
+        With one law for each of these tissues; None if the laws are those of the middle curves.
+    """
+
+    case: Case
+    model: Process
+    labels: tuple[int, ...]
+    drawn: DrawnLaws | None = None
+
+
+def with_prior_draw(case: Case, number: int, seed: int = 0, model: Process | None = None) -> FromPrior:
+    """The case with the laws of all tissues from draw `number` of their joint prior, each of its own kind.
+
+    Parameters
+    ----------
+    case : Case
+        Whose tissues say `prior`; `Case.with_law` changes the kind of law first. Tissues of one group share one curve.
+    number, seed : int
+        Which draw.
+    model : Process, optional
+        The one that is the default unless given.
+
+    Raises
+    ------
+    InputError
+        With file, tissue and key, if a tissue has no group, or one that the model has seen no study of.
+    SolveError
+        If no stable law is found.
+
+    Examples
+    --------
+    >>> from warpbrain.cases.shipped import find_case
+    >>> found = with_prior_draw(find_case("0529"), 7)
+    >>> found.drawn.groups
+    ('hyperelastic/grey matter', 'hyperelastic/white matter')
+    """
+    asked = _default(model)
+    labels = tuple(sorted(case.tissues))
+    _require_groups(case, labels, asked)
+    tissues = [case.tissues[label] for label in labels]
+    try:
+        drawn = draw_laws(
+            asked,
+            [tissue.prior for tissue in tissues],
+            [tissue.model for tissue in tissues],
+            number,
+            seed,
+            case.poisson,
+            [tissue.formulation for tissue in tissues],
+        )
+    except SolveError as error:
+        raise SolveError(f"{case.path}: {error}") from None
+    laws = dict(zip(labels, drawn.laws, strict=True))
+    changed = {label: replace(tissue, law=laws[label]) for label, tissue in case.tissues.items()}
+    return FromPrior(replace(case, tissues=changed), asked, labels, drawn)
+
+
+def with_prior_middle(case: Case, model: Process | None = None) -> FromPrior:
+    """The case with the laws of tissues that say `mu = "prior"` from the middle curves of their groups.
+
+    Raises
+    ------
+    InputError
+        With file, tissue and key, if the model has seen no study of a group.
+    """
+    asked = _default(model)
+    labels = tuple(label for label, tissue in sorted(case.tissues.items()) if tissue.law is None)
+    _require_groups(case, labels, asked)
+    changed = dict(case.tissues)
+    for label in labels:
+        tissue = changed[label]
+        changed[label] = replace(tissue, law=law_of_curve(asked, tissue.prior, law=tissue.model).law())
+    return FromPrior(replace(case, tissues=changed), asked, labels)
+
+
+def _default(model: Process | None) -> Process:
+    from warpbrain.gp.trained import trained
+
+    return trained() if model is None else model
+
+
+def _require_groups(case: Case, labels: tuple[int, ...], model: Process) -> None:
+    for label in labels:
+        group = case.tissues[label].prior
+        if group not in model.groups:
+            found = f"the generative model '{model.name}' ({model.variant}) has seen no study of '{group}'"
+            raise InputError(
+                f"{case.path}: [tissue.{label}] prior: {found if group else 'missing, but a draw is of a group'}: "
+                f"expected one of {', '.join(model.groups)}"
+            )

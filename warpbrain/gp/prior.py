@@ -1,0 +1,205 @@
+"""What the literature says of the parameters of laws before anything of a patient is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.errors import InputError
+from warpbrain.gp.coordinates import Coordinate, coordinates, from_coordinates, to_coordinates
+from warpbrain.gp.density import FoldedDensity
+from warpbrain.gp.process import Process
+from warpbrain.gp.sampling import DrawnLaws, draw_many
+
+if TYPE_CHECKING:
+    from warpbrain.physics.laws import Law
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """A distribution of the laws of one or several tissues.
+
+    A vector `theta` (p,) holds for each tissue `ln(mu0 / Pa)`, then for Mooney-Rivlin the ratio `C2 / (C1 + C2)`, for
+    Ogden the exponent `alpha`. The distribution is that of stable laws: draws that are not are drawn again
+    (`warpbrain.gp.sampling`), and `rejection_rate` says how many.
+
+    Where a curve wants a negative coefficient, Mooney-Rivlin's ratio is 0 or 1 but for the 0.1 Pa that the fit leaves
+    the coefficient: that is a mass on a side, which the samples have, which `at_bound` states, and which `log_density`
+    spreads inwards a little. Ogden's stable exponents lie above 1 and below -2: those of different signs are clusters.
+    Of both shapes the Gaussian approximation is a poor one, and `distances` says how poor.
+
+    Attributes
+    ----------
+    model : Process
+    groups : tuple of str
+        One for each tissue, all different.
+    laws_of : tuple of str
+        Name of the law of each tissue.
+    poisson, formulation : float, str
+        With which the laws are stable.
+    seed : int
+    theta : (n, p) array
+        Draws 0 to n - 1 of the seed, on which all but `samples` rests.
+    attempts : int
+        That these draws took.
+    at_bound : (groups,) array
+        Part of the draws in which the fit of a tissue lies at a bound of its parameters.
+    """
+
+    model: Process
+    groups: tuple[str, ...]
+    laws_of: tuple[str, ...]
+    poisson: float
+    formulation: str
+    seed: int
+    theta: Floats
+    attempts: int
+    at_bound: Floats
+
+    @classmethod
+    def of(
+        cls,
+        model: Process,
+        groups: Sequence[str],
+        law: str | Sequence[str],
+        poisson: float = 0.45,
+        formulation: str = "coupled",
+        count: int = 1000,
+        seed: int = 0,
+    ) -> Prior:
+        """The prior of tissues.
+
+        Parameters
+        ----------
+        model : Process
+        groups : sequence of str
+            One for each tissue, all different: tissues of one group are one tissue.
+        law : str or sequence of str
+            Names of laws, one for all tissues or one for each.
+        poisson, formulation : float, str
+        count : int
+            Draws on which density and Gaussian approximation rest.
+        seed : int
+
+        Raises
+        ------
+        InputError
+            If a group is given twice or the model has seen no study of it, there is no such law, or count is too small.
+        SolveError
+            If no stable law is found.
+
+        Examples
+        --------
+        >>> from warpbrain.gp.trained import trained
+        >>> prior = Prior.of(trained(), ["hyperelastic/brain"], "neo-hookean", count=100)
+        >>> prior.names
+        ('hyperelastic/brain: ln(mu0 / Pa)',)
+        """
+        names = (law,) * len(groups) if isinstance(law, str) else tuple(law)
+        size = sum(len(coordinates(name)) for name in names)
+        if len(set(groups)) < len(groups):
+            raise InputError(f"groups {', '.join(groups)}: one is given twice; tissues of one group are one tissue")
+        if count < 10 * size:
+            raise InputError(f"count {count}: expected at least {10 * size} draws for {size} parameters")
+        draws = list(draw_many(model, groups, names, count, seed, poisson, formulation))
+        attempts = sum(1 + len(drawn.rejected) for drawn in draws)
+        at_bound = np.mean([[bool(fitted.at_bound) for fitted in drawn.fits] for drawn in draws], axis=0)
+        return cls(model, tuple(groups), names, poisson, formulation, seed, _theta(draws), attempts, at_bound)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the parameters, with group and unit."""
+        return tuple(f"{group}: {coordinate.name}" for group, coordinate in self._coordinates)
+
+    @property
+    def rejection_rate(self) -> float:
+        """Part of the attempts that gave an unstable law."""
+        return 1.0 - len(self.theta) / self.attempts
+
+    def samples(self, count: int, seed: int | None = None) -> Floats:
+        """Draws 0 to `count` - 1 of a seed (the prior's own unless given), shape (count, p)."""
+        own = self.seed if seed is None else seed
+        if own == self.seed and count <= len(self.theta):
+            return self.theta[:count].copy()
+        return _theta(draw_many(self.model, self.groups, self.laws_of, count, own, self.poisson, self.formulation))
+
+    @cached_property
+    def mean(self) -> Floats:
+        """Of the Gaussian approximation, shape (p,)."""
+        return self.theta.mean(axis=0)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Of the Gaussian approximation, shape (p, p)."""
+        return np.atleast_2d(np.cov(self.theta, rowvar=False))
+
+    @cached_property
+    def distances(self) -> Floats:
+        """Largest difference (p,) between the distribution functions of each parameter's draws and of its Gaussian.
+
+        0 is a Gaussian, 1 is as far as can be. Of n draws of a Gaussian it is about `0.6 / sqrt(n)`, 0.02 for 1000.
+        """
+        from scipy.stats import kstest
+
+        away = (self.theta - self.mean) / np.sqrt(np.diag(self.covariance))
+        return np.array([kstest(column, "norm").statistic for column in away.T])
+
+    def log_density(self, theta: ArrayLike) -> Floats | float:
+        """Log density of the draws by `theta`: a number for (p,), an array (m,) for (m, p); see `FoldedDensity`."""
+        found = self._density.log_density(self._points(theta))
+        return found if np.ndim(theta) > 1 else float(found[0])
+
+    def gaussian_log_density(self, theta: ArrayLike) -> Floats | float:
+        """The same of the Gaussian approximation, which knows no bounds."""
+        away = self._points(theta) - self.mean
+        _, log_determinant = np.linalg.slogdet(2.0 * np.pi * self.covariance)
+        found = -0.5 * (log_determinant + np.sum(away * np.linalg.solve(self.covariance, away.T).T, axis=1))
+        return found if np.ndim(theta) > 1 else float(found[0])
+
+    def laws(self, theta: ArrayLike) -> tuple[Law, ...]:
+        """The law of each tissue at a vector (p,).
+
+        Raises
+        ------
+        InputError
+            If it is not as long as there are parameters, or is of no law.
+        """
+        [point] = self._points(theta)
+        laws, at = [], 0
+        for name in self.laws_of:
+            size = len(coordinates(name))
+            laws.append(from_coordinates(name, point[at : at + size].tolist()))
+            at += size
+        return tuple(laws)
+
+    def _points(self, theta: ArrayLike) -> Floats:
+        points = np.atleast_2d(np.asarray(theta, dtype=np.float64))
+        if points.ndim != 2 or points.shape[1] != len(self.names):
+            raise InputError(f"theta of shape {np.shape(theta)}: expected {len(self.names)}: {', '.join(self.names)}")
+        return points
+
+    @property
+    def _coordinates(self) -> list[tuple[str, Coordinate]]:
+        pairs = zip(self.groups, self.laws_of, strict=True)
+        return [(group, coordinate) for group, name in pairs for coordinate in coordinates(name)]
+
+    @cached_property
+    def _density(self) -> FoldedDensity:
+        found = [coordinate for _, coordinate in self._coordinates]
+        low, high = (np.array([getattr(coordinate, side) for coordinate in found]) for side in ("low", "high"))
+        signed = [coordinate.signed for coordinate in found]
+        negative = (self.theta[:, signed] < 0.0).astype(np.int64)
+        clusters = negative @ (2 ** np.arange(negative.shape[1]))
+        return FoldedDensity(self.theta, low, high, clusters)
+
+
+def _theta(draws: Iterable[DrawnLaws]) -> Floats:
+    """Parameters (n, p) of draws."""
+    return np.array([[value for law in drawn.laws for value in to_coordinates(law)] for drawn in draws])
