@@ -1,4 +1,4 @@
-"""What the log of the paper's own code prints: agranadoseu/Hyperelastic-Generative-Model, GaussianProcesses/data/new1."""
+"""What the log of the paper's own code prints (agranadoseu/Hyperelastic-Generative-Model, its data/new1)."""
 
 import numpy as np
 
@@ -23,8 +23,8 @@ STORED = Parameters(
 )  # fmt: skip
 #: Negative log marginal likelihood.
 OBJECTIVE = 7097.957
-#: Fits to its curves at 101 stretches: neo-Hookean mu [Pa] at k = 0, -2, 2, Mooney-Rivlin C1, C2 [Pa] and Ogden mu [Pa],
-#: alpha with the exponent up to 5 and up to 50, at k = 0.
+#: Fits to its curves at 101 stretches: neo-Hookean mu [Pa] at k = 0, -2, 2, Mooney-Rivlin C1, C2 [Pa] and Ogden
+#: mu [Pa], alpha with the exponent up to 5 and up to 50, at k = 0.
 FITS = {
     "MRE/grey matter": ((5725.58, 2116.93, 15432.87), (2864.13, 0.1), (3750.82, 3.05), (3750.9, 3.05)),
     "MRE/white matter": ((9197.15, 2015.24, 41736.45), (4600.79, 0.1), (6002.61, 3.07), (6002.65, 3.07)),

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from published_process import FITS, STORED
-from warpbrain.gp.metamodels.fit import fit
-from warpbrain.gp.metamodels.models import METAMODELS
 
 from warpbrain.gp.coregionalised import Coregionalised, prior_mean, training_points
 from warpbrain.gp.literature.groups import GROUPS, STRETCHES
 from warpbrain.gp.literature.studies import read_studies
+from warpbrain.gp.metamodels.fit import fit
+from warpbrain.gp.metamodels.models import METAMODELS
 from warpbrain.gp.trained import trained
 
 

@@ -69,6 +69,7 @@ def fit_model(
         record |= {
             "points": int(data.count.sum()),
             "means of replicates": data.size,
+            "jitter": training.jitter,
             "negative log likelihood": training.best.value,
             "climbs": [_described(climb) for climb in training.climbs],
             "starts": [
