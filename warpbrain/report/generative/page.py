@@ -1,0 +1,119 @@
+"""A page of panels, one a group of studies, and what the pictures of the generative model have in common.
+
+Colours are Okabe and Ito's, which the colour-blind tell apart; what has a colour has a line style or a hatch too, so that
+a print in grey says the same.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from warpbrain.atomic import whole_file
+from warpbrain.gp.literature.groups import ANATOMIES, METHODS
+from warpbrain.gp.literature.study import Study
+from warpbrain.gp.process import Process
+
+BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
+BLACK, PALE = "#000000", "#bbbbbb"
+
+#: Width of a page and of the picture of a single group [inch]: two columns of a journal, and a little more than one.
+WIDTH, WIDTH_OF_ONE = 7.2, 4.6
+#: Size of texts [point].
+TEXT, SMALL = 7.0, 6.0
+
+#: Half the widths of the bands that hold 50 % and 95 % of new studies [standard deviations].
+HALF, MOST = 0.674490, 1.959964
+
+
+def studies_of(model: Process, group: str) -> tuple[Study, ...]:
+    """The studies of a group that a model learnt from."""
+    return tuple(study for study in model.studies if study.group == group)
+
+
+def stretches_of(model: Process, group: str) -> tuple[float, float]:
+    """The stretches (low, high) that the studies of a group speak for, all together."""
+    ranges = [study.stretch for study in studies_of(model, group)]
+    return min(low for low, _ in ranges), max(high for _, high in ranges)
+
+
+def all_groups(model: Process, height: float, each: int = 1) -> tuple[Any, dict[str, list[Any]]]:
+    """A figure with a row for every method and a column for every anatomy.
+
+    Parameters
+    ----------
+    model : Process
+        Groups that it has seen no study of get an empty panel that says so.
+    height : float
+        Of the figure [inch].
+    each : int
+        Panels a group, one below the other.
+
+    Returns
+    -------
+    figure : matplotlib.figure.Figure
+    panels : dict of str to list of matplotlib.axes.Axes
+        Of the groups that the model has seen.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    grid = figure.subplots(each * len(METHODS), len(ANATOMIES), squeeze=False)
+    panels = {}
+    for row, method in enumerate(METHODS):
+        for column, anatomy in enumerate(ANATOMIES):
+            group = f"{method}/{anatomy}"
+            stack = [grid[each * row + part, column] for part in range(each)]
+            stack[0].set_title(group, fontsize=TEXT)
+            if group in model.groups:
+                panels[group] = stack
+                for axes in stack:
+                    axes.tick_params(labelsize=SMALL, length=2.5)
+                continue
+            for axes in stack:
+                axes.set_xticks([])
+                axes.set_yticks([])
+                axes.spines[:].set_color(PALE)
+                axes.text(0.5, 0.5, "no study", fontsize=TEXT, ha="center", va="center", transform=axes.transAxes)
+    return figure, panels
+
+
+def one_group(group: str, columns: int = 1) -> tuple[Any, list[Any]]:
+    """A figure of one group, with panels side by side."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH_OF_ONE if columns == 1 else WIDTH, 3.6), layout="constrained")
+    panels = list(figure.subplots(1, columns, squeeze=False)[0])
+    figure.suptitle(group, fontsize=TEXT + 2)
+    for axes in panels:
+        axes.tick_params(labelsize=TEXT)
+    return figure, panels
+
+
+def label(panels: Sequence[Any], what: str, size: float = TEXT) -> None:
+    """Name the vertical axis of panels."""
+    for axes in panels:
+        axes.set_ylabel(what, fontsize=size)
+
+
+def decades(axes: Any, low: float, high: float) -> None:
+    """A logarithmic vertical axis with ticks at whole powers of ten, few enough to be read."""
+    from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
+
+    axes.set_yscale("log")
+    axes.set_ylim(low, high)
+    wide = high / low > 1e4
+    axes.yaxis.set_major_locator(LogLocator(numticks=6 if wide else 10))
+    if wide:
+        axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def save(figure: Any, path: Path) -> None:
+    """Write a figure, whole, in the format that the file's ending names: pixels are those of print, 300 an inch."""
+    with whole_file(path) as temporary, warnings.catch_warnings():
+        # a name of a user's study in a script that the font lacks is no reason to print anything
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        figure.savefig(temporary, dpi=300, format=path.suffix[1:])
