@@ -8,10 +8,20 @@ import sys
 import tempfile
 from pathlib import Path
 
+from PIL import Image
+
+from warpbrain.gp.trained import trained
+from warpbrain.report.generative.draws_picture import draw_draws
+from warpbrain.report.generative.extrapolation_picture import draw_extrapolation
+from warpbrain.report.generative.page import save
+from warpbrain.report.generative.studies_picture import draw_studies
+
 FIGURES = Path(__file__).parent / "figures"
 #: Pictures of runs and of cases, by file.
 RUNS = {"0529.png": ["--case", "0529"]}
 CASES = {"0529-case.png": ["0529"]}
+#: Colours that are left of a picture of curves, and its width [pixel]: a screen's, and a fraction of the bytes.
+PALETTE, WIDTH = 64, 1440
 
 
 def main() -> None:
@@ -23,6 +33,25 @@ def main() -> None:
             shutil.copy(Path(folder) / "deformation.png", FIGURES / name)
     for name, arguments in CASES.items():
         _warpbrain("cases", "show", *arguments, "--out", str(FIGURES / name))
+    draw_generative_model()
+
+
+def draw_generative_model() -> None:
+    """Draw the default model, with the paper's process beside it and by itself."""
+    model, paper = trained(), trained("coregionalised", "as_published")
+    brain = "hyperelastic/brain"
+    pictures = {
+        "gp-studies.png": draw_studies(model),
+        "gp-extrapolation.png": draw_extrapolation(model, paper),
+        "gp-draws.png": draw_draws(model),
+        "gp-draws-paper.png": draw_draws(paper),
+        "gp-draws-brain.png": draw_draws(model, brain),
+    }
+    for name, figure in pictures.items():
+        save(figure, FIGURES / name)
+        with Image.open(FIGURES / name) as image:
+            small = image.convert("RGB").resize((WIDTH, round(image.height * WIDTH / image.width)), Image.LANCZOS)
+        small.quantize(PALETTE).save(FIGURES / name, optimize=True)
 
 
 def _warpbrain(*arguments: str) -> None:

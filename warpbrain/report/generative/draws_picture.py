@@ -15,17 +15,17 @@ from warpbrain.report.generative import page
 
 Floats = NDArray[np.float64]
 
-_DRAWS = 10
+_DRAWS = 16
 #: Steps to each side of rest: bands of the paper's process widen between any two of its hundred points a study.
-_STEPS = 240
-#: Of the way from rest to the end of the range: where curves of energy begin, and from where on they are in the picture.
-#: Moduli are shown from there on too: nearer to rest they are a quotient of two numbers that vanish.
+_STEPS = 160
+#: Parts of the way from rest to the end of the range: where curves of energy begin, and from where on they are in the
+#: picture. Moduli are shown from there on too: nearer to rest they are a quotient of two numbers that vanish.
 _NEAREST, _SHOWN = 1e-3, 0.08
-_MOST = {"facecolor": "#cfe3f1", "linewidth": 0.0}
-_HALF = {"facecolor": "#86b8dc", "linewidth": 0.0}
-_STUDY = {"color": "#444444", "linewidth": 0.4}
-_DRAW = {"color": page.VERMILLION, "linewidth": 0.6, "linestyle": (0, (4, 1.2))}
-_MEAN = {"color": page.BLACK, "linewidth": 1.2}
+_MOST: dict[str, Any] = {"facecolor": "#cfe3f1", "linewidth": 0.0}
+_HALF: dict[str, Any] = {"facecolor": "#86b8dc", "linewidth": 0.0}
+_STUDY: dict[str, Any] = {"color": "#444444", "linewidth": 0.4}
+_DRAW: dict[str, Any] = {"color": page.VERMILLION, "linewidth": 0.5, "linestyle": (0, (4, 1.2))}
+_MEAN: dict[str, Any] = {"color": page.BLACK, "linewidth": 1.2}
 
 
 def draw_draws(model: Process, group: str | None = None, seed: int = 0) -> Any:

@@ -17,11 +17,11 @@ Floats = NDArray[np.float64]
 #: Stretches that are shown, rest among them, and energies [Pa]: bands that leave these are wider than the picture.
 _STRETCHES = np.linspace(0.5, 1.5, 251)
 _ENERGIES = (1e-5, 1e7)
-_BAND = {"facecolor": page.SKY, "alpha": 0.55, "linewidth": 0.0}
-_OTHER_BAND = {"facecolor": "none", "edgecolor": page.ORANGE, "hatch": "////", "linewidth": 0.0}
-_MEAN = {"color": page.BLUE, "linewidth": 1.3}
-_OTHER_MEAN = {"color": page.VERMILLION, "linewidth": 1.0, "linestyle": (0, (4, 1.2))}
-_STUDY = {"color": page.BLACK, "linewidth": 0.4}
+_BAND: dict[str, Any] = {"facecolor": page.SKY, "alpha": 0.55, "linewidth": 0.0}
+_OTHER_BAND: dict[str, Any] = {"facecolor": "none", "edgecolor": page.ORANGE, "hatch": "////", "linewidth": 0.0}
+_MEAN: dict[str, Any] = {"color": page.BLUE, "linewidth": 1.3}
+_OTHER_MEAN: dict[str, Any] = {"color": page.VERMILLION, "linewidth": 1.0, "linestyle": (0, (4, 1.2))}
+_STUDY: dict[str, Any] = {"color": page.BLACK, "linewidth": 0.4}
 
 
 def draw_extrapolation(model: Process, other: Process, group: str | None = None) -> Any:

@@ -1,7 +1,7 @@
 """A page of panels, one a group of studies, and what the pictures of the generative model have in common.
 
-Colours are Okabe and Ito's, which the colour-blind tell apart; what has a colour has a line style or a hatch too, so that
-a print in grey says the same.
+Colours are Okabe and Ito's, which the colour-blind tell apart; what has a colour has a line style, a shade or a hatch
+of its own too, so that a print in grey says the same.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def label(panels: Sequence[Any], what: str, size: float = TEXT) -> None:
 
 
 def logarithmic(axes: Any, low: float, high: float) -> None:
-    """A logarithmic vertical axis with a few ticks that have numbers: powers of ten, or round numbers where it is short.
+    """A logarithmic vertical axis with a few ticks that have numbers: powers of ten, or round ones where it is short.
 
     It shows a factor of two at least: a spread of one part in a hundred is to look like one.
     """

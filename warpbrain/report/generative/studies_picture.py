@@ -59,9 +59,7 @@ def draw_studies(model: Process, group: str | None = None) -> Any:
     return figure
 
 
-def _draw(
-    axes: Any, studies: Sequence[Study], limits: tuple[float, float], names: Sequence[str], size: float
-) -> None:
+def _draw(axes: Any, studies: Sequence[Study], limits: tuple[float, float], names: Sequence[str], size: float) -> None:
     low = min(study.stretch[0] for study in studies)
     high = max(study.stretch[1] for study in studies)
     ends = []
