@@ -21,7 +21,7 @@ FIGURES = Path(__file__).parent / "figures"
 RUNS = {"0529.png": ["--case", "0529"]}
 CASES = {"0529-case.png": ["0529"]}
 #: Colours that are left of a picture of curves, and its width [pixel]: a screen's, and a fraction of the bytes.
-PALETTE, WIDTH = 64, 1440
+PALETTE, WIDTH = 48, 1280
 
 
 def main() -> None:
@@ -51,7 +51,7 @@ def draw_generative_model() -> None:
         save(figure, FIGURES / name)
         with Image.open(FIGURES / name) as image:
             small = image.convert("RGB").resize((WIDTH, round(image.height * WIDTH / image.width)), Image.LANCZOS)
-        small.quantize(PALETTE).save(FIGURES / name, optimize=True)
+        small.quantize(PALETTE, dither=Image.Dither.NONE).save(FIGURES / name, optimize=True)
 
 
 def _warpbrain(*arguments: str) -> None:
