@@ -5,6 +5,7 @@ import pytest
 
 from warpbrain.gp.hierarchical import Hierarchical, fit_hierarchy, negative_log_likelihood
 from warpbrain.gp.hierarchy import CENTRE, EFFECTS, Hierarchy, prior
+from warpbrain.gp.literature.groups import STRETCHES
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.literature.study import Study
 from warpbrain.gp.observations import Places, observations
@@ -124,6 +125,32 @@ def test_far_from_the_data_it_is_neo_hookean_and_finite(group):
         np.testing.assert_allclose(z[3:], z[5], atol=1e-3)
     drawn = np.array([modulus(model, [group], stretches, number) for number in range(20)])
     assert np.isfinite(drawn).all()
+
+
+@pytest.mark.parametrize("variant", ["corrected", "as_published"])
+def test_curves_are_monotone_and_convex_far_beyond_the_data(variant):
+    """Mean and the curves two standard deviations from it, of every group: energies of a stable solid."""
+    model, stretches = trained("hierarchical", variant), np.linspace(0.2, 4.0, 191)
+    rest = np.argmin(np.abs(stretches - 1.0))
+    assert stretches[rest] == pytest.approx(1.0, abs=1e-12)
+    for group in model.groups:
+        for k in (-2.0, 0.0, 2.0):
+            energies = np.exp(model.curve(group, stretches, k))
+            slopes = np.diff(energies)
+            assert np.isfinite(energies).all()
+            assert np.all(slopes[:rest] < 0.0) and np.all(slopes[rest:] > 0.0), (group, k)
+            assert np.all(np.diff(slopes) > 0.0), (group, k)
+
+
+@pytest.mark.parametrize("group", ["hyperelastic/brain", GREY, WHITE])
+def test_draws_rise_away_from_rest_where_there_are_data(group):
+    """Few do not, in tension of the brain beyond 1.25; on wider stretches half of them do not."""
+    low, high = STRETCHES[group]
+    stretches = np.concatenate([np.linspace(low, 1.0, 100), np.linspace(1.0, high, 100)[1:]])
+    energies = np.array([np.exp(trained().draw([group], stretches, number)[0]) for number in range(100)])
+    slopes = np.diff(energies, axis=1)
+    rises = np.all(slopes[:, :99] < 0.0, axis=1) & np.all(slopes[:, 99:] > 0.0, axis=1)
+    assert rises.sum() >= (97 if group == "hyperelastic/brain" else 100)
 
 
 def test_the_overall_level_is_not_pulled_to_the_centre():
