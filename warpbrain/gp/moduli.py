@@ -44,7 +44,7 @@ class Moduli:
     rejection_rate: float
 
 
-def moduli(model: Process, group: str, law: str, draws: int = 400, seed: int = 0, poisson: float = 0.45) -> Moduli:
+def moduli(model: Process, group: str, law: str, draws: int = 200, seed: int = 0, poisson: float = 0.45) -> Moduli:
     """Fit a law to the curves of a group, and to draws of it.
 
     Parameters

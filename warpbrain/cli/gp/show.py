@@ -22,7 +22,7 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument("--group", metavar="GROUP", help='only this one, such as "hyperelastic/brain"')
     add_model(parser)
     parser.add_argument("--model", choices=LAWS, help="only laws of this kind (default: all three)")
-    parser.add_argument("--draws", type=int, default=400, metavar="N", help="for the intervals (default: 400)")
+    parser.add_argument("--draws", type=int, default=200, metavar="N", help="for the intervals (default: 200)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the draws (default: 0)")
     parser.add_argument("--poisson", type=float, default=0.45, metavar="NU", help="of the laws (default: 0.45)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-gp)")
