@@ -115,6 +115,7 @@ def test_show_prints_moduli_with_intervals(shown):
         assert f"{fitted.shear_modulus:.4g}" in done.out
         low, middle, high = (float(row[name]) for name in ("2.5 % [Pa]", "median of draws [Pa]", "97.5 % [Pa]"))
         assert low < middle < high
+    assert "60 draws each: their medians are known to" in done.out
 
 
 def test_show_writes_pictures(shown):

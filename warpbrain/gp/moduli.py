@@ -28,6 +28,8 @@ class Moduli:
         Why each of these is unstable; empty where it is not.
     median, low, high : float
         Of the shear modulus at rest [Pa] of stable draws: 50 %, 2.5 % and 97.5 % lie below.
+    median_error : float
+        Relative standard error of the median: the number of draws is finite.
     draws : int
     rejection_rate : float
         Part of the attempts that gave an unstable law.
@@ -40,11 +42,12 @@ class Moduli:
     median: float
     low: float
     high: float
+    median_error: float
     draws: int
     rejection_rate: float
 
 
-def moduli(model: Process, group: str, law: str, draws: int = 200, seed: int = 0, poisson: float = 0.45) -> Moduli:
+def moduli(model: Process, group: str, law: str, draws: int = 1000, seed: int = 0, poisson: float = 0.45) -> Moduli:
     """Fit a law to the curves of a group, and to draws of it.
 
     Parameters
@@ -71,7 +74,10 @@ def moduli(model: Process, group: str, law: str, draws: int = 200, seed: int = 0
     """
     fits = tuple(law_of_curve(model, group, k, law) for k in CURVES)
     drawn = list(draw_many(model, [group], law, draws, seed, poisson))
-    low, median, high = np.quantile([draw.shear_moduli[0] for draw in drawn], [0.025, 0.5, 0.975]).tolist()
+    values = np.array([draw.shear_moduli[0] for draw in drawn])
+    low, median, high = np.quantile(values, [0.025, 0.5, 0.975]).tolist()
+    # of a normal distribution's median, in logarithms
+    error = float(np.sqrt(0.5 * np.pi / draws) * np.log(values).std())
     return Moduli(
         group,
         law,
@@ -80,6 +86,7 @@ def moduli(model: Process, group: str, law: str, draws: int = 200, seed: int = 0
         median,
         low,
         high,
+        error,
         draws,
         rejection_rate(drawn),
     )

@@ -21,8 +21,10 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
     )
     parser.add_argument("--group", metavar="GROUP", help='only this one, such as "hyperelastic/brain"')
     add_model(parser)
-    parser.add_argument("--model", choices=LAWS, help="only laws of this kind (default: all three)")
-    parser.add_argument("--draws", type=int, default=200, metavar="N", help="for the intervals (default: 200)")
+    parser.add_argument(
+        "--model", choices=LAWS, help="only laws of this kind (default: all three of a --group, else neo-hookean)"
+    )
+    parser.add_argument("--draws", type=int, default=1000, metavar="N", help="for the intervals (default: 1000)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the draws (default: 0)")
     parser.add_argument("--poisson", type=float, default=0.45, metavar="NU", help="of the laws (default: 0.45)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-gp)")
@@ -53,9 +55,13 @@ def _show(options: argparse.Namespace) -> None:
         )
     out = output_folder(options.out or Path("warpbrain-gp"))
     groups = model.groups if options.group is None else (options.group,)
-    wanted = [(group, law) for group in groups for law in (LAWS if options.model is None else (options.model,))]
+    laws = (options.model,) if options.model else LAWS[:1] if options.group is None else LAWS
+    wanted = [(group, law) for group in groups for law in laws]
     studies = [study for study in model.studies if study.group in groups]
-    print(f"{model.name} model of the literature as {model.variant}: {len(studies)} studies of {len(groups)} groups")
+    print(
+        f"{model.name} model of the literature as {model.variant}: {len(studies)} studies of {len(groups)} group"
+        + "s" * (len(groups) > 1)
+    )
     bar = Progress("moduli")
     found = []
     for index, (group, law) in enumerate(wanted):
@@ -65,6 +71,8 @@ def _show(options: argparse.Namespace) -> None:
     print("", *moduli_lines(found), sep="\n")
     if any(reason for one in found for reason in one.unstable):
         print("(a modulus in brackets is of a law that is unstable)")
+    error = 100.0 * max(one.median_error for one in found)
+    print(f"{options.draws} draws each: their medians are known to {error:.0f} % or better")
     other = trained("coregionalised" if model.name == KINDS[0] else "hierarchical", options.variant or VARIANTS[0])
     write_moduli(out / "moduli.csv", found)
     save(draw_studies(model, options.group), out / "studies.png")
