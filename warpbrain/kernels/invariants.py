@@ -19,13 +19,7 @@ import warp as wp
 
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
-from warpbrain.kernels.tetrahedron import (
-    ElementKernels,
-    deformation_gradient,
-    simple_kernels,
-    store_blocks,
-    store_forces,
-)
+from warpbrain.kernels.tetrahedron import ElementKernels, element_kernels
 
 
 @wp.func
@@ -106,21 +100,9 @@ def invariant_kernels(
         K[2, 2] += isotropic
         return K
 
-    @wp.kernel(module=module)
-    def forces_and_tangents(
-        elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        parameters: wp.array2d[scalar],
-        u: wp.array[vec3],
-        element_forces: wp.array2d[vec3],
-        element_blocks: wp.array2d[mat33],
-    ):
-        e = elements[wp.tid()]
-        G = inverse_edges[e]
-        V = volume[e]
-        F = deformation_gradient(u, nodes[e], G)
+    @wp.func
+    def tangents_of(F: mat33, G: mat33, V: scalar, parameters: wp.array2d[scalar], e: int):
+        """`V P` and the tangent blocks of nodes 1 to 3, whose shape-function gradients are the rows of `G`."""
         cof = cofactor(F)
         J = wp.dot(F[0], cof[0])
         I1 = wp.ddot(F, F)
@@ -158,8 +140,7 @@ def invariant_kernels(
             K23 += second_block(f2, f3, c2, c3, s2, s3, p23, I1, B, m2, M12, M22, M2J)
             K33 += second_block(f3, f3, c3, c3, s3, s3, p33, I1, B, m2, M12, M22, M2J)
             VP += m2 * S
-        store_forces(VP, G, element_forces, e)
-        store_blocks(K11, K12, K13, K22, K23, K33, element_blocks, e)
+        return VP, K11, K12, K13, K22, K23, K33
 
     @wp.kernel(module=pointwise)
     def moduli(
@@ -190,5 +171,7 @@ def invariant_kernels(
             )
         blocks[e, j, k] = K
 
-    forces, energy, stress = simple_kernels(stress_of, energy_of, precision, module, pointwise)
-    return ElementKernels(forces, forces_and_tangents, energy, stress, moduli)
+    forces, forces_and_tangents, energy, stress = element_kernels(
+        stress_of, energy_of, tangents_of, precision, module, pointwise
+    )
+    return ElementKernels(forces, forces_and_tangents, energy, stress, moduli, tangents_of)

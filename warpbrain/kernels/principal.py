@@ -23,13 +23,7 @@ import warp as wp
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.svd import singular_value_decomposition
-from warpbrain.kernels.tetrahedron import (
-    ElementKernels,
-    deformation_gradient,
-    simple_kernels,
-    store_blocks,
-    store_forces,
-)
+from warpbrain.kernels.tetrahedron import ElementKernels, element_kernels
 
 
 @cache
@@ -83,39 +77,27 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
         _U, l, _V = singular_value_decomposition(F, small)
         return energy_density(l, parameters, e)
 
-    @wp.kernel(module=module)
-    def forces_and_tangents(
-        elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        parameters: wp.array2d[scalar],
-        u: wp.array[vec3],
-        element_forces: wp.array2d[vec3],
-        element_blocks: wp.array2d[mat33],
-    ):
-        e = elements[wp.tid()]
-        G = inverse_edges[e]
-        volume_e = volume[e]
-        U, l, V = singular_value_decomposition(deformation_gradient(u, nodes[e], G), small)
+    @wp.func
+    def tangents_of(F: mat33, G: mat33, volume: scalar, parameters: wp.array2d[scalar], e: int):
+        """`V P` and the tangent blocks of nodes 1 to 3, whose shape-function gradients are the rows of `G`."""
+        U, l, V = singular_value_decomposition(F, small)
         T, H, m = derivatives(l, parameters, e)
         same, swap = shear_moduli(l, T, m)
-        store_forces(volume_e * (U * wp.diag(T) * wp.transpose(V)), G, element_forces, e)
-        H = volume_e * H
-        same = volume_e * same
-        swap = volume_e * swap
+        VP = volume * (U * wp.diag(T) * wp.transpose(V))
+        H = volume * H
+        same = volume * same
+        swap = volume * swap
         # the rows of G V are V^T g_a
         GV = G * V
         p1, p2, p3 = GV[0], GV[1], GV[2]
-        store_blocks(
+        return (
+            VP,
             block(p1, p1, H, same, swap, U),
             block(p1, p2, H, same, swap, U),
             block(p1, p3, H, same, swap, U),
             block(p2, p2, H, same, swap, U),
             block(p2, p3, H, same, swap, U),
             block(p3, p3, H, same, swap, U),
-            element_blocks,
-            e,
         )
 
     @wp.kernel(module=pointwise)
@@ -133,5 +115,7 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
         # row j of V is V^T e_j
         blocks[e, j, k] = block(V[j], V[k], H, same, swap, U)
 
-    forces, energy, stress = simple_kernels(stress_of, energy_of, precision, module, pointwise)
-    return ElementKernels(forces, forces_and_tangents, energy, stress, moduli)
+    forces, forces_and_tangents, energy, stress = element_kernels(
+        stress_of, energy_of, tangents_of, precision, module, pointwise
+    )
+    return ElementKernels(forces, forces_and_tangents, energy, stress, moduli, tangents_of)

@@ -38,6 +38,8 @@ class ElementKernels:
     moduli : wp.Kernel
         ``(elements, F, parameters) -> blocks[e, j, l]`` with ``blocks[e, j, l][i, k] = dP_ij/dF_kl`` [Pa];
         launched over (elements, 3, 3).
+    tangents : wp.func
+        ``(F, G, V, parameters, row) -> V P, K11, K12, K13, K22, K23, K33``, of which kernels of other shapes are made.
     """
 
     forces: Any
@@ -45,6 +47,7 @@ class ElementKernels:
     energy: Any
     stress: Any
     moduli: Any
+    tangents: Any
 
 
 class DeviceLaw(Protocol):
@@ -96,15 +99,17 @@ def store_blocks(K11: Any, K12: Any, K13: Any, K22: Any, K23: Any, K33: Any, ele
     element_blocks[e, 9] = K33
 
 
-def simple_kernels(
-    stress_of: Any, energy_of: Any, precision: Precision, module: Any, pointwise: Any
-) -> tuple[Any, Any, Any]:
-    """Make the kernels that need no tangent, whatever shape the law has: forces, energy and stress of `ElementKernels`.
+def element_kernels(
+    stress_of: Any, energy_of: Any, tangents_of: Any, precision: Precision, module: Any, pointwise: Any
+) -> tuple[Any, Any, Any, Any]:
+    """Make the kernels that every law has alike: forces, forces and tangents, energy and stress of `ElementKernels`.
 
     Parameters
     ----------
     stress_of, energy_of : wp.func
         ``stress_of(F, parameters, e) -> P`` and ``energy_of(F, parameters, e) -> Psi``.
+    tangents_of : wp.func
+        See `ElementKernels.tangents`.
     precision : Precision
     module, pointwise : Module
         Where the kernels over a mesh, and those at given deformation gradients, are compiled.
@@ -125,6 +130,24 @@ def simple_kernels(
         G = inverse_edges[e]
         F = deformation_gradient(u, nodes[e], G)
         store_forces(volume[e] * stress_of(F, parameters, e), G, element_forces, e)
+
+    @wp.kernel(module=module)
+    def forces_and_tangents(
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        parameters: wp.array2d[scalar],
+        u: wp.array[vec3],
+        element_forces: wp.array2d[vec3],
+        element_blocks: wp.array2d[mat33],
+    ):
+        e = elements[wp.tid()]
+        G = inverse_edges[e]
+        F = deformation_gradient(u, nodes[e], G)
+        VP, K11, K12, K13, K22, K23, K33 = tangents_of(F, G, volume[e], parameters, e)
+        store_forces(VP, G, element_forces, e)
+        store_blocks(K11, K12, K13, K22, K23, K33, element_blocks, e)
 
     @wp.kernel(module=module)
     def energy(
@@ -158,4 +181,4 @@ def simple_kernels(
         density[e] = energy_of(F[e], parameters, e)
         P[e] = stress_of(F[e], parameters, e)
 
-    return forces, energy, stress
+    return forces, forces_and_tangents, energy, stress

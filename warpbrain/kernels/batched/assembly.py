@@ -1,0 +1,155 @@
+"""From elements to the systems of many samples: ordered sums into nodes and into the blocks of each matrix.
+
+The matrices are symmetric: the blocks `A_ij` with i <= j are kept, one for each pair of nodes that share an element.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warpbrain.kernels.batched.layout import ROWS, block_of, store_block, store_vector, vector_of
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.precision import Precision
+
+
+@dataclass(frozen=True)
+class BatchedAssemblyKernels:
+    """Assembly kernels of one precision; each has a lane as its last index.
+
+    Attributes
+    ----------
+    gather_matrix : wp.Kernel
+        One thread for a pair of nodes: `A_ij = k K_ij + m M_ij`, with `k` and `m` of the sample and the rows and
+        columns of constrained components replaced by those of the identity.
+    gather_forces : wp.Kernel
+        One thread for `ROWS` nodes: internal forces, and the shares of the squared norms of what is out of balance on
+        the free components and of the internal forces.
+    smallest : wp.Kernel
+        One thread for a share of the elements: their smallest `J`, NaN if one is.
+    constrained_load : wp.Kernel
+        One thread for a node: subtract `k K d`, of prescribed velocities `d`, from the right-hand side.
+    """
+
+    gather_matrix: Any
+    gather_forces: Any
+    smallest: Any
+    constrained_load: Any
+
+
+@cache
+def batched_assembly_kernels(precision: Precision) -> BatchedAssemblyKernels:
+    """Make (once) the batched assembly kernels of a precision."""
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = compiled_module(f"assembly_{precision.name}_batched")
+    rows = wp.constant(ROWS)
+
+    @wp.kernel(module=module)
+    def gather_matrix(
+        slots: wp.array[int],
+        count: wp.array[int],
+        pairs: wp.array[wp.vec2i],
+        first: wp.array[int],
+        contributions: wp.array[int],
+        element_blocks: wp.array3d[scalar],
+        mass: wp.array[scalar],
+        free: wp.array[vec3],
+        k: wp.array[scalar],
+        m: wp.array[scalar],
+        values: wp.array3d[scalar],
+    ):
+        p, lane = wp.tid()
+        if lane >= count[0]:
+            return
+        slot = slots[lane]
+        K = mat33()
+        for c in range(first[p], first[p + 1]):
+            K += block_of(element_blocks, contributions[c], slot)
+        i = pairs[p][0]
+        j = pairs[p][1]
+        A = wp.cw_mul(k[slot] * K, wp.outer(free[i], free[j]))
+        if i == j:
+            one = scalar(1.0)
+            inertia = m[slot] * mass[i]
+            for c in range(3):
+                A[c, c] += free[i][c] * inertia + (one - free[i][c])
+        store_block(values, p, slot, A)
+
+    @wp.kernel(module=module)
+    def gather_forces(
+        slots: wp.array[int],
+        count: wp.array[int],
+        first: wp.array[int],
+        corners: wp.array[int],
+        element_forces: wp.array3d[scalar],
+        external: wp.array[vec3],
+        free: wp.array[vec3],
+        internal: wp.array3d[scalar],
+        shares: wp.array3d[scalar],
+    ):
+        chunk, lane = wp.tid()
+        if lane >= count[0]:
+            return
+        slot = slots[lane]
+        unbalanced = scalar(0.0)
+        size = scalar(0.0)
+        for i in range(chunk * rows, wp.min((chunk + 1) * rows, internal.shape[0])):
+            f = vec3()
+            for c in range(first[i], first[i + 1]):
+                f += vector_of(element_forces, corners[c], slot)
+            store_vector(internal, i, slot, f)
+            lack = wp.cw_mul(free[i], external[i] - f)
+            unbalanced += wp.dot(lack, lack)
+            size += wp.dot(f, f)
+        shares[0, chunk, slot] = unbalanced
+        shares[1, chunk, slot] = size
+
+    @wp.kernel(module=module)
+    def smallest(
+        slots: wp.array[int], count: wp.array[int], size: int, values: wp.array2d[scalar], least: wp.array2d[scalar]
+    ):
+        chunk, lane = wp.tid()
+        if lane >= count[0]:
+            return
+        slot = slots[lane]
+        low = values[chunk * size, slot]
+        for i in range(chunk * size + 1, wp.min((chunk + 1) * size, values.shape[0])):
+            value = values[i, slot]
+            # once NaN, for ever NaN
+            if low == low and not (value >= low):
+                low = value
+        least[chunk, slot] = low
+
+    @wp.kernel(module=module)
+    def constrained_load(
+        slots: wp.array[int],
+        count: wp.array[int],
+        first: wp.array[int],
+        corners: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        element_blocks: wp.array3d[scalar],
+        velocity: wp.array3d[scalar],
+        free: wp.array[vec3],
+        k: wp.array[scalar],
+        load: wp.array3d[scalar],
+    ):
+        i, lane = wp.tid()
+        if lane >= count[0]:
+            return
+        slot = slots[lane]
+        f = vec3()
+        for c in range(first[i], first[i + 1]):
+            e = corners[c] / 4
+            a = corners[c] % 4
+            for b in range(4):
+                low = wp.min(a, b)
+                high = wp.max(a, b)
+                # position of the pair in the ten stored blocks
+                K = block_of(element_blocks, 10 * e + low * 4 - low * (low + 1) / 2 + high, slot)
+                if a > b:
+                    K = wp.transpose(K)
+                f += K * vector_of(velocity, nodes[e][b], slot)
+        store_vector(load, i, slot, vector_of(load, i, slot) - wp.cw_mul(free[i], k[slot] * f))
+
+    return BatchedAssemblyKernels(gather_matrix, gather_forces, smallest, constrained_load)

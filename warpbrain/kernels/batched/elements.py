@@ -1,0 +1,91 @@
+"""Element kernels of many samples, made of a law's device functions: forces, tangent blocks and `J`."""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warpbrain.kernels.batched.layout import store_block, store_vector, vector_of
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.tetrahedron import DeviceLaw
+
+
+@dataclass(frozen=True)
+class BatchedElementKernels:
+    """The kernel of one law in one precision.
+
+    Attributes
+    ----------
+    forces_and_tangents : wp.Kernel
+        One thread for an element of a group and a lane. Parameters have a row for each tissue and slot, slots fastest.
+        Element results are those of `warpbrain.kernels.tetrahedron`: corner ``4 e + a`` and block ``10 e + k``.
+    """
+
+    forces_and_tangents: Any
+
+
+@cache
+def batched_element_kernels(law: DeviceLaw, precision: Precision) -> BatchedElementKernels:
+    """Make (once) the batched element kernels of a law in a precision."""
+    scalar, mat33 = precision.scalar, precision.mat33
+    module = compiled_module(f"{law.key}_{precision.name}_batched")
+    tangents_of = law.kernels(precision).tangents
+
+    @wp.func
+    def gradient_of(u: wp.array3d[scalar], nodes: wp.vec4i, G: mat33, slot: int):
+        """`grad u`."""
+        u0 = vector_of(u, nodes[0], slot)
+        u1 = vector_of(u, nodes[1], slot) - u0
+        u2 = vector_of(u, nodes[2], slot) - u0
+        u3 = vector_of(u, nodes[3], slot) - u0
+        return wp.matrix_from_cols(u1, u2, u3) * G
+
+    @wp.kernel(module=module)
+    def forces_and_tangents(
+        slots: wp.array[int],
+        count: wp.array[int],
+        elements: wp.array[int],
+        tissue: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        parameters: wp.array2d[scalar],
+        u: wp.array3d[scalar],
+        element_forces: wp.array3d[scalar],
+        element_blocks: wp.array3d[scalar],
+        element_J: wp.array2d[scalar],
+    ):
+        t, lane = wp.tid()
+        if lane >= count[0]:
+            return
+        slot = slots[lane]
+        e = elements[t]
+        G = inverse_edges[e]
+        F = gradient_of(u, nodes[e], G, slot) + wp.identity(n=3, dtype=scalar)
+        element_J[e, slot] = wp.determinant(F)
+        VP, K11, K12, K13, K22, K23, K33 = tangents_of(F, G, volume[e], parameters, tissue[t] * u.shape[2] + slot)
+        f1 = VP * G[0]
+        f2 = VP * G[1]
+        f3 = VP * G[2]
+        store_vector(element_forces, 4 * e, slot, -(f1 + f2 + f3))
+        store_vector(element_forces, 4 * e + 1, slot, f1)
+        store_vector(element_forces, 4 * e + 2, slot, f2)
+        store_vector(element_forces, 4 * e + 3, slot, f3)
+        # each row and column of blocks sums to zero
+        K01 = -(K11 + wp.transpose(K12) + wp.transpose(K13))
+        K02 = -(K12 + K22 + wp.transpose(K23))
+        K03 = -(K13 + K23 + K33)
+        store_block(element_blocks, 10 * e, slot, -(K01 + K02 + K03))
+        store_block(element_blocks, 10 * e + 1, slot, K01)
+        store_block(element_blocks, 10 * e + 2, slot, K02)
+        store_block(element_blocks, 10 * e + 3, slot, K03)
+        store_block(element_blocks, 10 * e + 4, slot, K11)
+        store_block(element_blocks, 10 * e + 5, slot, K12)
+        store_block(element_blocks, 10 * e + 6, slot, K13)
+        store_block(element_blocks, 10 * e + 7, slot, K22)
+        store_block(element_blocks, 10 * e + 8, slot, K23)
+        store_block(element_blocks, 10 * e + 9, slot, K33)
+
+    return BatchedElementKernels(forces_and_tangents)

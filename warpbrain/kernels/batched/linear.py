@@ -1,0 +1,152 @@
+"""Conjugate gradients for many symmetric systems of one pattern: the batched side of `warpbrain.kernels.linear`.
+
+Warp's own CG knows batches too (`batch_offsets`): systems one behind the other in one long vector. Its products and
+updates run on all of them until the last has converged, the indices of the one mesh are stored and read once a system,
+and its dot products end in atomic sums or in tiles whose shape depends on the batch. Here the sample is the fastest
+index, the pattern is shared, sums have a fixed order, and a system that has converged leaves the list that the kernels
+are launched over. `docs/ensembles.md` has the times of both.
+
+A system need not end in the loop that it began in. The loop is left when few go on (`linger`); they keep their vectors
+and go on in the next one beside whatever has been started until then. So a system that takes a thousand iterations
+holds up nobody.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from warpbrain.kernels.batched.layout import stages
+from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
+from warpbrain.kernels.precision import Precision
+
+
+class BatchedConjugateGradient:
+    """Block-Jacobi CG for as many systems as there are slots; nothing is allocated in a solve.
+
+    Parameters
+    ----------
+    offsets, columns, blocks : wp.array of int
+        Pattern: start of each row in `columns`, block columns, and where each block (or its transpose, left of the
+        diagonal) is kept in `values`.
+    diagonal : wp.array of int, shape (n,)
+        Where each diagonal block is kept in `values`.
+    values : wp.array, shape (pairs, 9, slots)
+        Blocks on and above the diagonal.
+    solution : wp.array, shape (n, 3, slots)
+        `x`: the first guess and the result.
+    precision : Precision
+    tolerance : float
+        A system ends when ``|b - A x| <= tolerance |b|``.
+    max_iterations : int
+
+    Attributes
+    ----------
+    right_hand_side : wp.array, shape (n, 3, slots)
+        `b`; the residual takes its place.
+    solving : wp.array of int, shape (slots,)
+        1 while the system of a slot has not ended.
+    """
+
+    def __init__(
+        self,
+        offsets: wp.array,
+        columns: wp.array,
+        blocks: wp.array,
+        diagonal: wp.array,
+        values: wp.array,
+        solution: wp.array,
+        precision: Precision,
+        *,
+        tolerance: float,
+        max_iterations: int,
+    ) -> None:
+        n, _, slots = solution.shape
+        self._kernels = batched_solve_kernels(precision)
+        self._device = solution.device
+        self._pattern = (offsets, columns, blocks)
+        self._diagonal, self._values, self._x = diagonal, values, solution
+        self._tolerance = precision.scalar(tolerance)
+        self._max_iterations = max_iterations
+        self._size, self._slots = n, slots
+        self._chunks, self._groups = stages(n)
+
+        def zeros(*shape: int, dtype: Any = precision.scalar) -> wp.array:
+            return wp.zeros(shape, dtype=dtype, device=self._device)
+
+        self.right_hand_side = zeros(n, 3, slots)
+        self._z, self._p, self._q = zeros(n, 3, slots), zeros(n, 3, slots), zeros(n, 3, slots)
+        self._inverse = zeros(n, 6, slots)
+        self._shares, self._sums = zeros(3, self._chunks, slots), zeros(3, self._groups, slots)
+        self._alpha, self._beta = zeros(slots), zeros(slots)
+        self._rr, self._rz, self._goal = zeros(slots), zeros(slots), zeros(slots)
+        self._iterations = zeros(slots, dtype=int)
+        self.solving = zeros(slots, dtype=int)
+        self._active, self._count = zeros(slots, dtype=int), zeros(1, dtype=int)
+        self._go_on = zeros(1, dtype=int)
+
+    def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
+        # small blocks: those whose lanes have all ended make room at once
+        wp.launch(kernel, dim=dim, inputs=list(inputs), device=self._device, block_dim=128)
+
+    def start(self, slots: wp.array, count: wp.array) -> None:
+        """Begin the systems of a list of slots, whose matrices, right-hand sides and guesses have been set."""
+        k, lanes = self._kernels, self._slots
+        self._launch(k.invert_diagonal, (self._size, lanes), slots, count, self._diagonal, self._values, self._inverse)
+        self._launch(
+            k.start, (self._chunks, lanes), slots, count, *self._pattern, self._values, self._inverse, self._x,
+            self.right_hand_side, self._z, self._p, self._shares,
+        )  # fmt: skip
+        self._launch(k.add_shares, (3, self._groups, lanes), slots, count, self._shares, self._sums)
+        self._launch(
+            k.finish_start, lanes, slots, count, self._sums, self._tolerance, self._goal, self._rr, self._rz,
+            self._iterations, self.solving,
+        )  # fmt: skip
+
+    def iterate(self, slots: wp.array, count: wp.array, linger: wp.array) -> None:
+        """Go on with the systems of a list of slots until no more than `linger` (of one number) have not ended.
+
+        To be called while a graph is being captured, in which it becomes a loop on the device.
+        """
+
+        def gather() -> None:
+            self._count.zero_()
+            self._launch(
+                self._kernels.gather_active, self._slots, slots, count, self.solving, self._active, self._count
+            )
+            self._launch(self._kernels.go_on, 1, self._count, linger, self._go_on)
+
+        def cycle() -> None:
+            self._iteration()
+            gather()
+
+        gather()
+        wp.capture_while(self._go_on, cycle)
+
+    def _iteration(self) -> None:
+        k, lanes, chunks = self._kernels, self._slots, (self._chunks, self._slots)
+        active = (self._active, self._count)
+        self._launch(k.product, chunks, *active, *self._pattern, self._values, self._p, self._q, self._shares)
+        self._launch(k.add_shares, (1, self._groups, lanes), *active, self._shares, self._sums)
+        self._launch(k.finish_product, lanes, *active, self._sums, self._rz, self._alpha)
+        self._launch(
+            k.advance, chunks, *active, self._alpha, self._inverse, self._p, self._q, self._x, self.right_hand_side,
+            self._z, self._shares,
+        )  # fmt: skip
+        self._launch(k.add_shares, (2, self._groups, lanes), *active, self._shares, self._sums)
+        self._launch(
+            k.finish_advance, lanes, *active, self._sums, self._max_iterations, self._goal, self._rr, self._rz,
+            self._beta, self._iterations, self.solving,
+        )  # fmt: skip
+        self._launch(k.turn, chunks, *active, self._beta, self._z, self._p)
+
+    def results(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Iterations, residual norms and goals of all slots (waits for the device)."""
+        with np.errstate(invalid="ignore"):
+            return (
+                self._iterations.numpy().copy(),
+                np.sqrt(self._rr.numpy().astype(np.float64)),
+                np.sqrt(self._goal.numpy().astype(np.float64)),
+            )

@@ -1,0 +1,153 @@
+"""Kernels of a time step of many samples, each with a step length, a time and loads of its own.
+
+See `warpbrain.simulation.dynamics` for the equations.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warpbrain.kernels.batched.layout import store_vector, vector_of
+from warpbrain.kernels.batched.product import row_product
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.precision import Precision
+
+
+@dataclass(frozen=True)
+class BatchedMotionKernels:
+    """Kernels of a time step in one precision, one thread for a node and a lane.
+
+    Attributes
+    ----------
+    restore : wp.Kernel
+        Back to the start of the step, with no guess for its solution.
+    reset : wp.Kernel
+        At rest in the reference shape.
+    prescribe : wp.Kernel
+        Velocity of the constrained components that takes them to where they must be at the end of the step.
+    begin : wp.Kernel
+        Keeps the state and writes the right-hand side `b = M v + h (f_ext - f_int) - A v` on the free components.
+    update : wp.Kernel
+        Velocity and displacement at the end of the step, of the samples whose linear solve has ended.
+    """
+
+    restore: Any
+    reset: Any
+    prescribe: Any
+    begin: Any
+    update: Any
+
+
+@cache
+def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
+    """Make (once) the batched kernels of a time step in a precision."""
+    scalar, vec3 = precision.scalar, precision.vec3
+    module = compiled_module(f"motion_{precision.name}_batched")
+
+    @wp.kernel(module=module)
+    def restore(
+        slots: wp.array[int],
+        u_start: wp.array3d[scalar],
+        v_start: wp.array3d[scalar],
+        u: wp.array3d[scalar],
+        v: wp.array3d[scalar],
+        dv: wp.array3d[scalar],
+    ):
+        i, lane = wp.tid()
+        slot = slots[lane]
+        store_vector(u, i, slot, vector_of(u_start, i, slot))
+        store_vector(v, i, slot, vector_of(v_start, i, slot))
+        store_vector(dv, i, slot, vec3())
+
+    @wp.kernel(module=module)
+    def reset(slots: wp.array[int], u: wp.array3d[scalar], v: wp.array3d[scalar], dv: wp.array3d[scalar]):
+        i, lane = wp.tid()
+        slot = slots[lane]
+        store_vector(u, i, slot, vec3())
+        store_vector(v, i, slot, vec3())
+        store_vector(dv, i, slot, vec3())
+
+    @wp.kernel(module=module)
+    def prescribe(
+        slots: wp.array[int],
+        count: wp.array[int],
+        shapes: wp.array2d[vec3],
+        amounts: wp.array2d[scalar],
+        free: wp.array[vec3],
+        h: wp.array[scalar],
+        u: wp.array3d[scalar],
+        velocity: wp.array3d[scalar],
+    ):
+        i, lane = wp.tid()
+        if lane >= count[0]:
+            return
+        slot = slots[lane]
+        goal = vec3()
+        for shape in range(shapes.shape[0]):
+            goal += amounts[shape, slot] * shapes[shape, i]
+        held = vec3(scalar(1.0), scalar(1.0), scalar(1.0)) - free[i]
+        store_vector(velocity, i, slot, wp.cw_mul(held, (goal - vector_of(u, i, slot)) / h[slot]))
+
+    @wp.kernel(module=module)
+    def begin(
+        slots: wp.array[int],
+        count: wp.array[int],
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        blocks: wp.array[int],
+        values: wp.array3d[scalar],
+        loads: wp.array2d[vec3],
+        factors: wp.array2d[scalar],
+        internal: wp.array3d[scalar],
+        mass: wp.array[scalar],
+        free: wp.array[vec3],
+        h: wp.array[scalar],
+        u: wp.array3d[scalar],
+        v: wp.array3d[scalar],
+        u_start: wp.array3d[scalar],
+        v_start: wp.array3d[scalar],
+        b: wp.array3d[scalar],
+    ):
+        i, lane = wp.tid()
+        if lane >= count[0]:
+            return
+        slot = slots[lane]
+        vi = vector_of(v, i, slot)
+        store_vector(u_start, i, slot, vector_of(u, i, slot))
+        store_vector(v_start, i, slot, vi)
+        external = vec3()
+        for load in range(loads.shape[0]):
+            external += factors[load, slot] * loads[load, i]
+        Av = row_product(offsets, columns, blocks, values, v, i, slot)
+        step = h[slot] * (external - vector_of(internal, i, slot))
+        store_vector(b, i, slot, wp.cw_mul(free[i], mass[i] * vi + step - Av))
+
+    @wp.kernel(module=module)
+    def update(
+        slots: wp.array[int],
+        count: wp.array[int],
+        solving: wp.array[int],
+        u_start: wp.array3d[scalar],
+        v_start: wp.array3d[scalar],
+        dv: wp.array3d[scalar],
+        velocity: wp.array3d[scalar],
+        free: wp.array[vec3],
+        h: wp.array[scalar],
+        v: wp.array3d[scalar],
+        u: wp.array3d[scalar],
+    ):
+        i, lane = wp.tid()
+        if lane >= count[0]:
+            return
+        slot = slots[lane]
+        if solving[slot] != 0:
+            return
+        prescribed = vector_of(velocity, i, slot)
+        change = vector_of(v_start, i, slot) + vector_of(dv, i, slot) - prescribed
+        w = wp.cw_mul(free[i], change) + prescribed
+        store_vector(v, i, slot, w)
+        store_vector(u, i, slot, vector_of(u_start, i, slot) + h[slot] * w)
+
+    return BatchedMotionKernels(restore, reset, prescribe, begin, update)
