@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import SolveError
+from warpbrain.kernels.precision import Precision
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.held import require_held
 from warpbrain.simulation.phase_clock import PhaseClock
@@ -83,6 +84,11 @@ class RelaxationOptions:
     max_steps: int = 400
 
 
+def least_residual(tolerance: float, precision: Precision) -> float:
+    """The residual that counts as rest: many steps leave more rounding than one solve."""
+    return max(tolerance, 500.0 * precision.epsilon)
+
+
 def relax_to_rest(
     system: System,
     options: RelaxationOptions | None = None,
@@ -113,8 +119,7 @@ def relax_to_rest(
     clock = clock or PhaseClock(system.device)
     model = system.model
     require_held(model)
-    # many steps leave more rounding than one solve
-    goal = max(options.tolerance, 500.0 * system.precision.epsilon)
+    goal = least_residual(options.tolerance, system.precision)
     free = 1.0 - model.constrained
     external = model.external_forces()
     simulator = Simulator(system, time_step=options.time_step, tolerance=1e-8)

@@ -112,7 +112,6 @@ class BatchedConjugateGradient:
         """
 
         def gather() -> None:
-            self._count.zero_()
             self._launch(
                 self._kernels.gather_active, self._slots, slots, count, self.solving, self._active, self._count
             )

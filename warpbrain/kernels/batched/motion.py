@@ -31,6 +31,8 @@ class BatchedMotionKernels:
         Keeps the state and writes the right-hand side `b = M v + h (f_ext - f_int) - A v` on the free components.
     update : wp.Kernel
         Velocity and displacement at the end of the step, of the samples whose linear solve has ended.
+    find_ready : wp.Kernel
+        One thread for a slot: 1 where a state is to be evaluated, one that has just been reached or one that is marked.
     """
 
     restore: Any
@@ -38,6 +40,7 @@ class BatchedMotionKernels:
     prescribe: Any
     begin: Any
     update: Any
+    find_ready: Any
 
 
 @cache
@@ -150,4 +153,13 @@ def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
         store_vector(v, i, slot, w)
         store_vector(u, i, slot, vector_of(u_start, i, slot) + h[slot] * w)
 
-    return BatchedMotionKernels(restore, reset, prescribe, begin, update)
+    @wp.kernel(module=module)
+    def find_ready(
+        marked: wp.array[int], stepping: wp.array[int], solving: wp.array[int], ready: wp.array[int]
+    ):
+        slot = wp.tid()
+        ready[slot] = marked[slot]
+        if stepping[slot] != 0 and solving[slot] == 0:
+            ready[slot] = 1
+
+    return BatchedMotionKernels(restore, reset, prescribe, begin, update, find_ready)

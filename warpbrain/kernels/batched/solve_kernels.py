@@ -41,6 +41,8 @@ class BatchedSolveKernels:
         Second stage of the sums, one thread for `SHARES` shares.
     finish_start, finish_product, finish_advance : wp.Kernel
         Third stage, one thread for a sample: its scalars, and whether it goes on.
+    add_sums : wp.Kernel
+        Third stage of sums that are only looked at, one thread for a quantity.
     gather_active : wp.Kernel
         One thread for a lane: the list of the slots that go on, in the order of the list they come from.
     go_on : wp.Kernel
@@ -56,6 +58,7 @@ class BatchedSolveKernels:
     finish_start: Any
     finish_product: Any
     finish_advance: Any
+    add_sums: Any
     gather_active: Any
     go_on: Any
 
@@ -281,6 +284,8 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         active_count: wp.array[int],
     ):
         lane = wp.tid()
+        if lane == 0 and count[0] == 0:
+            active_count[0] = 0
         if lane >= count[0]:
             return
         # each lane counts those before it: no order of threads matters
@@ -294,6 +299,13 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
             active_count[0] = place + solving[slot]
 
     @wp.kernel(module=module)
+    def add_sums(slots: wp.array[int], count: wp.array[int], sums: wp.array3d[scalar], totals: wp.array2d[scalar]):
+        quantity, lane = wp.tid()
+        if lane >= count[0]:
+            return
+        totals[quantity, slots[lane]] = total_of(sums, quantity, slots[lane])
+
+    @wp.kernel(module=module)
     def go_on(active_count: wp.array[int], linger: wp.array[int], condition: wp.array[int]):
         condition[0] = 0
         if active_count[0] > linger[0]:
@@ -301,5 +313,5 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
 
     return BatchedSolveKernels(
         invert_diagonal, start, product, advance, turn, add_shares, finish_start, finish_product, finish_advance,
-        gather_active, go_on,
+        add_sums, gather_active, go_on,
     )  # fmt: skip

@@ -1,0 +1,341 @@
+"""A batch: as many samples as there are slots, stepped together on one device. Nothing is allocated in its loop.
+
+A pass does three things in one graph, each for a list of slots of its own:
+
+1. for those that begin a step: matrix, right-hand side and preconditioner at their present state;
+2. for those whose linear solve has not ended, these and older ones: conjugate gradients, until few have not ended;
+3. for those that have ended, and any that are marked: velocity, displacement, and then element forces, tangents, `J`
+   and the balance of forces, from which the floor above decides what each of them does next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.ensemble.batch_materials import BatchMaterials
+from warpbrain.ensemble.sample import Sample
+from warpbrain.kernels.batched.assembly import batched_assembly_kernels
+from warpbrain.kernels.batched.layout import stages
+from warpbrain.kernels.batched.linear import BatchedConjugateGradient
+from warpbrain.kernels.batched.motion import batched_motion_kernels
+from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
+from warpbrain.kernels.tetrahedron import PAIRS
+from warpbrain.simulation.dynamics import finest_tolerance
+from warpbrain.simulation.system import System
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class States:
+    """What is known of the state of each slot after a pass; arrays over all slots.
+
+    Attributes
+    ----------
+    ready : bool array
+        The state is new: the others are still being solved for, or empty.
+    min_J : array
+    unbalanced, internal : array
+        Norms of what is out of balance on the free components and of the internal forces [N].
+    cg_iterations : int array
+    cg_residual, cg_goal : array
+        Of the linear solve that led to the state.
+    """
+
+    ready: NDArray[np.bool_]
+    min_J: Floats
+    unbalanced: Floats
+    internal: Floats
+    cg_iterations: Ints
+    cg_residual: Floats
+    cg_goal: Floats
+
+
+class Batch:
+    """Slots for samples on a device.
+
+    Parameters
+    ----------
+    system : System
+        Mesh, pattern and masses, which all samples share; its own fields are not used.
+    samples : sequence of Sample
+        All that may ever be placed.
+    slots : int
+    tolerance : float
+        Relative tolerance of each linear solve; never finer than 20 rounding errors of the precision.
+    max_cg : int
+        Iterations of a linear solve.
+    linger : float
+        A pass ends when this part of the solves that it began with, or less, has not ended.
+
+    Attributes
+    ----------
+    time_step : array
+        `h` [s] of each slot in the step that it begins next.
+    load_factors : (loads, slots) array
+        Factors of the model's loads at the end of that step.
+    amounts : (shapes, slots) array
+        How much of each of `shapes` is to be reached at the end of that step.
+    shapes : (shapes, n, 3) array
+        Prescribed displacements [m] are sums of these.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        samples: Sequence[Sample],
+        slots: int,
+        *,
+        tolerance: float,
+        shapes: Floats | None = None,
+        max_cg: int = 2000,
+        linger: float = 0.25,
+    ) -> None:
+        self.system, self.slots = system, slots
+        self._linger = linger
+        self._device, self._precision = system.device, system.precision
+        self._materials = BatchMaterials(system, samples, slots)
+        self._kernels = batched_assembly_kernels(system.precision)
+        self._motion = batched_motion_kernels(system.precision)
+        self._sums_kernels = batched_solve_kernels(system.precision)
+        n = system.size
+        self.shapes = np.zeros((0, n, 3)) if shapes is None else shapes
+        self._place_state()
+        self._place_lists()
+        self._place_coefficients()
+        self._place_sums()
+        positions = system.pair_positions.numpy()
+        blocks = np.empty(system.matrix.nnz, dtype=np.int32)
+        blocks[positions[:, 0]] = blocks[positions[:, 1]] = np.arange(len(positions))
+        self._pattern = (system.matrix.offsets, system.matrix.columns, self._array(blocks, int))
+        self._cg = BatchedConjugateGradient(
+            *self._pattern,
+            self._array(blocks[system.diagonal.numpy()], int),
+            self._values,
+            self._dv,
+            system.precision,
+            tolerance=finest_tolerance(tolerance, system.precision),
+            max_iterations=max_cg,
+        )
+        self._graph: Any = None
+
+    # -- arrays ---------------------------------------------------------------------------------------------------
+
+    def _array(self, values: Any, dtype: Any) -> wp.array:
+        return wp.array(values, dtype=dtype, device=self._device)
+
+    def _zeros(self, *shape: int, dtype: Any = None) -> wp.array:
+        return wp.zeros(shape, dtype=dtype or self._precision.scalar, device=self._device)
+
+    def _place_state(self) -> None:
+        s, n, b = self.system, self.system.size, self.slots
+        self._u, self._v, self._dv = (self._zeros(n, 3, b) for _ in range(3))
+        self._u_start, self._v_start = self._zeros(n, 3, b), self._zeros(n, 3, b)
+        self._prescribed, self._internal = self._zeros(n, 3, b), self._zeros(n, 3, b)
+        self._element_forces = self._zeros(4 * s.elements, 3, b)
+        self._element_blocks = self._zeros(len(PAIRS) * s.elements, 9, b)
+        self._element_J = self._zeros(s.elements, b)
+        self._values = self._zeros(len(s.pairs), 9, b)
+
+    def _place_lists(self) -> None:
+        b = self.slots
+        self._all, self._all_count = self._array(np.arange(b), int), self._array([b], int)
+        self._start, self._start_count = self._zeros(b, dtype=int), self._zeros(1, dtype=int)
+        self._solve, self._solve_count = self._zeros(b, dtype=int), self._zeros(1, dtype=int)
+        self._fresh, self._fresh_count = self._zeros(b, dtype=int), self._zeros(1, dtype=int)
+        self._marked, self._stepping = self._zeros(b, dtype=int), self._zeros(b, dtype=int)
+        self._ready = self._zeros(b, dtype=int)
+        self._linger_count = self._zeros(1, dtype=int)
+        self._unsolved = np.zeros(b, dtype=bool)
+
+    def _place_coefficients(self) -> None:
+        model, p, b = self.system.model, self._precision, self.slots
+        self.time_step = np.ones(b)
+        self.load_factors = np.zeros((len(model.loads), b))
+        self.amounts = np.zeros((len(self.shapes), b))
+        self._h, self._k, self._m = self._zeros(b), self._zeros(b), self._zeros(b)
+        forces = [load.nodal_forces(model.mesh) for load in model.loads]
+        # no load is one load of nothing: a launch takes no array without rows
+        self._loads = self._array(np.array(forces) if forces else np.zeros((1, self.system.size, 3)), p.vec3)
+        self._factors = self._zeros(max(1, len(forces)), b)
+        self._final = self._array(model.external_forces(), p.vec3)
+        self._shapes = self._array(self.shapes, p.vec3) if len(self.shapes) else None
+        self._amounts = self._zeros(max(1, len(self.shapes)), b)
+
+    def _place_sums(self) -> None:
+        b, m = self.slots, self.system.elements
+        self._chunks, self._groups = stages(self.system.size)
+        self._shares, self._sums = self._zeros(2, self._chunks, b), self._zeros(2, self._groups, b)
+        self._totals = self._zeros(2, b)
+        self._J_share = int(np.ceil(np.sqrt(m)))
+        self._least_J = self._zeros(-(-m // self._J_share), b)
+        self._min_J = self._zeros(1, b)
+
+    # -- samples in slots -----------------------------------------------------------------------------------------
+
+    def place(self, numbers: Mapping[int, int]) -> None:
+        """Put samples, by their numbers, into slots: at rest, to be evaluated in the next pass."""
+        if not numbers:
+            return
+        self._materials.place(numbers)
+        slots = self._array(list(numbers), int)
+        self._launch(self._motion.reset, (self.system.size, len(numbers)), slots, self._u, self._v, self._dv)
+
+    def restore(self, slots: Sequence[int]) -> None:
+        """Back to the state before the last step, to be evaluated in the next pass."""
+        if not len(slots):
+            return
+        self._launch(
+            self._motion.restore, (self.system.size, len(slots)), self._array(slots, int), self._u_start,
+            self._v_start, self._u, self._v, self._dv,
+        )  # fmt: skip
+
+    def displacement(self, slot: int) -> Floats:
+        """`u` of a slot [m], shape (n, 3)."""
+        return self._u[:, :, slot].contiguous().numpy().astype(np.float64)
+
+    def internal_forces(self, slot: int) -> Floats:
+        """Internal forces of a slot [N], shape (n, 3)."""
+        return self._internal[:, :, slot].contiguous().numpy().astype(np.float64)
+
+    def element_J(self, slot: int) -> Floats:
+        """Volume ratio of each element of a slot, shape (m,)."""
+        return self._element_J[:, slot].contiguous().numpy().astype(np.float64)
+
+    # -- a pass ---------------------------------------------------------------------------------------------------
+
+    def advance(self, start: NDArray[np.intp], marked: NDArray[np.intp]) -> States:
+        """One pass.
+
+        Parameters
+        ----------
+        start : array of int
+            Slots that begin a step, of the lengths `time_step`, from a state that has been evaluated.
+        marked : array of int
+            Slots whose state is to be evaluated.
+        """
+        self._unsolved[start] = True
+        stepping = np.flatnonzero(self._unsolved)
+        self._write_list(self._start, self._start_count, start)
+        self._write_list(self._solve, self._solve_count, stepping)
+        self._write_flags(self._marked, marked)
+        self._write_flags(self._stepping, stepping)
+        self._linger_count.assign(np.array([int(self._linger * len(stepping))], dtype=np.int32))
+        self._write_coefficients()
+        if self._graph is None:
+            self._capture()
+        wp.capture_launch(self._graph)
+        ready = self._ready.numpy() != 0
+        self._unsolved[ready] = False
+        iterations, residual, goal = self._cg.results()
+        unbalanced, internal = np.sqrt(self._totals.numpy().astype(np.float64))
+        min_J = self._min_J.numpy()[0].astype(np.float64)
+        return States(ready, min_J, unbalanced, internal, iterations, residual, goal)
+
+    def _write_list(self, slots: wp.array, count: wp.array, values: NDArray[np.intp]) -> None:
+        padded = np.zeros(self.slots, dtype=np.int32)
+        padded[: len(values)] = values
+        slots.assign(padded)
+        count.assign(np.array([len(values)], dtype=np.int32))
+
+    def _write_flags(self, flags: wp.array, slots: NDArray[np.intp]) -> None:
+        values = np.zeros(self.slots, dtype=np.int32)
+        values[slots] = 1
+        flags.assign(values)
+
+    def _write_coefficients(self) -> None:
+        h, damping = self.time_step, self.system.model.damping
+        self._h.assign(h)
+        self._k.assign(h * damping.stiffness + h * h)
+        self._m.assign(1.0 + h * damping.mass)
+        if len(self.load_factors):
+            self._factors.assign(self.load_factors)
+        if len(self.amounts):
+            self._amounts.assign(self.amounts)
+
+    def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
+        # small blocks: those whose lanes have all ended make room at once
+        wp.launch(kernel, dim=dim, inputs=list(inputs), device=self._device, block_dim=128)
+
+    def _capture(self) -> None:
+        """Capture a pass in a graph: one launch from the host instead of hundreds."""
+        lists = (self._start_count, self._solve_count, self._marked, self._stepping)
+        kept = [wp.clone(values) for values in lists]
+        for values in lists:
+            values.zero_()
+        # a pass over empty lists loads every module
+        self._record()
+        for values, content in zip(lists, kept, strict=True):
+            wp.copy(values, content)
+        with wp.ScopedCapture(device=self._device) as capture:
+            self._record()
+        self._graph = capture.graph
+
+    def _record(self) -> None:
+        self._begin_steps()
+        self._cg.iterate(self._solve, self._solve_count, self._linger_count)
+        self._launch(
+            self._motion.update, (self.system.size, self.slots), self._solve, self._solve_count, self._cg.solving,
+            self._u_start, self._v_start, self._dv, self._prescribed, self.system.free, self._h, self._v, self._u,
+        )  # fmt: skip
+        self._launch(
+            self._motion.find_ready, self.slots, self._marked, self._stepping, self._cg.solving, self._ready
+        )
+        self._launch(
+            self._sums_kernels.gather_active, self.slots, self._all, self._all_count, self._ready, self._fresh,
+            self._fresh_count,
+        )  # fmt: skip
+        self._evaluate()
+
+    def _begin_steps(self) -> None:
+        s, lanes, begun = self.system, self.slots, (self._start, self._start_count)
+        if self._shapes is not None:
+            self._launch(
+                self._motion.prescribe, (s.size, lanes), *begun, self._shapes, self._amounts, s.free, self._h, self._u,
+                self._prescribed,
+            )  # fmt: skip
+        self._launch(
+            self._kernels.gather_matrix, (len(s.pairs), lanes), *begun, s.pairs, s.pair_first, s.contributions,
+            self._element_blocks, s.mass, s.free, self._k, self._m, self._values,
+        )  # fmt: skip
+        self._launch(
+            self._motion.begin, (s.size, lanes), *begun, *self._pattern, self._values, self._loads, self._factors,
+            self._internal, s.mass, s.free, self._h, self._u, self._v, self._u_start, self._v_start,
+            self._cg.right_hand_side,
+        )  # fmt: skip
+        if self._shapes is not None:
+            self._launch(
+                self._kernels.constrained_load, (s.size, lanes), *begun, s.corner_first, s.corners, s.nodes,
+                self._element_blocks, self._prescribed, s.free, self._k, self._cg.right_hand_side,
+            )  # fmt: skip
+        self._cg.start(*begun)
+
+    def _evaluate(self) -> None:
+        """Forces, tangents, `J` and balance at the states of the fresh list."""
+        s, lanes, fresh = self.system, self.slots, (self._fresh, self._fresh_count)
+        for group in self._materials.groups:
+            self._launch(
+                group.kernels.forces_and_tangents, (len(group.elements), lanes), *fresh, group.elements, group.tissue,
+                s.nodes, s.inverse_edges, s.volume, group.parameters, self._u, self._element_forces,
+                self._element_blocks, self._element_J,
+            )  # fmt: skip
+        self._launch(
+            self._kernels.gather_forces, (self._chunks, lanes), *fresh, s.corner_first, s.corners,
+            self._element_forces, self._final, s.free, self._internal, self._shares,
+        )  # fmt: skip
+        self._launch(
+            self._sums_kernels.add_shares, (2, self._groups, lanes), *fresh, self._shares, self._sums
+        )
+        self._launch(self._sums_kernels.add_sums, (2, lanes), *fresh, self._sums, self._totals)
+        shares = self._least_J.shape[0]
+        self._launch(
+            self._kernels.smallest, (shares, lanes), *fresh, self._J_share, self._element_J, self._least_J
+        )
+        self._launch(self._kernels.smallest, (1, lanes), *fresh, shares, self._least_J, self._min_J)

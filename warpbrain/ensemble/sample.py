@@ -1,0 +1,83 @@
+"""What goes into an ensemble and what comes out of it, as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.simulation.model import Material
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One set of parameters.
+
+    Attributes
+    ----------
+    number : int
+    materials : mapping of int to Material, or None
+        By tissue label; None if none could be found.
+    reason : str
+        Why there are none.
+    """
+
+    number: int
+    materials: Mapping[int, Material] | None
+    reason: str = ""
+
+    @property
+    def stiffness(self) -> float:
+        """Largest shear modulus [Pa]: samples of like stiffness need about as many iterations, so they go together."""
+        if self.materials is None:
+            return 0.0
+        return max(material.law.shear_modulus for material in self.materials.values())
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a sample ended.
+
+    Attributes
+    ----------
+    number : int
+    reason : str
+        Why it failed; empty if it did not.
+    steps : int
+        Time steps that were taken.
+    cg_iterations : int
+        Of all its linear solves, those of refused steps too.
+    time : float
+        Of the last state [s].
+    residual : float
+        Out-of-balance force of that state relative to all nodal forces, with every load at its end.
+    min_J : float
+        Smallest volume ratio of an element in that state.
+    u, reactions : (n, 3) array
+        Displacement [m], and what holds the constrained components [N]; of no nodes if the sample failed.
+    """
+
+    number: int
+    reason: str
+    steps: int
+    cg_iterations: int
+    time: float
+    residual: float
+    min_J: float
+    u: Floats
+    reactions: Floats
+
+    @property
+    def failed(self) -> bool:
+        """There is no answer."""
+        return bool(self.reason)
+
+
+def failure(number: int, reason: str, steps: int = 0, cg_iterations: int = 0, time: float = 0.0) -> Outcome:
+    """The outcome of a sample that has none."""
+    nothing = np.zeros((0, 3))
+    return Outcome(number, reason, steps, cg_iterations, time, float("nan"), float("nan"), nothing, nothing)
