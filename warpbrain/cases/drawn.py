@@ -59,7 +59,7 @@ def with_prior_draw(case: Case, number: int, seed: int = 0, model: Process | Non
     """
     asked = _default(model)
     labels = tuple(sorted(case.tissues))
-    _require_groups(case, labels, asked)
+    require_groups(case, labels, asked)
     tissues = [case.tissues[label] for label in labels]
     try:
         drawn = draw_laws(
@@ -88,7 +88,7 @@ def with_prior_middle(case: Case, model: Process | None = None) -> FromPrior:
     """
     asked = _default(model)
     labels = tuple(label for label, tissue in sorted(case.tissues.items()) if tissue.law is None)
-    _require_groups(case, labels, asked)
+    require_groups(case, labels, asked)
     changed = dict(case.tissues)
     for label in labels:
         tissue = changed[label]
@@ -102,7 +102,8 @@ def _default(model: Process | None) -> Process:
     return trained() if model is None else model
 
 
-def _require_groups(case: Case, labels: tuple[int, ...], model: Process) -> None:
+def require_groups(case: Case, labels: tuple[int, ...], model: Process) -> None:
+    """`InputError` with file, tissue and key, if a tissue has no group, or one that the model has seen no study of."""
     for label in labels:
         group = case.tissues[label].prior
         if group not in model.groups:

@@ -21,6 +21,10 @@ SHIPPED = {
 }
 
 
+#: Other names of shipped cases: the paper calls its phantom synthetic.
+ALIASES = {"synthetic": "phantom", "synthetic-fine": "phantom-fine"}
+
+
 def files_of(name: str) -> list[Path]:
     """Every `case.toml` of a shipped case or of a folder: the one of many tissues, and that of one tissue if there.
 
@@ -29,6 +33,7 @@ def files_of(name: str) -> list[Path]:
     InputError
         If there is no such case and no such folder.
     """
+    name = ALIASES.get(name, name)
     if name in SHIPPED:
         return [_DATA / file for file in SHIPPED[name].values()]
     path = _existing(name)
@@ -53,6 +58,7 @@ def find_case(name: str, tissue: str = "multi") -> Case:
     InputError
         If there is no such case, or it is wrong.
     """
+    name = ALIASES.get(name, name)
     if name in SHIPPED:
         return read_case(_DATA / SHIPPED[name][tissue])
     path = _existing(name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +24,14 @@ class Sample:
         By tissue label; None if none could be found.
     reason : str
         Why there are none.
+    deviations : mapping of int to float
+        Of a sweep: how many standard deviations each tissue's curve is from the mean, by label.
     """
 
     number: int
     materials: Mapping[int, Material] | None
     reason: str = ""
+    deviations: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def stiffness(self) -> float:

@@ -16,8 +16,8 @@ from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.simulation.observation import Observed
 
-#: Units as people read them: of a comparison, the factor and the name.
-_SHOWN = {"m": (MILLIMETRES, "mm"), "N": (1.0, "N"), "Pa": (1.0, "Pa"), "N m": (1.0, "N m")}
+#: Units as people read them, by that of a comparison, the factor and the name.
+SHOWN = {"m": (MILLIMETRES, "mm"), "N": (1.0, "N"), "Pa": (1.0, "Pa"), "N m": (1.0, "N m")}
 
 
 def describe_comparisons(observed: Observed) -> dict[str, Any]:
@@ -29,7 +29,7 @@ def describe_comparisons(observed: Observed) -> dict[str, Any]:
 
 
 def _describe(comparison: Comparison) -> dict[str, Any]:
-    factor, unit = _SHOWN[comparison.unit]
+    factor, unit = SHOWN[comparison.unit]
 
     def error(value: Error | None) -> dict[str, Any] | None:
         if value is None:
@@ -97,7 +97,7 @@ def write_comparisons(path: Path, case: Case, observed: Observed) -> None:
             + [f"{what}_{axis}" for what in ("recorded", "computed", "difference") for axis in "xyz"]
         )
         for comparison in observed.comparisons:
-            factor, unit = _SHOWN[comparison.unit]
+            factor, unit = SHOWN[comparison.unit]
             recording = recordings[comparison.name]
             for k, row in enumerate(comparison.rows):
                 place: Sequence[Any] = ("", "", "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,25 @@ from numpy.typing import NDArray
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
+from warpbrain.mesh import TetMesh
 from warpbrain.recordings.comparison import Comparison, compare_force, compare_points, compare_surface
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
-from warpbrain.simulation.result import Result
+
+
+class State(Protocol):
+    """What recordings are compared with: a `warpbrain.simulation.result.Result`, or less than that."""
+
+    @property
+    def mesh(self) -> TetMesh:
+        """The simulated mesh, undeformed."""
+
+    @property
+    def u(self) -> NDArray[np.float64]:
+        """Displacement [m], shape (n, 3)."""
+
+    @property
+    def reactions(self) -> NDArray[np.float64]:
+        """What holds the constrained components [N], shape (n, 3)."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +49,13 @@ class Observed:
     skipped: tuple[str, ...]
 
 
-def observe(case: Case, result: Result, time: float | None = None) -> Observed:
+def observe(case: Case, result: State, time: float | None = None) -> Observed:
     """Compare a state with the recordings of its case.
 
     Parameters
     ----------
     case : Case
-    result : Result
+    result : State
         Of the case's model.
     time : float, optional
         Of the state [s]; None for a state at rest, which is compared with the end of each recording. A recording
@@ -56,7 +73,7 @@ def observe(case: Case, result: Result, time: float | None = None) -> Observed:
     return Observed(tuple(comparisons), tuple(skipped))
 
 
-def _compare(case: Case, recording: Recording, result: Result, time: float | None) -> Comparison:
+def _compare(case: Case, recording: Recording, result: State, time: float | None) -> Comparison:
     if isinstance(recording, PointsRecording):
         return compare_points(recording, result.mesh, result.u, time)
     if isinstance(recording, SurfaceRecording):
@@ -65,7 +82,7 @@ def _compare(case: Case, recording: Recording, result: Result, time: float | Non
     return compare_force(recording, _resultant(case, recording, result, time), time)
 
 
-def _resultant(case: Case, recording: ForceRecording, result: Result, time: float | None) -> NDArray[np.float64]:
+def _resultant(case: Case, recording: ForceRecording, result: State, time: float | None) -> NDArray[np.float64]:
     """Force (3,) [N] with which the recording's boundary acts on the tissue."""
     boundary = case.boundary(recording.boundary)
     if isinstance(boundary, Forced):

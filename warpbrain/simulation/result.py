@@ -57,9 +57,14 @@ class Result:
 
     def displacement_statistics(self) -> Mapping[str, Statistics]:
         """Statistics of the displacement by node set, and of all nodes under ``"all nodes"``."""
-        sizes = np.linalg.norm(self.u, axis=1)
-        groups = {"all nodes": np.ones(len(sizes), dtype=bool), **self.mesh.node_sets}
-        return {name: _statistics(sizes[members]) for name, members in groups.items() if members.any()}
+        return displacement_statistics(self.mesh, self.u)
+
+
+def displacement_statistics(mesh: TetMesh, u: Floats) -> Mapping[str, Statistics]:
+    """Statistics of a displacement (n, 3) [m] by node set, and of all nodes under ``"all nodes"``."""
+    sizes = np.linalg.norm(u, axis=1)
+    groups = {"all nodes": np.ones(len(sizes), dtype=bool), **mesh.node_sets}
+    return {name: _statistics(sizes[members]) for name, members in groups.items() if members.any()}
 
 
 def _statistics(sizes: Floats) -> Statistics:

@@ -1,0 +1,255 @@
+"""`warpbrain ensemble`: many samples of a case as one batched simulation, resumed where it was left."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from warpbrain.errors import InputError, SolveError
+from warpbrain.terminal.progress import Progress
+
+if TYPE_CHECKING:
+    from warpbrain.cases.case import Case
+    from warpbrain.ensemble.job import Job
+    from warpbrain.ensemble.sample import Sample
+    from warpbrain.ensemble.store import Store
+    from warpbrain.ensemble.workers import Workers
+
+#: Samples where the arguments do not say how many: as many as the paper's sweep has.
+_SAMPLES = 289
+
+
+def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "ensemble",
+        help="simulate many samples of a case",
+        description="Simulates a case with many laws of the generative model, to rest or for a number of steps, and "
+        "writes samples.csv, fields.vtu and summary.json. What a killed run has computed is kept: the same command "
+        "goes on with what is missing.",
+    )
+    add = parser.add_argument
+    add(
+        "--case",
+        required=True,
+        metavar="NAME",
+        help="synthetic (the phantom), 0529, ... (see warpbrain cases), or the path of a case folder",
+    )
+    add("--tissue", choices=("single", "multi"), default="multi", help="one tissue, or grey and white (default)")
+    add("--model", metavar="LAW", help="neo-hookean, mooney-rivlin or ogden for every tissue (default: the case's own)")
+    chosen = parser.add_mutually_exclusive_group()
+    chosen.add_argument(
+        "--samples", type=int, metavar="N", help=f"draws 0 to N - 1 of the tissues' joint prior (default: {_SAMPLES})"
+    )
+    chosen.add_argument(
+        "--grid",
+        action="store_true",
+        help="the paper's sweep instead: curves of -2 to 2 standard deviations, 17 for a tissue, 289 pairs for two",
+    )
+    add("--seed", type=int, metavar="S", help="another sequence of draws (default: 0)")
+    add("--gp", metavar="MODEL", help="generative model: hierarchical (default), coregionalised or a folder")
+    add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
+    motion = parser.add_mutually_exclusive_group()
+    motion.add_argument("--steps", type=int, metavar="N", help="follow the motion for N time steps of 1 ms")
+    motion.add_argument("--to-rest", action="store_true", help="follow the damped motion until it is at rest (default)")
+    add(
+        "--tolerance",
+        type=float,
+        default=1e-8,
+        metavar="TOL",
+        help="out-of-balance force at rest, relative to all nodal forces (default: 1e-8)",
+    )
+    add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
+    add("--precision", choices=("double", "single"), default="double", help="default: double")
+    add("--batch", default="auto", metavar="B", help="samples at a time on a device (default: auto, by its memory)")
+    add("--processes", type=int, metavar="P", help="processes on the CPU (default: one for each processor)")
+    add(
+        "--dask",
+        metavar="ADDRESS",
+        help="spread over a Dask cluster, one worker a device: tcp://host:8786, or local[:N] for processes of this "
+        "machine",
+    )
+    add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-ensemble-CASE-TISSUE)")
+    add("--quiet", action="store_true", help="print nothing but errors")
+    parser.set_defaults(call=_ensemble)
+
+
+def _ensemble(options: argparse.Namespace) -> None:
+    _check(options)
+    say: Callable[..., None] = (lambda *_values, **_options: None) if options.quiet else print
+
+    from warpbrain.atomic import safe_name
+    from warpbrain.ensemble.results import results_of
+    from warpbrain.ensemble.store import Store
+    from warpbrain.report import summary as tables
+    from warpbrain.report.ensemble_files import table_of, write_fields, write_table
+    from warpbrain.report.ensemble_text import describe_ensemble, ensemble_lines
+    from warpbrain.report.files import write_summary
+    from warpbrain.simulation.of_case import model_of
+    from warpbrain.terminal.quiet import start_warp_quietly
+
+    start_warp_quietly()
+    case = _case(options)
+    samples, chosen = _samples(options, case)
+    model, _ = model_of(case)
+    job = _job(options, model, samples)
+    described = tables.describe_case(case, model)
+    course = "to rest" if options.steps is None else f"{options.steps} steps of 1 ms"
+    say(described["title"])
+    say(f"  mesh      {described['nodes']} nodes, {described['tetrahedra']} tetrahedra")
+    say(*(f"  assumed   {sentence}" for sentence in case.assumptions), sep="\n")
+    say(*(f"  left out  {sentence}" for sentence in tables.LEFT_OUT), sep="\n")
+    say(f"  samples   {len(samples)}: {chosen}; {course}, {options.precision} precision")
+
+    out = options.out or Path(f"warpbrain-ensemble-{safe_name(case.name)}-{options.tissue}")
+    with _workers(options) as workers:
+        about = {"case": case.name, "samples": len(samples), "chosen": chosen, "course": course, "on": workers.kind}
+        store = Store(out, job.fingerprint(workers.kind), {**about, "versions": job.versions}, model.constrained.any(1))
+        seconds, computed = _compute(job, store, workers, say, Progress("samples", options.quiet))
+
+    progress = Progress("summing up", options.quiet)
+    result = results_of(
+        case, model.mesh, samples, store.outcomes(), options.steps is None, lambda n: progress.show(n / len(samples))
+    )
+    progress.clear()
+    said = describe_ensemble(result)
+    say("", *ensemble_lines(said), sep="\n")
+    files = [*write_table(out, table_of(result)), "summary.json"]
+    if result.fields is not None:
+        write_fields(out / "fields.vtu", result.fields)
+        files.append("fields.vtu")
+    write_summary(
+        out / "summary.json",
+        {
+            "case": described,
+            "chosen": chosen,
+            "course": course,
+            "precision": options.precision,
+            "workers": workers.name,
+            "result": said,
+            "seconds": seconds,
+            "samples_computed_in_these_seconds": computed,
+            "versions": tables.machine(),
+        },
+    )
+    say("", f"written to {out}: {', '.join(files)}", sep="\n")
+    if result.fields is None:
+        raise SolveError(f"no sample of {len(samples)} has an answer; the reasons are in {out / 'samples.csv'}")
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Refuse bad numbers before anything heavy is imported; reads the size of a batch."""
+    for name, least in (("samples", 1), ("steps", 1), ("processes", 1), ("seed", 0)):
+        value = getattr(options, name)
+        if value is not None and value < least:
+            raise InputError(f"--{name} {value}: expected a whole number of at least {least}")
+    if options.poisson is not None and not -1.0 < options.poisson < 0.5:
+        raise InputError(f"--poisson {options.poisson:g}: expected a number in the open interval (-1, 0.5)")
+    if not 0.0 < options.tolerance < 1.0:
+        raise InputError(f"--tolerance {options.tolerance:g}: expected a number between 0 and 1")
+    if options.grid and options.seed is not None:
+        raise InputError(f"--seed {options.seed}: means nothing with --grid")
+    if options.dask is not None and options.processes is not None:
+        raise InputError(f"--processes {options.processes}: means nothing with --dask; write local:{options.processes}")
+    if options.batch == "auto":
+        options.batch = None
+    elif options.batch.isdecimal() and int(options.batch) > 0:
+        options.batch = int(options.batch)
+    else:
+        raise InputError(f"--batch {options.batch}: expected auto or a whole number of at least 1")
+
+
+def _case(options: argparse.Namespace) -> Case:
+    """The case as the arguments change it."""
+    from warpbrain.cases.shipped import find_case
+
+    case = find_case(options.case, options.tissue)
+    if case.specimen is not None:
+        raise InputError(f"{case.path}: [specimen]: a specimen's tests are run one by one: see warpbrain run")
+    if options.model is not None:
+        case = case.with_law(options.model)
+    return case if options.poisson is None else replace(case, poisson=options.poisson)
+
+
+def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str]:
+    """The samples, and in words how they were chosen."""
+    from warpbrain.ensemble.choosing import drawn_samples, swept_samples
+    from warpbrain.gp.trained import find_model
+
+    process = find_model(options.gp or "hierarchical")
+    by = f"the generative model {process.name} ({process.variant})"
+    if options.grid:
+        return swept_samples(case, process), f"the paper's sweep by {by}"
+    count, seed = options.samples or _SAMPLES, options.seed or 0
+    progress = Progress("drawing", options.quiet)
+    samples = drawn_samples(case, count, seed, process, lambda n: progress.show(n / count))
+    progress.clear()
+    return samples, f"draws 0 to {count - 1} of seed {seed} by {by}"
+
+
+def _job(options: argparse.Namespace, model: Any, samples: list[Sample]) -> Job:
+    from warpbrain.ensemble.job import Job
+
+    return Job(
+        model, tuple(samples), steps=options.steps, tolerance=options.tolerance, precision=options.precision
+    )
+
+
+@contextmanager
+def _workers(options: argparse.Namespace) -> Iterator[Workers]:
+    """Who computes, as the arguments say."""
+    from warpbrain.ensemble.workers import Here, Processes, kind_of, processors
+    from warpbrain.terminal.quiet import start_warp_quietly
+
+    if options.dask is not None:
+        from warpbrain.ensemble.cluster import Cluster
+
+        with Cluster(options.dask, processors(), options.device, options.batch, start_warp_quietly) as cluster:
+            yield cluster
+        return
+    count = options.processes or processors()
+    if kind_of(options.device) == "cpu" and count > 1:
+        yield Processes(count, options.batch, start_warp_quietly)
+        return
+    yield Here(options.device, options.batch)
+
+
+def _compute(
+    job: Job, store: Store, workers: Workers, say: Callable[..., None], progress: Progress
+) -> tuple[float, int]:
+    """Compute what the store lacks; returns the seconds that it took and how many samples they were."""
+    total, there = len(job.samples), store.numbers()
+    missing = [sample.number for sample in job.samples if sample.number not in there]
+    if there:
+        say(f"  resumed   {len(there)} of {total} samples are there, {len(missing)} are missing")
+    if not missing:
+        return 0.0, 0
+    say(f"  workers   {workers.name}")
+    start = time.perf_counter()
+    done = 0
+    try:
+        progress.show(len(there) / total, "loading kernels; the first run on a machine compiles them")
+        for ended in workers.outcomes(job.part(set(missing))):
+            store.write(ended)
+            done += len(ended)
+            rate = done / (time.perf_counter() - start)
+            left = (len(missing) - done) / rate
+            progress.show((len(there) + done) / total, f"{rate:.3g} a second, {_duration(left)} left")
+    finally:
+        progress.clear()
+    seconds = time.perf_counter() - start
+    say(f"  computed  {done} samples in {_duration(seconds)}, {done / seconds:.3g} a second")
+    return seconds, done
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min {rest} s" if minutes else f"{seconds:.3g} s"

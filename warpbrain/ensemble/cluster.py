@@ -1,0 +1,129 @@
+"""Workers of a Dask cluster, one a device. Dask is imported here and nowhere else.
+
+Each part carries everything it needs and its outcomes come back to the client, which writes them: workers share no file
+system with it. A worker that dies costs the time of its part, which the scheduler gives to another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Any
+
+from warpbrain.ensemble.job import Job
+from warpbrain.ensemble.memory import ENOUGH
+from warpbrain.ensemble.sample import Outcome
+from warpbrain.ensemble.workers import Prepare, compute_part, kind_of, parts_of
+from warpbrain.errors import InputError, SolveError
+
+#: Seconds to wait for a scheduler to answer, and for its first worker.
+_PATIENCE = 30
+
+
+def local_workers(address: str) -> int | None:
+    """Workers that ``local[:N]`` asks for, 0 if it does not say how many; None if it is the address of a scheduler.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    if address == "local":
+        return 0
+    if address.startswith("local:"):
+        count = address.removeprefix("local:")
+        if not count.isdecimal() or int(count) < 1:
+            raise InputError(f"--dask {address}: expected a whole number of workers of at least 1 after 'local:'")
+        return int(count)
+    if "://" not in address:
+        raise InputError(f"--dask {address}: expected the address of a scheduler, as tcp://host:8786, or local[:N]")
+    return None
+
+
+class Cluster:
+    """A Dask cluster, or one of processes of this machine that lives as long as this object's context.
+
+    Parameters
+    ----------
+    address : str
+        Of a scheduler; ``local`` or ``local:N`` starts processes here.
+    workers : int
+        How many ``local`` starts.
+    device : str or None
+        Warp device of each worker.
+    batch : int or None
+        Samples at a time on a worker; None for what it has memory for and pays.
+    prepare : callable
+        Called on a worker before each part.
+
+    Raises
+    ------
+    InputError
+        If Dask is not installed, or no scheduler or worker answers.
+    """
+
+    def __init__(self, address: str, workers: int, device: str | None, batch: int | None, prepare: Prepare) -> None:
+        count = local_workers(address)
+        try:
+            import distributed
+        except ImportError:
+            raise InputError('--dask: needs the dask extra: pip install "warpbrain[dask]"') from None
+        self._device, self._batch, self._prepare = device, batch, prepare
+        self._stack = ExitStack()
+        try:
+            self._client = self._connect(distributed, address, workers if count == 0 else count)
+            self._client.wait_for_workers(1, timeout=_PATIENCE)
+        except (OSError, ValueError) as error:
+            self._stack.close()
+            raise InputError(f"--dask {address}: no scheduler with a worker answers: {error}") from None
+        self.kind = str(self._client.submit(_kind, device, prepare, pure=False).result())
+        self._count = len(self._client.scheduler_info(n_workers=-1)["workers"])
+        self.name = f"{self._count} workers of {self._client.scheduler.address}"
+
+    def _connect(self, distributed: Any, address: str, workers: int | None) -> Any:
+        if workers is None:
+            return self._stack.enter_context(distributed.Client(address, timeout=_PATIENCE))
+        cluster = distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs="CRITICAL"
+        )
+        return self._stack.enter_context(distributed.Client(self._stack.enter_context(cluster)))
+
+    def __enter__(self) -> Cluster:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
+        """Outcomes of all samples of a job, as they become known.
+
+        Raises
+        ------
+        InputError
+            If a worker has other versions than this machine, or no such device.
+        SolveError
+            If a part has ended its worker again and again.
+        """
+        import distributed
+
+        parts = parts_of(job, self._count, self._batch or ENOUGH[self.kind])
+        pending = [
+            self._client.submit(compute_part, part, self._device, self._batch, self._prepare, pure=False)
+            for part in parts
+        ]
+        for part in distributed.as_completed(pending):
+            try:
+                outcomes = part.result()
+            except distributed.KilledWorker as error:
+                raise SolveError(f"a part of the ensemble ended its worker again and again: {error}") from None
+            yield outcomes
+            # it is written: the scheduler may forget it
+            part.release()
+
+
+def _kind(device: str | None, prepare: Prepare) -> str:
+    prepare()
+    return kind_of(device)

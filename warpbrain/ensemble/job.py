@@ -1,0 +1,104 @@
+"""A job: everything that decides the outcomes of an ensemble, as plain data that can travel to another machine."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from warpbrain import __version__
+from warpbrain.ensemble.course import Course
+from warpbrain.ensemble.moving import Moving
+from warpbrain.ensemble.resting import Resting
+from warpbrain.ensemble.sample import Outcome, Sample
+from warpbrain.ensemble.stepping import step_samples
+from warpbrain.errors import InputError
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.relaxation import RelaxationOptions
+from warpbrain.simulation.system import System, find_precision
+
+
+def _versions() -> dict[str, str]:
+    return {"warpbrain": __version__, "warp-lang": version("warp-lang")}
+
+
+@dataclass(frozen=True)
+class Job:
+    """Samples of a model and the course that they take.
+
+    Attributes
+    ----------
+    model : Model
+        Its own materials are not used.
+    samples : tuple of Sample
+    steps : int or None
+        Time steps; None: to rest.
+    time_step : float
+        Of a motion [s].
+    tolerance : float
+        Of rest; see `warpbrain.simulation.relaxation.RelaxationOptions`.
+    precision : str
+        ``"double"`` or ``"single"``.
+    versions : dict of str
+        Of what has computed, or will.
+    """
+
+    model: Model
+    samples: tuple[Sample, ...]
+    steps: int | None = None
+    time_step: float = 0.001
+    tolerance: float = 1e-8
+    precision: str = "double"
+    versions: dict[str, str] = None  # type: ignore[assignment]  # those of this machine
+
+    def __post_init__(self) -> None:
+        if self.versions is None:
+            object.__setattr__(self, "versions", _versions())
+
+    def part(self, numbers: Collection[int]) -> Job:
+        """The same job for some of its samples, by number."""
+        return replace(self, samples=tuple(sample for sample in self.samples if sample.number in numbers))
+
+    def course(self) -> Course:
+        """A new course for a batch of these samples."""
+        if self.steps is not None:
+            return Moving(self.model, self.steps, self.time_step)
+        return Resting(self.model, RelaxationOptions(tolerance=self.tolerance), find_precision(self.precision))
+
+    def system(self, device: str | None) -> System:
+        """The model on a device.
+
+        Raises
+        ------
+        InputError
+            If this machine does not have the versions that the job was made with: its bits would be others.
+        """
+        if self.versions != _versions():
+            raise InputError(f"a worker has {_versions()}, the job was made with {self.versions}")
+        return System(self.model, device, self.precision)
+
+    def outcomes(self, system: System, slots: int) -> Iterator[list[Outcome]]:
+        """Compute the samples, `slots` at a time, on the device of a system of this job's model."""
+        return step_samples(system, self.course(), self.samples, slots)
+
+    def fingerprint(self, kind: str) -> str:
+        """A hash of all that decides the outcomes' bits; `kind` is that of the devices, ``"cpu"`` or ``"cuda"``."""
+        model = self.model
+        digest = hashlib.sha256()
+        parts: list[Any] = [model.mesh.points, model.mesh.tetrahedra, model.mesh.tissue, model.constrained]
+        parts += [model.prescribed, model.external_forces(), model.density, model.damping, list(model.loads)]
+        parts += [(motion.nodes, motion.times, motion.values) for motion in model.motions]
+        parts += [(s.number, s.reason, sorted((s.materials or {}).items())) for s in self.samples]
+        parts += [self.steps, self.time_step, self.tolerance, self.precision, sorted(self.versions.items()), kind]
+        for part in parts:
+            for item in part if isinstance(part, tuple) else (part,):
+                digest.update(np.ascontiguousarray(item).tobytes() if isinstance(item, np.ndarray) else _text(item))
+        return digest.hexdigest()
+
+
+def _text(value: Any) -> bytes:
+    return f"{value!r};".encode()

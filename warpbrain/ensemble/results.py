@@ -1,0 +1,197 @@
+"""What an ensemble says: a row for each sample, and the displacement's mean, spread and percentiles at every node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.case import Case
+from warpbrain.ensemble.sample import Outcome, Sample
+from warpbrain.mesh import TetMesh
+from warpbrain.recordings.comparison import Comparison
+from warpbrain.simulation.observation import observe
+from warpbrain.simulation.result import Statistics, displacement_statistics
+
+Floats = NDArray[np.float64]
+
+#: Percentiles of the fields.
+PERCENTILES = (5, 50, 95)
+_NOTHING = np.zeros((0, 3))
+
+
+@dataclass(frozen=True)
+class Row:
+    """A sample and how it ended.
+
+    Attributes
+    ----------
+    sample : Sample
+    outcome : Outcome
+        Without its fields, which `Fields` sums up.
+    displacement : mapping of str to Statistics
+        By node set; empty if it failed.
+    comparisons : tuple of Comparison
+        With the case's recordings; empty if it failed.
+    """
+
+    sample: Sample
+    outcome: Outcome
+    displacement: Mapping[str, Statistics]
+    comparisons: tuple[Comparison, ...]
+
+    def error(self, recording: str) -> float:
+        """Root mean square error at a recording, in its unit."""
+        return next(c.after.root_mean_square for c in self.comparisons if c.name == recording)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean, standard deviation and percentiles of a quantity over the samples.
+
+    Attributes
+    ----------
+    mean, sd : array
+        The standard deviation is that of the samples themselves, with their number as its divisor.
+    percentiles : mapping of int to array
+    """
+
+    mean: Floats
+    sd: Floats
+    percentiles: Mapping[int, Floats]
+
+
+@dataclass(frozen=True)
+class Fields:
+    """The displacement over the samples that have an answer.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+    count : int
+    components : Spread
+        Of each component [m], arrays (n, 3).
+    size : Spread
+        Of its size [m], arrays (n,).
+    """
+
+    mesh: TetMesh
+    count: int
+    components: Spread
+    size: Spread
+
+
+@dataclass(frozen=True)
+class EnsembleResult:
+    """Everything that an ensemble says.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+        By number.
+    fields : Fields or None
+        None if no sample has an answer.
+    displacement : mapping of str to Spread
+        Of the samples' mean displacement by node set [m].
+    errors : mapping of str to Spread
+        Of the samples' root mean square errors by recording, in its unit.
+    not_compared : tuple of str
+        Why some recordings are not compared, a sentence each.
+    """
+
+    rows: tuple[Row, ...]
+    fields: Fields | None
+    displacement: Mapping[str, Spread]
+    errors: Mapping[str, Spread]
+    not_compared: tuple[str, ...]
+
+    @property
+    def failed(self) -> tuple[Row, ...]:
+        """Samples without an answer."""
+        return tuple(row for row in self.rows if row.outcome.failed)
+
+    @property
+    def done(self) -> tuple[Row, ...]:
+        """Samples with one."""
+        return tuple(row for row in self.rows if not row.outcome.failed)
+
+    def nearest(self, recording: str) -> Row:
+        """The sample with the least error at a recording."""
+        return min(self.done, key=lambda row: row.error(recording))
+
+
+@dataclass(frozen=True)
+class _Reached:
+    """A state for `observe`."""
+
+    mesh: TetMesh
+    u: Floats
+    reactions: Floats
+
+
+def results_of(
+    case: Case,
+    mesh: TetMesh,
+    samples: Sequence[Sample],
+    outcomes: Iterable[Outcome],
+    to_rest: bool,
+    on_sample: Callable[[int], None] | None = None,
+) -> EnsembleResult:
+    """Sum up the outcomes of samples.
+
+    Parameters
+    ----------
+    case : Case
+    mesh : TetMesh
+        Of the case's model.
+    samples : sequence of Sample
+    outcomes : iterable of Outcome
+        One for each sample, in any order.
+    to_rest : bool
+        They are states at rest, which are compared with the end of each recording.
+    on_sample : callable, optional
+        Called with the count of samples so far.
+    """
+    by_number = {sample.number: sample for sample in samples}
+    rows: dict[int, Row] = {}
+    states: dict[int, Floats] = {}
+    not_compared: dict[str, None] = {}
+    for outcome in outcomes:
+        displacement: Mapping[str, Statistics] = {}
+        comparisons: tuple[Comparison, ...] = ()
+        if not outcome.failed:
+            states[outcome.number] = outcome.u
+            displacement = displacement_statistics(mesh, outcome.u)
+            observed = observe(
+                case, _Reached(mesh, outcome.u, outcome.reactions), None if to_rest else outcome.time
+            )
+            comparisons = observed.comparisons
+            not_compared.update(dict.fromkeys(observed.skipped))
+        ended = replace(outcome, u=_NOTHING, reactions=_NOTHING)
+        rows[outcome.number] = Row(by_number[outcome.number], ended, displacement, comparisons)
+        if on_sample is not None:
+            on_sample(len(rows))
+    # by number: sums over samples then have one order, whoever computed which of them when
+    u = np.array([states[number] for number in sorted(states)])
+    fields = None
+    if len(u):
+        fields = Fields(mesh, len(u), spread_of(u), spread_of(np.linalg.norm(u, axis=2)))
+    ordered = tuple(rows[number] for number in sorted(rows))
+    done = [row for row in ordered if not row.outcome.failed]
+    sets = done[0].displacement if done else ()
+    recordings = [comparison.name for comparison in done[0].comparisons] if done else []
+    return EnsembleResult(
+        ordered,
+        fields,
+        {name: spread_of(np.array([row.displacement[name].mean for row in done])) for name in sets},
+        {name: spread_of(np.array([row.error(name) for row in done])) for name in recordings},
+        tuple(not_compared),
+    )
+
+
+def spread_of(values: Floats) -> Spread:
+    """Mean, standard deviation and percentiles over the first axis."""
+    levels = np.percentile(values, PERCENTILES, axis=0)
+    return Spread(values.mean(axis=0), values.std(axis=0), dict(zip(PERCENTILES, levels, strict=True)))

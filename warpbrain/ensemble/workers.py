@@ -1,0 +1,140 @@
+"""Who computes a job: this process, or processes of this machine (a cluster of others is in its own file).
+
+A part of a job is a pure function of what it is given, and every sample has the same bits wherever it is computed: who
+computes which part decides nothing. Warp's kernels on the CPU run on one thread, so there a process for each processor.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from typing import Protocol
+
+from warpbrain.ensemble.job import Job
+from warpbrain.ensemble.memory import ENOUGH, batch_size
+from warpbrain.ensemble.sample import Outcome
+from warpbrain.errors import SolveError
+from warpbrain.simulation.system import find_device
+
+#: Parts that each worker gets: the more, the less the others wait for the last.
+PARTS_EACH = 8
+
+#: Called on a worker before each part.
+Prepare = Callable[[], object]
+
+
+class Workers(Protocol):
+    """Computes jobs.
+
+    Attributes
+    ----------
+    kind : str
+        Of its devices, ``"cpu"`` or ``"cuda"``: bits differ between the two.
+    name : str
+        For people.
+    """
+
+    kind: str
+    name: str
+
+    def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
+        """Outcomes of all samples of a job, as they become known."""
+
+
+class Here:
+    """This process and one device.
+
+    Parameters
+    ----------
+    device : str or None
+    batch : int or None
+        Samples at a time; None for as many as the memory holds and pay.
+    """
+
+    def __init__(self, device: str | None, batch: int | None) -> None:
+        self._device, self._batch = find_device(device), batch
+        self.kind = kind_of(device)
+        self.name = f"{self._device.name} ({self._device.alias})"
+
+    def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
+        """Outcomes of all samples of a job, as they become known."""
+        system = job.system(self._device.alias)
+        yield from job.outcomes(system, batch_size(system, self._batch))
+
+
+class Processes:
+    """Processes of this machine, each on the CPU.
+
+    Parameters
+    ----------
+    count : int
+    batch : int or None
+    prepare : callable
+        Called in a process before each part.
+    """
+
+    def __init__(self, count: int, batch: int | None, prepare: Prepare) -> None:
+        self._count, self._batch, self._prepare = count, batch, prepare
+        self.kind = "cpu"
+        self.name = f"{count} processes on {find_device('cpu').name}"
+
+    def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
+        """Outcomes of all samples of a job, as they become known.
+
+        Raises
+        ------
+        SolveError
+            If a process is ended from outside.
+        """
+        pool = ProcessPoolExecutor(self._count, get_context("spawn"), _live_with, (os.getpid(),))
+        try:
+            parts = parts_of(job, self._count, self._batch or ENOUGH["cpu"])
+            pending = [pool.submit(compute_part, part, "cpu", self._batch, self._prepare) for part in parts]
+            for part in as_completed(pending):
+                yield part.result()
+        except BrokenProcessPool:
+            raise SolveError("a worker process was ended; the same command goes on with what is missing") from None
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def processors() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def kind_of(device: str | None) -> str:
+    """``"cpu"`` or ``"cuda"``."""
+    return "cuda" if find_device(device).is_cuda else "cpu"
+
+
+def compute_part(job: Job, device: str | None, batch: int | None, prepare: Prepare) -> list[Outcome]:
+    """All outcomes of a job: what a worker does."""
+    prepare()
+    system = job.system(device)
+    return [outcome for ended in job.outcomes(system, batch_size(system, batch)) for outcome in ended]
+
+
+def parts_of(job: Job, workers: int, least: int) -> list[Job]:
+    """The job in parts of like stiffness, of at least so many samples; the soft ones, which take longest, first."""
+    samples = sorted(job.samples, key=lambda sample: (sample.stiffness, sample.number))
+    size = max(least, -(-len(samples) // (PARTS_EACH * workers)))
+    return [job.part({s.number for s in samples[k : k + size]}) for k in range(0, len(samples), size)]
+
+
+def _live_with(parent: int) -> None:
+    """Prepare a worker process: it ends with its parent, however that ends, and leaves Ctrl-C to it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
