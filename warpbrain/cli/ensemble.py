@@ -108,8 +108,8 @@ def _ensemble(options: argparse.Namespace) -> None:
 
     out = options.out or Path(f"warpbrain-ensemble-{safe_name(case.name)}-{options.tissue}")
     with _workers(options) as workers:
-        about = {"case": case.name, "samples": len(samples), "chosen": chosen, "course": course, "on": workers.kind}
-        store = Store(out, job.fingerprint(workers.kind), {**about, "versions": job.versions}, model.constrained.any(1))
+        about = {"case": case.name, "samples": len(samples), "chosen": chosen, "course": course}
+        store = Store(out, job, workers.kind, about)
         seconds, computed = _compute(job, store, workers, say, Progress("samples", options.quiet))
 
     progress = Progress("summing up", options.quiet)
@@ -195,9 +195,7 @@ def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str
 def _job(options: argparse.Namespace, model: Any, samples: list[Sample]) -> Job:
     from warpbrain.ensemble.job import Job
 
-    return Job(
-        model, tuple(samples), steps=options.steps, tolerance=options.tolerance, precision=options.precision
-    )
+    return Job(model, tuple(samples), steps=options.steps, tolerance=options.tolerance, precision=options.precision)
 
 
 @contextmanager

@@ -285,9 +285,7 @@ class Batch:
             self._motion.update, (self.system.size, self.slots), self._solve, self._solve_count, self._cg.solving,
             self._u_start, self._v_start, self._dv, self._prescribed, self.system.free, self._h, self._v, self._u,
         )  # fmt: skip
-        self._launch(
-            self._motion.find_ready, self.slots, self._marked, self._stepping, self._cg.solving, self._ready
-        )
+        self._launch(self._motion.find_ready, self.slots, self._marked, self._stepping, self._cg.solving, self._ready)
         self._launch(
             self._sums_kernels.gather_active, self.slots, self._all, self._all_count, self._ready, self._fresh,
             self._fresh_count,
@@ -330,12 +328,8 @@ class Batch:
             self._kernels.gather_forces, (self._chunks, lanes), *fresh, s.corner_first, s.corners,
             self._element_forces, self._final, s.free, self._internal, self._shares,
         )  # fmt: skip
-        self._launch(
-            self._sums_kernels.add_shares, (2, self._groups, lanes), *fresh, self._shares, self._sums
-        )
+        self._launch(self._sums_kernels.add_shares, (2, self._groups, lanes), *fresh, self._shares, self._sums)
         self._launch(self._sums_kernels.add_sums, (2, lanes), *fresh, self._sums, self._totals)
         shares = self._least_J.shape[0]
-        self._launch(
-            self._kernels.smallest, (shares, lanes), *fresh, self._J_share, self._element_J, self._least_J
-        )
+        self._launch(self._kernels.smallest, (shares, lanes), *fresh, self._J_share, self._element_J, self._least_J)
         self._launch(self._kernels.smallest, (1, lanes), *fresh, shares, self._least_J, self._min_J)

@@ -17,7 +17,6 @@ from warpbrain.physics.laws import Law
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
 
-
 Floats = NDArray[np.float64]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any
 
@@ -44,7 +44,7 @@ class Job:
     precision : str
         ``"double"`` or ``"single"``.
     versions : dict of str
-        Of what has computed, or will.
+        Of this machine's packages; a worker must have the same.
     """
 
     model: Model
@@ -53,11 +53,7 @@ class Job:
     time_step: float = 0.001
     tolerance: float = 1e-8
     precision: str = "double"
-    versions: dict[str, str] = None  # type: ignore[assignment]  # those of this machine
-
-    def __post_init__(self) -> None:
-        if self.versions is None:
-            object.__setattr__(self, "versions", _versions())
+    versions: dict[str, str] = field(default_factory=_versions)
 
     def part(self, numbers: Collection[int]) -> Job:
         """The same job for some of its samples, by number."""

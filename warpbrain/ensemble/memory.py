@@ -49,6 +49,7 @@ def batch_size(system: System, asked: int | None = None) -> int:
     room = int(SHARE * free_bytes(system)) // each
     if room < (asked or 1):
         raise InputError(
-            f"--batch {asked or 'auto'}: a sample takes {each / 1e6:.0f} MB, and {system.device.alias} has room for {room}"
+            f"--batch {asked or 'auto'}: a sample takes {each / 1e6:.0f} MB, and {system.device.alias} has room for "
+            f"{room}"
         )
     return asked or min(room, ENOUGH["cuda" if system.device.is_cuda else "cpu"])

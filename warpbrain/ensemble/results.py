@@ -164,9 +164,7 @@ def results_of(
         if not outcome.failed:
             states[outcome.number] = outcome.u
             displacement = displacement_statistics(mesh, outcome.u)
-            observed = observe(
-                case, _Reached(mesh, outcome.u, outcome.reactions), None if to_rest else outcome.time
-            )
+            observed = observe(case, _Reached(mesh, outcome.u, outcome.reactions), None if to_rest else outcome.time)
             comparisons = observed.comparisons
             not_compared.update(dict.fromkeys(observed.skipped))
         ended = replace(outcome, u=_NOTHING, reactions=_NOTHING)

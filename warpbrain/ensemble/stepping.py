@@ -53,8 +53,7 @@ def step_samples(system: System, course: Course, samples: Sequence[Sample], slot
         verdict = course.judge(states)
         batch.restore(verdict.back.tolist())
         ended = [
-            _outcome(batch, course, int(slot), int(number_in[slot]), float(states.min_J[slot]))
-            for slot in verdict.done
+            _outcome(batch, course, int(slot), int(number_in[slot]), float(states.min_J[slot])) for slot in verdict.done
         ]
         for slot, reason in verdict.failed.items():
             taken = int(course.steps[slot]), int(course.cg_iterations[slot]), float(course.time[slot])

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.atomic import output_folder, whole_file
+from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.sample import Outcome
 from warpbrain.errors import InputError
 
@@ -26,12 +27,12 @@ class Store:
     ----------
     folder : Path
         Made if it is not there.
-    fingerprint : str
-        Of the ensemble; see `warpbrain.ensemble.job.Job.fingerprint`.
+    job : Job
+        All of the ensemble, whose fingerprint tells it from others.
+    kind : str
+        Of the devices, see `warpbrain.ensemble.job.Job.fingerprint`.
     about : mapping
         What a reader of `ensemble.json` should know of it; plain values.
-    held : (n,) bool array
-        Nodes with constrained components: reactions are kept there only.
 
     Raises
     ------
@@ -39,9 +40,11 @@ class Store:
         If the folder holds another ensemble, or cannot be written to.
     """
 
-    def __init__(self, folder: Path, fingerprint: str, about: Mapping[str, Any], held: NDArray[np.bool_]) -> None:
+    def __init__(self, folder: Path, job: Job, kind: str, about: Mapping[str, Any]) -> None:
         self.folder = folder
-        self._held = held
+        # reactions are kept at nodes with constrained components only
+        self._held = np.any(job.model.constrained, axis=1)
+        fingerprint = job.fingerprint(kind)
         manifest = output_folder(folder) / "ensemble.json"
         self._parts = folder / "samples"
         if manifest.exists():
@@ -50,7 +53,8 @@ class Store:
             if self._parts.exists():
                 raise InputError(f"{self._parts}: samples of an ensemble whose ensemble.json is missing: remove one")
             with whole_file(manifest) as scratch:
-                scratch.write_text(json.dumps({"fingerprint": fingerprint, **about}, indent=2) + "\n", encoding="utf-8")
+                known = {"fingerprint": fingerprint, **about, "devices": kind, "versions": job.versions}
+                scratch.write_text(json.dumps(known, indent=2) + "\n", encoding="utf-8")
         output_folder(self._parts)
         last = self._files()[-1:]
         self._next = int(last[0].stem.removeprefix("part-")) + 1 if last else 0
@@ -69,7 +73,7 @@ class Store:
         """Write outcomes, all or none of them."""
         good = [outcome for outcome in outcomes if not outcome.failed]
         n = len(self._held)
-        arrays = {
+        arrays: dict[str, Any] = {
             **{name: np.array([getattr(o, name) for o in outcomes]) for name in _NUMBERS},
             "reason": np.array([outcome.reason for outcome in outcomes], dtype=np.str_),
             "u": np.array([outcome.u for outcome in good]).reshape(-1, n, 3),
@@ -104,7 +108,9 @@ def _read(file: Path) -> dict[str, NDArray[Any]]:
         with np.load(file, allow_pickle=False) as arrays:
             return dict(arrays)
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise InputError(f"{file}: not a file of samples: {error}; remove it, and its samples are computed again") from None
+        raise InputError(
+            f"{file}: not a file of samples: {error}; remove it, and its samples are computed again"
+        ) from None
 
 
 def _require_same(manifest: Path, fingerprint: str) -> None:
@@ -114,5 +120,6 @@ def _require_same(manifest: Path, fingerprint: str) -> None:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{manifest}: not the manifest of an ensemble: {error}") from None
     if known != fingerprint:
-        about = ", ".join(f"{key} {value}" for key, value in found.items() if key != "fingerprint")
+        about = ", ".join(f"{key}: {value}" for key, value in found.items() if isinstance(value, str | int))
+        about = about.removeprefix(f"fingerprint: {known}, ")
         raise InputError(f"{manifest.parent}: holds another ensemble ({about}): choose another folder")

@@ -53,6 +53,9 @@ class ElementKernels:
 class DeviceLaw(Protocol):
     """What the floors above ask of the device code of a material law (see `warpbrain.physics.laws`)."""
 
+    def __hash__(self) -> int:
+        """Kernels are made once for each law."""
+
     @property
     def key(self) -> str:
         """Unique name of the law and its formulation, a valid identifier."""

@@ -82,7 +82,7 @@ def write_fields(path: Path, fields: Fields) -> None:
     import meshio
 
     mesh = fields.mesh
-    arrays = {name: members.astype(np.uint8) for name, members in mesh.node_sets.items()}
+    arrays: dict[str, Any] = {name: members.astype(np.uint8) for name, members in mesh.node_sets.items()}
     for name, spread in (("displacement", fields.components), ("size", fields.size)):
         arrays[f"{name}_mean"] = MILLIMETRES * spread.mean
         arrays[f"{name}_sd"] = MILLIMETRES * spread.sd

@@ -55,7 +55,10 @@ def ensemble_lines(described: Mapping[str, Any]) -> list[str]:
     for name, s in described["mean_displacement_mm"].items():
         lines.append(f"  {SET_TITLES.get(name, name):<22}{_columns(s)}")
     if described["rmse_at_recordings"]:
-        lines += ["", "RMSE at recordings            mean       sd      5 %     50 %     95 %   before   nearest sample"]
+        lines += [
+            "",
+            "RMSE at recordings            mean       sd      5 %     50 %     95 %   before   nearest sample",
+        ]
     for name, errors in described["rmse_at_recordings"].items():
         lines.append(
             f"  {name:<22}{_columns(errors['after'])}{errors['before']:>9.3f} {errors['unit']:<3}"

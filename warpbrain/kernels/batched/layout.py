@@ -55,7 +55,9 @@ def symmetric_of(blocks: wp.array3d[Any], i: int, slot: int):
     xz = blocks[i, 2, slot]
     yz = blocks[i, 4, slot]
     return wp.matrix_from_rows(
-        wp.vector(blocks[i, 0, slot], xy, xz), wp.vector(xy, blocks[i, 3, slot], yz), wp.vector(xz, yz, blocks[i, 5, slot])
+        wp.vector(blocks[i, 0, slot], xy, xz),
+        wp.vector(xy, blocks[i, 3, slot], yz),
+        wp.vector(xz, yz, blocks[i, 5, slot]),
     )
 
 

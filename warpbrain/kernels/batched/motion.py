@@ -154,9 +154,7 @@ def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
         store_vector(u, i, slot, vector_of(u_start, i, slot) + h[slot] * w)
 
     @wp.kernel(module=module)
-    def find_ready(
-        marked: wp.array[int], stepping: wp.array[int], solving: wp.array[int], ready: wp.array[int]
-    ):
+    def find_ready(marked: wp.array[int], stepping: wp.array[int], solving: wp.array[int], ready: wp.array[int]):
         slot = wp.tid()
         ready[slot] = marked[slot]
         if stepping[slot] != 0 and solving[slot] == 0:

@@ -192,9 +192,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
             store_vector(p, i, slot, vector_of(z, i, slot) + b * vector_of(p, i, slot))
 
     @wp.kernel(module=module)
-    def add_shares(
-        slots: wp.array[int], count: wp.array[int], shares: wp.array3d[scalar], sums: wp.array3d[scalar]
-    ):
+    def add_shares(slots: wp.array[int], count: wp.array[int], shares: wp.array3d[scalar], sums: wp.array3d[scalar]):
         quantity, group, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -289,8 +287,8 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         if lane >= count[0]:
             return
         # each lane counts those before it: no order of threads matters
-        place = int(0)
-        for other in range(lane):
+        place = wp.int32(0)
+        for other in range(lane):  # type: ignore[arg-type]
             place += solving[slots[other]]
         slot = slots[lane]
         if solving[slot] != 0:
