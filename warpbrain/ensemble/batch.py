@@ -197,13 +197,19 @@ class Batch:
             self._v_start, self._u, self._v, self._dv,
         )  # fmt: skip
 
-    def displacement(self, slot: int) -> Floats:
-        """`u` of a slot [m], shape (n, 3)."""
-        return self._u[:, :, slot].contiguous().numpy().astype(np.float64)
+    def displacements(self, slots: Sequence[int]) -> Floats:
+        """`u` of some slots [m], shape (slots, n, 3)."""
+        return self._collect(self._u, slots)
 
-    def internal_forces(self, slot: int) -> Floats:
-        """Internal forces of a slot [N], shape (n, 3)."""
-        return self._internal[:, :, slot].contiguous().numpy().astype(np.float64)
+    def internal_forces(self, slots: Sequence[int]) -> Floats:
+        """Internal forces of some slots [N], shape (slots, n, 3)."""
+        return self._collect(self._internal, slots)
+
+    def _collect(self, values: wp.array, slots: Sequence[int]) -> Floats:
+        n = self.system.size
+        collected = wp.empty((len(slots), n), dtype=self._precision.vec3, device=self._device)
+        self._launch(self._motion.collect, (len(slots), n), self._array(slots, int), values, collected)
+        return collected.numpy().astype(np.float64)
 
     def element_J(self, slot: int) -> Floats:
         """Volume ratio of each element of a slot, shape (m,)."""

@@ -6,6 +6,7 @@ system with it. A worker that dies costs the time of its part, which the schedul
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import ExitStack
 from types import TracebackType
@@ -69,6 +70,8 @@ class Cluster:
             import distributed
         except ImportError:
             raise InputError('--dask: needs the dask extra: pip install "warpbrain[dask]"') from None
+        # what it logs of workers that come and go is no news to a user; errors come as exceptions
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
         self._device, self._batch, self._prepare = device, batch, prepare
         self._stack = ExitStack()
         try:
@@ -85,7 +88,7 @@ class Cluster:
         if workers is None:
             return self._stack.enter_context(distributed.Client(address, timeout=_PATIENCE))
         cluster = distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs="CRITICAL"
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs="CRITICAL"
         )
         return self._stack.enter_context(distributed.Client(self._stack.enter_context(cluster)))
 

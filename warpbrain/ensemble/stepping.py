@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpbrain.ensemble.batch import Batch
 from warpbrain.ensemble.course import Course
@@ -35,13 +36,16 @@ def step_samples(system: System, course: Course, samples: Sequence[Sample], slot
     if impossible:
         yield impossible
     queue = sorted((s for s in samples if s.materials is not None), key=lambda s: (s.stiffness, s.number))
-    if not queue:
-        return
-    slots = min(slots, len(queue))
-    batch = Batch(system, queue, slots, tolerance=course.tolerance, shapes=course.shapes())
+    if queue:
+        batch = Batch(system, queue, min(slots, len(queue)), tolerance=course.tolerance, shapes=course.shapes())
+        yield from step_batch(batch, course, [sample.number for sample in queue])
+
+
+def step_batch(batch: Batch, course: Course, numbers: Sequence[int]) -> Iterator[list[Outcome]]:
+    """Compute samples of a batch, by their numbers and in this order; see `step_samples`."""
     course.attach(batch)
-    number_in = np.full(slots, -1)
-    waiting = [sample.number for sample in queue]
+    number_in = np.full(batch.slots, -1)
+    waiting = list(numbers)
     go = back = np.zeros(0, dtype=np.intp)
     while waiting or np.any(number_in >= 0):
         free = np.flatnonzero(number_in < 0)[: len(waiting)]
@@ -52,9 +56,7 @@ def step_samples(system: System, course: Course, samples: Sequence[Sample], slot
         states = batch.advance(go, np.concatenate([back, free]))
         verdict = course.judge(states)
         batch.restore(verdict.back.tolist())
-        ended = [
-            _outcome(batch, course, int(slot), int(number_in[slot]), float(states.min_J[slot])) for slot in verdict.done
-        ]
+        ended = _answers(batch, course, verdict.done.tolist(), number_in, states.min_J)
         for slot, reason in verdict.failed.items():
             taken = int(course.steps[slot]), int(course.cg_iterations[slot]), float(course.time[slot])
             ended.append(failure(int(number_in[slot]), reason, *taken))
@@ -65,17 +67,27 @@ def step_samples(system: System, course: Course, samples: Sequence[Sample], slot
             yield sorted(ended, key=lambda outcome: outcome.number)
 
 
-def _outcome(batch: Batch, course: Course, slot: int, number: int, min_J: float) -> Outcome:
-    model, time = course.model, float(course.time[slot])
-    reactions = batch.internal_forces(slot) - model.external_forces(time)
-    return Outcome(
-        number=number,
-        reason="",
-        steps=int(course.steps[slot]),
-        cg_iterations=int(course.cg_iterations[slot]),
-        time=time,
-        residual=float(course.residual[slot]),
-        min_J=min_J,
-        u=batch.displacement(slot),
-        reactions=np.where(model.constrained, reactions, 0.0),
-    )
+def _answers(
+    batch: Batch, course: Course, slots: list[int], number_in: NDArray[np.int_], min_J: NDArray[np.float64]
+) -> list[Outcome]:
+    """Outcomes of the samples in some slots, which have their answer."""
+    if not slots:
+        return []
+    model = course.model
+    found = []
+    for slot, u, internal in zip(slots, batch.displacements(slots), batch.internal_forces(slots), strict=True):
+        time = float(course.time[slot])
+        found.append(
+            Outcome(
+                number=int(number_in[slot]),
+                reason="",
+                steps=int(course.steps[slot]),
+                cg_iterations=int(course.cg_iterations[slot]),
+                time=time,
+                residual=float(course.residual[slot]),
+                min_J=float(min_J[slot]),
+                u=u,
+                reactions=np.where(model.constrained, internal - model.external_forces(time), 0.0),
+            )
+        )
+    return found

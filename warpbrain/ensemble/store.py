@@ -72,12 +72,12 @@ class Store:
     def write(self, outcomes: Sequence[Outcome]) -> None:
         """Write outcomes, all or none of them."""
         good = [outcome for outcome in outcomes if not outcome.failed]
-        n = len(self._held)
+        n, held = len(self._held), np.count_nonzero(self._held)
         arrays: dict[str, Any] = {
             **{name: np.array([getattr(o, name) for o in outcomes]) for name in _NUMBERS},
             "reason": np.array([outcome.reason for outcome in outcomes], dtype=np.str_),
             "u": np.array([outcome.u for outcome in good]).reshape(-1, n, 3),
-            "reactions": np.array([outcome.reactions[self._held] for outcome in good]).reshape(len(good), -1, 3),
+            "reactions": np.array([outcome.reactions[self._held] for outcome in good]).reshape(-1, held, 3),
         }
         with whole_file(self._parts / f"part-{self._next:06d}.npz") as scratch, scratch.open("wb") as stream:
             np.savez(stream, **arrays)
@@ -107,7 +107,7 @@ def _read(file: Path) -> dict[str, NDArray[Any]]:
     try:
         with np.load(file, allow_pickle=False) as arrays:
             return dict(arrays)
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise InputError(
             f"{file}: not a file of samples: {error}; remove it, and its samples are computed again"
         ) from None

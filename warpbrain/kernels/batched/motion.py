@@ -33,6 +33,8 @@ class BatchedMotionKernels:
         Velocity and displacement at the end of the step, of the samples whose linear solve has ended.
     find_ready : wp.Kernel
         One thread for a slot: 1 where a state is to be evaluated, one that has just been reached or one that is marked.
+    collect : wp.Kernel
+        One thread for a slot of a list and a node: a sample's vectors side by side, as they leave the device.
     """
 
     restore: Any
@@ -41,6 +43,7 @@ class BatchedMotionKernels:
     begin: Any
     update: Any
     find_ready: Any
+    collect: Any
 
 
 @cache
@@ -160,4 +163,9 @@ def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
         if stepping[slot] != 0 and solving[slot] == 0:
             ready[slot] = 1
 
-    return BatchedMotionKernels(restore, reset, prescribe, begin, update, find_ready)
+    @wp.kernel(module=module)
+    def collect(slots: wp.array[int], x: wp.array3d[scalar], collected: wp.array2d[vec3]):
+        place, i = wp.tid()
+        collected[place, i] = vec3(x[i, 0, slots[place]], x[i, 1, slots[place]], x[i, 2, slots[place]])
+
+    return BatchedMotionKernels(restore, reset, prescribe, begin, update, find_ready, collect)

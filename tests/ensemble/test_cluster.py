@@ -1,0 +1,119 @@
+"""A real Dask cluster of processes on loopback: the bits of the local run, also when a worker is killed in the middle."""
+
+import os
+import signal
+from collections.abc import Iterator
+
+import distributed
+import pytest
+from command import warpbrain
+from many_samples import computed, samples_of, shaken_block
+from material_point import LAWS
+
+from warpbrain.ensemble.cluster import Cluster, local_workers
+from warpbrain.ensemble.job import Job
+from warpbrain.ensemble.sample import Outcome
+from warpbrain.errors import InputError
+from warpbrain.terminal.quiet import start_warp_quietly
+
+WORKERS = 2
+#: Enough moduli for parts to be many.
+MODULI = tuple(500.0 + 150.0 * k for k in range(24))
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[distributed.LocalCluster]:
+    with distributed.LocalCluster(
+        n_workers=WORKERS, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs="CRITICAL"
+    ) as cluster:
+        yield cluster
+
+
+def job(steps: int) -> Job:
+    model = shaken_block(LAWS["neo-hookean"])
+    return Job(model, tuple(samples_of(model, MODULI)), steps=steps)
+
+
+def bits(outcomes: dict[int, Outcome]) -> dict[int, tuple]:
+    return {n: (o.u.tobytes(), o.reactions.tobytes(), o.steps, o.cg_iterations, o.reason) for n, o in outcomes.items()}
+
+
+def alone(work: Job) -> dict[int, Outcome]:
+    return computed(work.system("cpu"), work.course(), list(work.samples), 5)
+
+
+def test_a_cluster_has_the_bits_of_the_local_run(cluster):
+    work = job(4)
+    with Cluster(cluster.scheduler_address, 1, "cpu", None, start_warp_quietly) as workers:
+        assert workers.kind == "cpu"
+        assert workers.name == f"{WORKERS} workers of {cluster.scheduler_address}"
+        parts = list(workers.outcomes(work))
+    assert len(parts) >= 2 * WORKERS
+    assert bits({o.number: o for part in parts for o in part}) == bits(alone(work))
+
+
+def test_a_killed_worker_costs_only_time(cluster):
+    work = job(150)
+    found: dict[int, Outcome] = {}
+    killed: list[int] = []
+    with Cluster(cluster.scheduler_address, 1, "cpu", None, start_warp_quietly) as workers:
+        process = workers._client.run(os.getpid)
+        for part in workers.outcomes(work):
+            found.update({o.number: o for o in part})
+            if not killed:
+                busy = next(address for address, tasks in workers._client.processing().items() if tasks)
+                killed.append(process[busy])
+                os.kill(process[busy], signal.SIGKILL)
+        # the cluster has grown a new worker, or is about to
+        workers._client.wait_for_workers(WORKERS, timeout=30)
+        assert killed[0] not in workers._client.run(os.getpid).values()
+    assert bits(found) == bits(alone(work))
+
+
+def test_local_starts_its_own_cluster(tmp_path):
+    arguments = [
+        "ensemble",
+        "--case",
+        "0529",
+        "--tissue",
+        "single",
+        "--samples",
+        "4",
+        "--steps",
+        "2",
+        "--device",
+        "cpu",
+    ]
+    one = warpbrain(*arguments, "--processes", "1", "--out", tmp_path / "one")
+    many = warpbrain(*arguments, "--dask", "local:2", "--out", tmp_path / "many")
+    assert (one.status, many.status) == (0, 0), one.err + many.err
+    assert "2 workers of tcp://127.0.0.1:" in many.out
+    assert (tmp_path / "one" / "samples.csv").read_bytes() == (tmp_path / "many" / "samples.csv").read_bytes()
+
+
+def test_a_worker_of_another_version_is_refused(cluster):
+    work = job(1)
+    other = Job(work.model, work.samples, steps=1, versions={**work.versions, "warp-lang": "0.0"})
+    with (
+        Cluster(cluster.scheduler_address, 1, "cpu", None, start_warp_quietly) as workers,
+        pytest.raises(InputError, match="a worker has"),
+    ):
+        list(workers.outcomes(other))
+
+
+def test_a_device_that_no_worker_has(cluster):
+    with pytest.raises(InputError, match="device 'cuda:7': not found on this machine"):
+        Cluster(cluster.scheduler_address, 1, "cuda:7", None, start_warp_quietly)
+
+
+def test_no_scheduler(monkeypatch):
+    monkeypatch.setattr("warpbrain.ensemble.cluster._PATIENCE", 1)
+    with pytest.raises(InputError, match="--dask tcp://127.0.0.1:9: no scheduler with a worker answers"):
+        Cluster("tcp://127.0.0.1:9", 1, "cpu", None, start_warp_quietly)
+
+
+def test_addresses():
+    assert (local_workers("local"), local_workers("local:3"), local_workers("tcp://host:8786")) == (0, 3, None)
+    for wrong in ("local:", "local:x", "local:-1", "host:8786", ""):
+        with pytest.raises(InputError, match="--dask"):
+            local_workers(wrong)
