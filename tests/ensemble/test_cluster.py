@@ -1,4 +1,4 @@
-"""A real Dask cluster of processes on loopback: the bits of the local run, also when a worker is killed in the middle."""
+"""A real Dask cluster of processes on loopback has the bits of the local run, also when a worker is killed midway."""
 
 import os
 import signal
@@ -108,7 +108,7 @@ def test_a_device_that_no_worker_has(cluster):
 
 def test_no_scheduler(monkeypatch):
     monkeypatch.setattr("warpbrain.ensemble.cluster._PATIENCE", 1)
-    with pytest.raises(InputError, match="--dask tcp://127.0.0.1:9: no scheduler with a worker answers"):
+    with pytest.raises(InputError, match=r"--dask tcp://127\.0\.0\.1:9: no scheduler with a worker answers"):
         Cluster("tcp://127.0.0.1:9", 1, "cpu", None, start_warp_quietly)
 
 

@@ -1,0 +1,162 @@
+"""Measures batches: the time of a step and sample over the size of a batch, and the gain of several processes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import warp as wp
+
+from warpbrain.cases.shipped import find_case
+from warpbrain.ensemble.batch import Batch
+from warpbrain.ensemble.choosing import drawn_samples, swept_samples
+from warpbrain.ensemble.job import Job
+from warpbrain.ensemble.memory import bytes_per_slot
+from warpbrain.ensemble.stepping import step_batch
+from warpbrain.ensemble.workers import Here, Prepare, Processes
+from warpbrain.gp.trained import trained
+from warpbrain.kernels.tetrahedron import PAIRS
+from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.system import System
+
+#: Steps of a motion from rest, as many as the bench of a single run takes before it starts again.
+STEPS = 20
+#: Motions of which the fastest counts.
+REPEATS = 3
+
+
+@dataclass(frozen=True)
+class MeasuredBatch:
+    """Times of one size of batch.
+
+    Attributes
+    ----------
+    slots : int
+    samples, failed : int
+        In a motion, and how many of them had no answer.
+    milliseconds : list of float
+        A step and sample, for each motion.
+    cg_iterations : float
+        Mean over all steps.
+    bytes_per_step : int
+        Of a step and sample, each array counted once a kernel.
+    memory : int
+        Of the batch [bytes].
+    """
+
+    slots: int
+    samples: int
+    failed: int
+    milliseconds: list[float]
+    cg_iterations: float
+    bytes_per_step: int
+    memory: int
+
+    @property
+    def best(self) -> float:
+        """Least time of a step and sample [ms]."""
+        return min(self.milliseconds)
+
+    @property
+    def bandwidth(self) -> float:
+        """[GB/s]"""
+        return self.bytes_per_step / self.best / 1e6
+
+
+def phantom_job(count: int, precision: str) -> Job:
+    """Motions of the coarse phantom of one tissue, with the laws of the first draws of its prior."""
+    case = find_case("phantom", "single")
+    samples = drawn_samples(case, count, 0, trained())
+    return Job(model_of(case)[0], tuple(samples), steps=STEPS, precision=precision)
+
+
+def measure_batches(sizes: list[int], device: str, precision: str) -> Iterator[MeasuredBatch]:
+    """Measure motions of as many samples as a batch has slots."""
+    whole = phantom_job(max(sizes), precision)
+    system = whole.system(device)
+    for slots in sizes:
+        samples = sorted(whole.samples[:slots], key=lambda sample: sample.stiffness)
+        numbers = [sample.number for sample in samples]
+        course = whole.course()
+        batch = Batch(system, samples, slots, tolerance=course.tolerance, shapes=course.shapes())
+        # loads kernels and captures the graph
+        list(step_batch(batch, course, numbers))
+        times = []
+        for _ in range(REPEATS):
+            wp.synchronize_device(system.device)
+            start = time.perf_counter()
+            outcomes = [outcome for ended in step_batch(batch, course, numbers) for outcome in ended]
+            seconds = time.perf_counter() - start
+            steps = sum(outcome.steps for outcome in outcomes)
+            times.append(1000.0 * seconds / steps)
+        iterations = sum(outcome.cg_iterations for outcome in outcomes) / steps
+        yield MeasuredBatch(
+            slots=slots,
+            samples=len(outcomes),
+            failed=sum(outcome.failed for outcome in outcomes),
+            milliseconds=times,
+            cg_iterations=iterations,
+            bytes_per_step=count_bytes(system, iterations),
+            memory=slots * bytes_per_slot(system),
+        )
+        del batch, course
+
+
+def measure_single(device: str, precision: str) -> float:
+    """Least time of a step [ms] of single runs with the laws of the same draws, as `Simulator` captures them."""
+    job = phantom_job(3, precision)
+    best = []
+    for sample in job.samples:
+        assert sample.materials is not None
+        simulator = Simulator(System(replace(job.model, materials=sample.materials), device, precision))
+        simulator.capture()
+        simulator.reset()
+        wp.synchronize_device(device)
+        start = time.perf_counter()
+        for _ in range(STEPS):
+            simulator.step()
+        wp.synchronize_device(device)
+        best.append(1000.0 * (time.perf_counter() - start) / STEPS)
+    return sum(best) / len(best)
+
+
+def measure_processes(count: int, samples: int, precision: str, prepare: Prepare) -> float:
+    """Samples a second that `count` processes on the CPU compute, from the first results to the last."""
+    job = phantom_job(samples, precision)
+    workers = Processes(count, None, prepare)
+    done, first, start = 0, 0, 0.0
+    for ended in workers.outcomes(job):
+        done += len(ended)
+        if not first:
+            # processes have started and loaded their kernels
+            first, start = done, time.perf_counter()
+    return (done - first) / (time.perf_counter() - start)
+
+
+def measure_sweep(tissue: str, device: str, precision: str) -> tuple[float, int, int, int]:
+    """The paper's sweep on the coarse phantom, to rest: seconds, samples, how many failed, and CG iterations."""
+    case = find_case("phantom", tissue)
+    job = Job(model_of(case)[0], tuple(swept_samples(case, trained())), precision=precision)
+    start = time.perf_counter()
+    outcomes = [outcome for ended in Here(device, None).outcomes(job) for outcome in ended]
+    seconds = time.perf_counter() - start
+    return seconds, len(outcomes), sum(o.failed for o in outcomes), sum(o.cg_iterations for o in outcomes)
+
+
+def count_bytes(system: System, cg_iterations: float) -> int:
+    """Bytes that a step of one sample must move through memory, each array of samples counted once a kernel.
+
+    The mesh's own arrays, which all samples share, are left out.
+    """
+    n, m, pairs = system.size, system.elements, len(system.pairs)
+    vector, inverse = 3 * n, 6 * n
+    blocks, forces, matrix = len(PAIRS) * 9 * m, 12 * m, 9 * pairs
+    elements = vector + blocks + forces + m
+    evaluation = elements + forces + vector + m
+    # right-hand side, preconditioner, start
+    beginning = blocks + matrix + (matrix + 7 * vector) + (3 * vector + inverse) + (matrix + 5 * vector + inverse)
+    product = matrix + 2 * vector
+    iteration = product + (7 * vector + inverse) + 3 * vector
+    return int(system.precision.numpy.itemsize * (evaluation + beginning + cg_iterations * iteration + 6 * vector))
