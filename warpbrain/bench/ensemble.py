@@ -16,7 +16,7 @@ def main(arguments: Sequence[str]) -> int:
     """Parse, measure, print; returns the exit status."""
     parser = OneLineParser(
         prog="python -m warpbrain.bench ensemble",
-        description="Times batches of the coarse single-tissue phantom, 20 steps from rest, over the size of the batch.",
+        description="Times batches of the coarse single-tissue phantom, 20 steps from rest, over their size.",
     )
     add = parser.add_argument
     add("--device", default=None, metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one)")
@@ -73,9 +73,7 @@ def _bench(options: argparse.Namespace) -> None:
     single = measure_single(device.alias, options.precision)
     progress.clear()
     print(f"single run: {single:.3f} ms a step")
-    print(
-        f"{'batch':>6} {'ms a step and sample':>21} {'x single':>9} {'CG':>6} {'MB a step':>10} {'GB/s':>7} {'GB held':>8}"
-    )
+    print(" batch  ms a step and sample  x single     CG  MB a step    GB/s  GB held")
     written |= {"single_milliseconds": single, "batches": []}
     for measured in measure_batches(batches, device.alias, options.precision):
         print(
