@@ -191,6 +191,23 @@ def test_killed_it_leaves_no_process(tmp_path):
         time.sleep(0.1)
 
 
+def test_interrupted_it_is_gone_within_two_seconds(tmp_path):
+    arguments = ["ensemble", "--case", "0529", "--tissue", "single", "--samples", "32", "--steps", "500"]
+    arguments += ["--device", "cpu", "--processes", "2", "--out", str(tmp_path / "out")]
+    command = [sys.executable, "-u", "-m", "warpbrain", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as ran:
+        assert ran.stdout is not None
+        assert any("workers" in line for line in ran.stdout)
+        time.sleep(4.0)
+        start = time.monotonic()
+        ran.send_signal(signal.SIGINT)
+        _, err = ran.communicate(timeout=30)
+        assert time.monotonic() - start < 2.0
+    assert ran.returncode == 130
+    assert err.strip() == "warpbrain: interrupted; nothing half-written was left"
+    assert not list((tmp_path / "out").rglob(".*"))
+
+
 def _ended(process: str) -> bool:
     try:
         return "State:\tZ" in Path(f"/proc/{process}/status").read_text()

@@ -1,5 +1,6 @@
 """A real Dask cluster of processes on loopback has the bits of the local run, also when a worker is killed midway."""
 
+import logging
 import os
 import signal
 from collections.abc import Iterator
@@ -107,6 +108,8 @@ def test_a_device_that_no_worker_has(cluster):
 
 
 def test_no_scheduler(monkeypatch):
+    # of its attempts, which a process that goes on would otherwise hear of later
+    logging.getLogger("distributed.utils").setLevel(logging.CRITICAL)
     monkeypatch.setattr("warpbrain.ensemble.cluster._PATIENCE", 1)
     with pytest.raises(InputError, match=r"--dask tcp://127\.0\.0\.1:9: no scheduler with a worker answers"):
         Cluster("tcp://127.0.0.1:9", 1, "cpu", None, start_warp_quietly)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import ExitStack
+from importlib.util import find_spec
 from types import TracebackType
 from typing import Any
 
@@ -66,31 +67,22 @@ class Cluster:
 
     def __init__(self, address: str, workers: int, device: str | None, batch: int | None, prepare: Prepare) -> None:
         count = local_workers(address)
-        try:
-            import distributed
-        except ImportError:
-            raise InputError('--dask: needs the dask extra: pip install "warpbrain[dask]"') from None
+        if find_spec("distributed") is None:
+            raise InputError('--dask: needs the dask extra: pip install "warpbrain[dask]"')
         # what it logs of workers that come and go is no news to a user; errors come as exceptions
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         self._device, self._batch, self._prepare = device, batch, prepare
-        self._stack = ExitStack()
-        try:
-            self._client = self._connect(distributed, address, workers if count == 0 else count)
-            self._client.wait_for_workers(1, timeout=_PATIENCE)
-        except (OSError, ValueError) as error:
-            self._stack.close()
-            raise InputError(f"--dask {address}: no scheduler with a worker answers: {error}") from None
-        self.kind = str(self._client.submit(_kind, device, prepare, pure=False).result())
-        self._count = len(self._client.scheduler_info(n_workers=-1)["workers"])
-        self.name = f"{self._count} workers of {self._client.scheduler.address}"
-
-    def _connect(self, distributed: Any, address: str, workers: int | None) -> Any:
-        if workers is None:
-            return self._stack.enter_context(distributed.Client(address, timeout=_PATIENCE))
-        cluster = distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs="CRITICAL"
-        )
-        return self._stack.enter_context(distributed.Client(self._stack.enter_context(cluster)))
+        with ExitStack() as stack:
+            try:
+                self._client = _connect(stack, address, workers if count == 0 else count)
+                self._client.wait_for_workers(1, timeout=_PATIENCE)
+            except OSError as error:
+                raise InputError(f"--dask {address}: no scheduler with a worker answers: {error}") from None
+            self.kind = str(self._client.submit(_kind, device, prepare, pure=False).result())
+            self._count = len(self._client.scheduler_info(n_workers=-1)["workers"])
+            self.name = f"{self._count} workers of {self._client.scheduler.address}"
+            # nothing went wrong: it is closed by this object's own context
+            self._stack = stack.pop_all()
 
     def __enter__(self) -> Cluster:
         return self
@@ -125,6 +117,18 @@ class Cluster:
             yield outcomes
             # it is written: the scheduler may forget it
             part.release()
+
+
+def _connect(stack: ExitStack, address: str, workers: int | None) -> Any:
+    """A client of a scheduler, or of a new cluster of so many processes of this machine."""
+    import distributed
+
+    if workers is None:
+        return stack.enter_context(distributed.Client(address, timeout=_PATIENCE))
+    cluster = distributed.LocalCluster(
+        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs="CRITICAL"
+    )
+    return stack.enter_context(distributed.Client(stack.enter_context(cluster)))
 
 
 def _kind(device: str | None, prepare: Prepare) -> str:

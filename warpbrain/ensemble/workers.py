@@ -9,11 +9,11 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
+from multiprocessing.synchronize import Event
 from typing import Protocol
 
 from warpbrain.ensemble.job import Job
@@ -92,7 +92,9 @@ class Processes:
         SolveError
             If a process is ended from outside.
         """
-        pool = ProcessPoolExecutor(self._count, get_context("spawn"), _live_with, (os.getpid(),))
+        context = get_context("spawn")
+        stop = context.Event()
+        pool = ProcessPoolExecutor(self._count, context, _live_with, (os.getpid(), stop))
         try:
             parts = parts_of(job, self._count, self._batch or ENOUGH["cpu"])
             pending = [pool.submit(compute_part, part, "cpu", self._batch, self._prepare) for part in parts]
@@ -101,6 +103,8 @@ class Processes:
         except BrokenProcessPool:
             raise SolveError("a worker process was ended; the same command goes on with what is missing") from None
         finally:
+            # what they are at is wanted no more; the interpreter would wait for it before it ends
+            stop.set()
             pool.shutdown(wait=False, cancel_futures=True)
 
 
@@ -128,13 +132,13 @@ def parts_of(job: Job, workers: int, least: int) -> list[Job]:
     return [job.part({s.number for s in samples[k : k + size]}) for k in range(0, len(samples), size)]
 
 
-def _live_with(parent: int) -> None:
-    """Prepare a worker process: it ends with its parent, however that ends, and leaves Ctrl-C to it."""
+def _live_with(parent: int, stop: Event) -> None:
+    """Prepare a worker process: it ends when told to or with its parent, however that ends; Ctrl-C is left to that."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
+        while os.getppid() == parent and not stop.wait(0.5):
+            pass
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
