@@ -17,8 +17,9 @@ from warpbrain.report.generative.page import save
 from warpbrain.report.generative.studies_picture import draw_studies
 
 FIGURES = Path(__file__).parent / "figures"
-#: Pictures of runs and of cases, by file.
+#: Pictures of runs, of ensembles and of cases, by file.
 RUNS = {"0529.png": ["--case", "0529"]}
+ENSEMBLES = {"0529-spread.png": ["--case", "0529", "--grid"]}
 CASES = {"0529-case.png": ["0529"]}
 #: Colours that are left of a picture of curves, and its width [pixel]: a screen's, and a fraction of the bytes.
 PALETTE, WIDTH = 48, 1280
@@ -31,6 +32,10 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             _warpbrain("run", *arguments, "--out", folder)
             shutil.copy(Path(folder) / "deformation.png", FIGURES / name)
+    for name, arguments in ENSEMBLES.items():
+        with tempfile.TemporaryDirectory() as folder:
+            _warpbrain("ensemble", *arguments, "--out", folder)
+            shutil.copy(Path(folder) / "spread.png", FIGURES / name)
     for name, arguments in CASES.items():
         _warpbrain("cases", "show", *arguments, "--out", str(FIGURES / name))
     draw_generative_model()

@@ -30,7 +30,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "ensemble",
         help="simulate many samples of a case",
         description="Simulates a case with many laws of the generative model, to rest or for a number of steps, and "
-        "writes samples.csv, fields.vtu and summary.json. What a killed run has computed is kept: the same command "
+        "writes samples.csv, fields.vtu, spread.png and summary.json. What a killed run has computed is kept: the same command "
         "goes on with what is missing.",
     )
     add = parser.add_argument
@@ -88,6 +88,7 @@ def _ensemble(options: argparse.Namespace) -> None:
     from warpbrain.ensemble.store import Store
     from warpbrain.report import summary as tables
     from warpbrain.report.ensemble_files import table_of, write_fields, write_table
+    from warpbrain.report.ensemble_picture import write_spread_picture
     from warpbrain.report.ensemble_text import describe_ensemble, ensemble_lines
     from warpbrain.report.files import write_summary
     from warpbrain.simulation.of_case import model_of
@@ -122,7 +123,9 @@ def _ensemble(options: argparse.Namespace) -> None:
     files = [*write_table(out, table_of(result)), "summary.json"]
     if result.fields is not None:
         write_fields(out / "fields.vtu", result.fields)
-        files.append("fields.vtu")
+        count = f"{result.fields.count} of {len(samples)} samples, {course}"
+        write_spread_picture(out / "spread.png", result.fields, case.title, f"{count}: {chosen}")
+        files += ["fields.vtu", "spread.png"]
     write_summary(
         out / "summary.json",
         {
