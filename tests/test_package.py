@@ -82,6 +82,11 @@ def test_what_is_imported_is_declared():
             elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
                 imported.add(node.module.split(".")[0])
     project = (Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8")
+    extras = tomllib.loads(project)["project"]["optional-dependencies"]
+    # imported where a user asks for what they do
+    for module, extra in (("distributed", "dask"), ("pyarrow", "parquet")):
+        assert [_plain(re.split(r"[^\w.-]", line)[0]) for line in extras[extra]] == [module]
+        imported.remove(module)
     foreign = imported - set(sys.stdlib_module_names) - {"warpbrain"}
     dependencies = tomllib.loads(project)["project"]["dependencies"]
     declared = {_plain(re.split(r"[^\w.-]", line)[0]) for line in dependencies}
