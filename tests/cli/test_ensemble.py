@@ -248,3 +248,12 @@ def test_a_case_without_groups(tmp_path):
     assert ran.status == 2
     assert "[tissue.1] prior: missing, but a draw is of a group" in ran.err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_table_as_parquet(folder, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    ran = ensemble(folder, "--samples", 2, "--steps", 1, "--out", tmp_path)
+    assert ran.status == 0, ran.err
+    rows = parquet.read_table(tmp_path / "samples.parquet").to_pylist()
+    for row, line in zip(rows, table(tmp_path), strict=True):
+        assert {name: "" if value is None else str(value) for name, value in row.items()} == line
