@@ -54,7 +54,7 @@ def test_a_cluster_has_the_bits_of_the_local_run(cluster):
 
 
 def test_a_killed_worker_costs_only_time(cluster):
-    work = job(150)
+    work = job(100)
     found: dict[int, Outcome] = {}
     killed: list[int] = []
     with Cluster(cluster.scheduler_address, 1, "cpu", None, start_warp_quietly) as workers:

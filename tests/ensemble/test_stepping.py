@@ -43,8 +43,11 @@ def moved(model: Model, device: str, precision: str) -> System:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("formulation", ["coupled", "uncoupled"])
-def test_a_motion_is_that_of_the_simulator(kind: str, formulation: str, device: str, precision) -> None:
+@pytest.mark.parametrize(
+    ("formulation", "digits"), [("coupled", "double"), ("uncoupled", "double"), ("coupled", "single")]
+)
+def test_a_motion_is_that_of_the_simulator(kind: str, formulation: str, digits: str, device: str) -> None:
+    precision = PRECISIONS[digits]
     model = shaken_block(KINDS[kind], formulation)
     samples = samples_of(model, MODULI[:3])
     system = System(model, device, precision.name)
