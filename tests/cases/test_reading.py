@@ -315,3 +315,9 @@ def test_a_case_that_is_not_there(name, hint):
     with pytest.raises(InputError) as caught:
         find_case(name)
     assert str(caught.value).startswith(f"case '{name}': no such case and no such folder ({hint}")
+
+
+def test_the_phantom_has_the_papers_name_too():
+    for tissue in ("single", "multi"):
+        assert find_case("synthetic", tissue).path == find_case("phantom", tissue).path
+        assert find_case("synthetic-fine", tissue).path == find_case("phantom-fine", tissue).path

@@ -111,6 +111,9 @@ def test_a_failure_is_that_of_the_single_run_and_leaves_the_others_alone(device:
     outcomes = computed(system, course, samples, 3)
     assert [o.failed for _, o in sorted(outcomes.items())] == [False, True, False]
     assert outcomes[2].u.tobytes() == alone[2].u.tobytes()
+    # the slot of the one that failed, which comes first, is taken by the next
+    after = computed(system, Moving(model, 60, time_step=0.01), samples, 1)
+    assert [after[number].u.tobytes() for number in (0, 2)] == [alone[number].u.tobytes() for number in (0, 2)]
     simulator = Simulator(System(replace(model, materials=soft.materials), device), time_step=0.01)
 
     def follow() -> None:
