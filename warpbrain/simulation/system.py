@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,11 @@ def find_precision(name: str) -> Precision:
     if name not in PRECISIONS:
         raise InputError(f"precision '{name}': expected one of {', '.join(PRECISIONS)}")
     return PRECISIONS[name]
+
+
+def _code(material: Material) -> tuple[type[Law], str, int]:
+    """What must stay as it is when a material changes in a system: law, formulation and number of parameters."""
+    return type(material.law), material.formulation, len(material.law.parameters())
 
 
 @dataclass(frozen=True)
@@ -135,22 +141,55 @@ class System:
         self.matrix.nnz = len(pattern.columns)
 
     def _group_elements(self) -> list[ElementGroup]:
-        model, p = self.model, self.precision
-        labels = model.mesh.tissue
+        groups = []
+        for (law_type, formulation), materials in self._grouped(self.model).items():
+            members = np.flatnonzero(np.isin(self.model.mesh.tissue, list(materials)))
+            kernels = law_type.device_law(formulation).kernels(self.precision)
+            parameters = self._array(self._parameters(law_type, materials), self.precision.scalar)
+            groups.append(ElementGroup(kernels, self._array(members, int), parameters))
+        return groups
+
+    @staticmethod
+    def _grouped(model: Model) -> dict[tuple[type[Law], str], dict[int, Material]]:
+        """Materials of the tissues of the mesh by what they are launched with."""
         by_code: dict[tuple[type[Law], str], dict[int, Material]] = {}
-        for label in np.unique(labels).tolist():
+        for label in np.unique(model.mesh.tissue).tolist():
             material = model.materials[label]
             by_code.setdefault((type(material.law), material.formulation), {})[label] = material
-        groups = []
-        for (law_type, formulation), materials in by_code.items():
-            rows = law_type.parameter_rows([material.law for material in materials.values()])
-            parameters = np.zeros((self.elements, 1 + len(rows[0])))
-            for (label, material), row in zip(materials.items(), rows, strict=True):
-                parameters[labels == label] = (material.volumetric_modulus, *row)
-            members = np.flatnonzero(np.isin(labels, list(materials)))
-            kernels = law_type.device_law(formulation).kernels(p)
-            groups.append(ElementGroup(kernels, self._array(members, int), self._array(parameters, p.scalar)))
-        return groups
+        return by_code
+
+    def _parameters(self, law_type: type[Law], materials: Mapping[int, Material]) -> Floats:
+        """Parameters by element; zero where it is of no tissue of the group."""
+        rows = law_type.parameter_rows([material.law for material in materials.values()])
+        parameters = np.zeros((self.elements, 1 + len(rows[0])))
+        for (label, material), row in zip(materials.items(), rows, strict=True):
+            parameters[self.model.mesh.tissue == label] = (material.volumetric_modulus, *row)
+        return parameters
+
+    def set_materials(self, materials: Mapping[int, Material]) -> None:
+        """Other parameters for the same laws, in the same arrays: nothing is pre-processed again.
+
+        Parameters
+        ----------
+        materials : mapping of int to Material
+            By tissue label; each of the law (of Ogden's, with as many terms) and formulation that the tissue has.
+
+        Raises
+        ------
+        InputError
+            If a tissue has no material, or one of another law, formulation or number of parameters.
+        """
+        model = replace(self.model, materials=dict(materials))
+        for label in np.unique(model.mesh.tissue).tolist():
+            old, new = self.model.materials[label], model.materials[label]
+            if _code(old) != _code(new):
+                raise InputError(
+                    f"materials: tissue {label} has {new.law!r}, {new.formulation}: expected other parameters of "
+                    f"{old.law!r}, {old.formulation}"
+                )
+        self.model = model
+        for group, ((law_type, _), members) in zip(self.groups, self._grouped(model).items(), strict=True):
+            group.parameters.assign(self._parameters(law_type, members))
 
     def _place_fields(self) -> None:
         p, n, m = self.precision, self.size, self.elements
@@ -161,6 +200,7 @@ class System:
         self.u, self.internal, self.external = vectors(), vectors(), vectors()
         self.load, self.solution, self.increment = vectors(), vectors(), vectors()
         self.free = self._array(1.0 - self.model.constrained, p.vec3)
+        self._all_components = self._array(np.ones((n, 3)), p.vec3)
         self.element_forces = wp.zeros((m, 4), dtype=p.vec3, device=self.device)
         self.element_blocks = wp.zeros((m, len(PAIRS)), dtype=p.mat33, device=self.device)
         self._flat_forces = self.element_forces.flatten()
@@ -231,6 +271,24 @@ class System:
             self.precision.scalar(k),
             self.load,
         )
+
+    def stiffness_times(self, increment: Floats) -> Floats:
+        """`K increment` [N] on every component, constrained ones included, from the element blocks, shape (n, 3)."""
+        self.increment.assign(increment)
+        self.load.zero_()
+        self._launch(
+            self._kernels.constrained_load,
+            self.size,
+            self.corner_first,
+            self.corners,
+            self.nodes,
+            self.element_blocks,
+            self.increment,
+            self._all_components,
+            self.precision.scalar(-1.0),
+            self.load,
+        )
+        return self.load.numpy().astype(np.float64)
 
     def linear_solver(
         self,
