@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from warpbrain.cases.case import Case
@@ -102,7 +103,7 @@ def _default(model: Process | None) -> Process:
     return trained() if model is None else model
 
 
-def require_groups(case: Case, labels: tuple[int, ...], model: Process) -> None:
+def require_groups(case: Case, labels: Sequence[int], model: Process) -> None:
     """`InputError` with file, tissue and key, if a tissue has no group, or one that the model has seen no study of."""
     for label in labels:
         group = case.tissues[label].prior

@@ -42,8 +42,8 @@ class Prior:
         One for each tissue, all different.
     laws_of : tuple of str
         Name of the law of each tissue.
-    poisson, formulation : float, str
-        With which the laws are stable.
+    poisson, formulation : float, str or tuple of str
+        With which the laws are stable; one formulation for all tissues, or one for each.
     seed : int
     theta : (n, p) array
         Draws 0 to n - 1 of the seed, on which all but `samples` rests.
@@ -57,7 +57,7 @@ class Prior:
     groups: tuple[str, ...]
     laws_of: tuple[str, ...]
     poisson: float
-    formulation: str
+    formulation: str | tuple[str, ...]
     seed: int
     theta: Floats
     attempts: int
@@ -70,7 +70,7 @@ class Prior:
         groups: Sequence[str],
         law: str | Sequence[str],
         poisson: float = 0.45,
-        formulation: str = "coupled",
+        formulation: str | tuple[str, ...] = "coupled",
         count: int = 1000,
         seed: int = 0,
     ) -> Prior:
@@ -83,7 +83,7 @@ class Prior:
             One for each tissue, all different: tissues of one group are one tissue.
         law : str or sequence of str
             Names of laws, one for all tissues or one for each.
-        poisson, formulation : float, str
+        poisson, formulation : float, str or tuple of str
         count : int
             Draws on which density and Gaussian approximation rest.
         seed : int

@@ -1,0 +1,1 @@
+"""Tissue parameters from observed deformation: likelihood, estimate, and what the data can tell."""

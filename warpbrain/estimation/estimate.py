@@ -1,0 +1,295 @@
+"""Tissue from recordings, from one end to the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.case import Case
+from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.chain import Chain, run_chain
+from warpbrain.estimation.discretisation import Difference, Discretisation, FinerMesh
+from warpbrain.estimation.forward import Forward
+from warpbrain.estimation.gauss_newton import GaussNewton, GaussNewtonOptions, GaussNewtonStep, require_explained
+from warpbrain.estimation.importance import Importance, importance_sampling
+from warpbrain.estimation.likelihood import Likelihood
+from warpbrain.estimation.modes import Mode
+from warpbrain.estimation.nuisances import Nuisances
+from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.posterior import Posterior
+from warpbrain.estimation.prior_modes import PriorMode, prior_modes, prior_of
+from warpbrain.estimation.problem import Problem
+from warpbrain.estimation.proposal import Proposal
+from warpbrain.estimation.registration import Registration
+from warpbrain.estimation.target import Target
+from warpbrain.gp.prior import Prior
+
+Floats = NDArray[np.float64]
+
+#: The error of the mesh is computed again until the estimate moves by no more than this, in standard deviations.
+_SETTLED = 0.1
+#: And no more often than this.
+_MOST_DIFFERENCES = 4
+
+
+@dataclass(frozen=True)
+class EstimationOptions:
+    """How to estimate.
+
+    Attributes
+    ----------
+    likelihood : Likelihood
+    discretisation : Discretisation or None
+        None: the mesh is taken for exact, and the estimate holds for this mesh only.
+    registration : Registration or None
+        None: positions are taken as they were recorded.
+    samples : int
+        Draws that check Laplace's approximation, an equilibrium each.
+    chain : int
+        Equilibria of the chain that replaces it where it fails.
+    seed : int
+        Of those draws.
+    gauss_newton : GaussNewtonOptions
+    """
+
+    likelihood: Likelihood = field(default_factory=Likelihood)
+    discretisation: Discretisation | None = field(default_factory=Discretisation)
+    registration: Registration | None = None
+    samples: int = 64
+    chain: int = 300
+    seed: int = 0
+    gauss_newton: GaussNewtonOptions = field(default_factory=GaussNewtonOptions)
+
+    def __post_init__(self) -> None:
+        for name, least in (("samples", 25), ("chain", 10), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise InputError(f"{name} = {getattr(self, name)}: expected a whole number of at least {least}")
+
+
+@dataclass(frozen=True)
+class Listener:
+    """Who wants to know how an estimation gets on.
+
+    Attributes
+    ----------
+    stage : callable
+        Called with a few words when a stage begins.
+    step : callable
+        Called with each step of Gauss-Newton.
+    progress : callable
+        Called with the part that is done of a stage of known length, from 0 to 1.
+    """
+
+    stage: Callable[[str], None] = lambda _text: None
+    step: Callable[[GaussNewtonStep], None] = lambda _step: None
+    progress: Callable[[float], None] = lambda _part: None
+
+
+def estimate(
+    case: Case,
+    prior: Prior | None = None,
+    options: EstimationOptions | None = None,
+    device: str | None = None,
+    listener: Listener | None = None,
+) -> Posterior:
+    """Estimate the laws of a case's tissues from its recordings.
+
+    Parameters
+    ----------
+    case : Case
+        Its laws say what kind of law each tissue has; their parameters do not count.
+    prior : Prior, optional
+        That of the default generative model unless given; see `warpbrain.estimation.prior_modes.prior_of`.
+    options : EstimationOptions, optional
+    device : str, optional
+        Warp device.
+    listener : Listener, optional
+
+    Raises
+    ------
+    InputError
+        If there is nothing to estimate from, a noise is not positive, or a tissue has no prior.
+    SolveError
+        If no equilibrium is found, or what was recorded is gross errors only.
+
+    Examples
+    --------
+    >>> from warpbrain import estimate, find_case
+    >>> posterior = estimate(find_case("0529", "single"))  # doctest: +SKIP
+    >>> [marginal.interval for marginal in posterior.marginals]  # doctest: +SKIP
+    """
+    return Estimation(case, prior, options, device, listener).run()
+
+
+class Estimation:
+    """The stages of an estimation; parameters as of `estimate`.
+
+    Attributes
+    ----------
+    seconds : dict
+        Wall time by stage so far.
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        prior: Prior | None = None,
+        options: EstimationOptions | None = None,
+        device: str | None = None,
+        listener: Listener | None = None,
+    ) -> None:
+        self.case = case
+        self.options = options or EstimationOptions()
+        self.listener = listener or Listener()
+        self.seconds: dict[str, float] = {}
+        self._device = device
+        self._remarks: list[str] = []
+        # what is wrong with recordings is known before anything is computed
+        self.observations = Observations.to_fit(case)
+        self._remarks += self.observations.remarks
+        self.parameters = Parameters.of(case)
+        with self._timed("prior"):
+            self.prior = prior_of(case) if prior is None else prior
+            self.prior_modes = prior_modes(self.prior, self.parameters)
+        with self._timed("pre-processing"):
+            self.forward = Forward(case, self.prior_modes[0].gaussian.mean, device)
+
+    def run(self) -> Posterior:
+        """All stages."""
+        with self._timed("estimate"):
+            modes = self.fit(Nuisances(registration=self.options.registration))
+        solves = {"estimate": self.forward.solves}
+        differences: list[Difference] = []
+        if self.options.discretisation is not None:
+            with self._timed("error of the mesh"):
+                modes = self._without_error_of_mesh(modes, self.options.discretisation, differences, solves)
+        require_explained(modes[0].estimate)
+        before = self.forward.solves
+        with self._timed("check of the posterior"):
+            target, proposal = Target(self.prior, modes), Proposal.of(modes)
+            importance = self._check(target, proposal)
+        solves["check of the posterior"] = self.forward.solves - before
+        doubts, chain = importance.doubts(modes[0].laplace), None
+        if doubts:
+            before = self.forward.solves
+            with self._timed("chain"):
+                chain = self._sample(target, proposal, importance)
+            solves["chain"] = self.forward.solves - before
+        return Posterior(
+            self.case,
+            self.prior,
+            modes,
+            tuple(self._remarks),
+            tuple(differences),
+            importance,
+            doubts,
+            chain,
+            solves,
+            self.seconds,
+        )
+
+    def fit(self, nuisances: Nuisances, starts: tuple[Mode, ...] = ()) -> tuple[Mode, ...]:
+        """The estimate in every mode of the prior, the most probable first.
+
+        Parameters
+        ----------
+        nuisances : Nuisances
+        starts : tuple of Mode, optional
+            Estimates with other nuisances, from which to go on.
+
+        Raises
+        ------
+        SolveError
+            If there is none in any mode.
+        """
+        found, failures = [], []
+        begun = {id(mode.estimate.problem.mode): mode for mode in starts}
+        for prior_mode in self.prior_modes:
+            if starts and id(prior_mode) not in begun:
+                continue
+            try:
+                found.append(self._fit_one(prior_mode, nuisances, begun.get(id(prior_mode))))
+            except SolveError as error:
+                failures.append(error)
+                remark = f"{_where(self.parameters, prior_mode)}: {error}"
+                if remark not in self._remarks:
+                    self._remarks.append(remark)
+        if not found:
+            raise failures[0]
+        return tuple(sorted(found, key=lambda mode: -mode.log_evidence))
+
+    def _fit_one(self, prior_mode: PriorMode, nuisances: Nuisances, start: Mode | None) -> Mode:
+        many = len(self.prior_modes) > 1
+        text = "Gauss-Newton" + (f", {_where(self.parameters, prior_mode)}" if many else "")
+        self.listener.stage(text if start is None else f"{text}, with the error of the mesh")
+        problem = Problem(self.forward, self.observations, prior_mode, self.options.likelihood, nuisances)
+        search = GaussNewton(problem, self.options.gauss_newton, self.listener.step)
+        if start is None:
+            found = search.solve()
+        else:
+            known = start.estimate.point.nuisances
+            values = nuisances.mean.copy()
+            values[len(values) - len(known) :] = known
+            found = search.solve(start.estimate.point.state, values)
+        if not found.converged:
+            self._remarks.append(f"{text}: not converged")
+        return Mode.of(found)
+
+    def _without_error_of_mesh(
+        self, modes: tuple[Mode, ...], believed: Discretisation, differences: list[Difference], solves: dict[str, int]
+    ) -> tuple[Mode, ...]:
+        before = self.forward.solves
+        finer: FinerMesh | None = None
+        for _ in range(_MOST_DIFFERENCES):
+            self.listener.stage("error of the mesh: one equilibrium on elements of half the size")
+            best = modes[0]
+            if finer is None:
+                finer = FinerMesh(self.case, best.estimate.theta, self._device)
+            differences.append(finer.difference(best.estimate.point.state))
+            nuisances = Nuisances(believed, differences[-1], self.options.registration)
+            modes = self.fit(nuisances, modes)
+            moved = modes[0].estimate.theta - differences[-1].theta
+            if np.sqrt(moved @ np.linalg.solve(modes[0].laplace.covariance, moved)) <= _SETTLED:
+                break
+        else:
+            self._remarks.append("the error of the mesh was still changing when it was last computed")
+        solves["on elements of half the size"] = 0 if finer is None else finer.solves
+        solves["estimate with the error of the mesh"] = self.forward.solves - before
+        return modes
+
+    def _check(self, target: Target, proposal: Proposal) -> Importance:
+        count = self.options.samples
+        self.listener.stage(f"check of the posterior: {count} equilibria")
+        rng = np.random.default_rng([self.options.seed, 0])
+        return importance_sampling(target, proposal, count, rng, lambda n: self.listener.progress(n / count))
+
+    def _sample(self, target: Target, proposal: Proposal, importance: Importance) -> Chain:
+        solves = self.options.chain
+        self.listener.stage(f"Laplace's approximation fails: a chain of {solves} equilibria instead")
+        best = int(np.argmax(importance.log_densities))
+        start = target.modes[0].estimate.theta
+        if np.isfinite(importance.log_densities[best]):
+            start = importance.theta[best]
+        rng = np.random.default_rng([self.options.seed, 1])
+        return run_chain(target, proposal, start, solves, rng, lambda n: self.listener.progress(n / solves))
+
+    @contextmanager
+    def _timed(self, stage: str) -> Iterator[None]:
+        begun = time.perf_counter()
+        yield
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
+
+
+def _where(parameters: Parameters, mode: PriorMode) -> str:
+    """Which mode, in words: the signs of its exponents."""
+    ends = zip(parameters.each, mode.low, strict=True)
+    words = [
+        f"{parameter.name} {'>' if low == 0.0 else '<'} 0" for parameter, low in ends if parameter.coordinate.signed
+    ]
+    return ", ".join(words) or "prior"

@@ -1,0 +1,249 @@
+"""The most probable parameters: damped Gauss-Newton on likelihood and prior, solving equilibrium from the last state.
+
+Each iteration differentiates the equilibrium (`warpbrain.simulation.sensitivity`), takes the step of weighted least
+squares, and starts the next equilibrium where the derivatives say it will be. A step is halved until the objective
+falls. Parameters at an end of their range stay there while the objective pushes them out.
+
+Far from the estimate most of a residual is no noise yet, and a Student t would take nearly all rows for gross errors
+and settle for a few. So the noise is first taken to be as large as the residuals say, and what is known of it after
+that.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.forward import State
+from warpbrain.estimation.problem import Linearised, Point, Problem
+
+Floats = NDArray[np.float64]
+
+#: How often a first state is tried at moduli larger by a factor of e.
+_STIFFER = 4
+#: There is no estimate if fewer rows than this share are something else.
+_FEWEST_EXPLAINED = 0.1
+
+
+@dataclass(frozen=True)
+class GaussNewtonOptions:
+    """How to look for the estimate.
+
+    Attributes
+    ----------
+    tolerance : float
+        Converged when the next step is shorter than this in standard deviations of the posterior.
+    least_step : float
+        Or when no parameter would change by more than this.
+    max_iterations : int
+        In each of the two stages.
+    """
+
+    tolerance: float = 1e-3
+    least_step: float = 1e-7
+    max_iterations: int = 30
+
+
+@dataclass(frozen=True)
+class GaussNewtonStep:
+    """One line of the history.
+
+    Attributes
+    ----------
+    iteration : int
+        From 1.
+    objective : float
+        `-ln` of likelihood times prior, before the step.
+    decrement : float
+        Length of the whole step in standard deviations of the posterior.
+    step : float
+        Share of it that was taken.
+    newton_iterations : int
+        Of all equilibria that were tried.
+    """
+
+    iteration: int
+    objective: float
+    decrement: float
+    step: float
+    newton_iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The most probable parameters.
+
+    Attributes
+    ----------
+    problem : Problem
+    point : Point
+    linearised : Linearised
+        There.
+    converged : bool
+    history : tuple of GaussNewtonStep
+    """
+
+    problem: Problem
+    point: Point
+    linearised: Linearised
+    converged: bool
+    history: tuple[GaussNewtonStep, ...]
+
+    @property
+    def theta(self) -> Floats:
+        """Estimate of the parameters, shape (p,)."""
+        return self.point.state.theta
+
+
+class GaussNewton:
+    """Looks for the most probable parameters of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+    options : GaussNewtonOptions, optional
+    on_step : callable, optional
+        Called with each `GaussNewtonStep`.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        options: GaussNewtonOptions | None = None,
+        on_step: Callable[[GaussNewtonStep], None] | None = None,
+    ) -> None:
+        self.problem = problem
+        self.options = options or GaussNewtonOptions()
+        self._on_step = on_step
+        self._history: list[GaussNewtonStep] = []
+
+    def solve(self, start: State | None = None, nuisances: Floats | None = None) -> Estimate:
+        """Go from a start to the estimate.
+
+        Parameters
+        ----------
+        start : State, optional
+            The state in the middle of the prior by default, and then the first stage is that of large residuals.
+        nuisances : (q,) array, optional
+            Their middle by default.
+
+        Raises
+        ------
+        InputError
+            If the laws of the middle of the prior are not stable.
+        SolveError
+            If there is no equilibrium to start from.
+        """
+        problem = self.problem
+        values = problem.nuisances.mean if nuisances is None else nuisances
+        self._history = []
+        if start is None:
+            point, linearised = self._first(values)
+            point, _, _ = self._descend(point, linearised, cautious=True)
+            start, values = point.state, point.nuisances
+        point = problem.at(start, values)
+        point, linearised, converged = self._descend(point, problem.linearise(point), cautious=False)
+        return Estimate(problem, point, linearised, converged, tuple(self._history))
+
+    def _first(self, values: Floats) -> tuple[Point, Linearised]:
+        """The middle of the prior; something stiffer if there is no stable equilibrium."""
+        problem, mode = self.problem, self.problem.mode
+        theta = np.clip(mode.gaussian.mean, mode.low, mode.high)
+        problem.parameters.require_possible(theta)
+        stiffer = problem.parameters.is_modulus.astype(np.float64)
+        why = ""
+        for times in range(_STIFFER + 1):
+            try:
+                point = problem.at(problem.forward.solve(theta + times * stiffer), values, cautious=True)
+                return point, problem.linearise(point)
+            except SolveError as error:
+                why = str(error)
+        raise SolveError(f"in the middle of the prior, and up to {math.exp(_STIFFER):.0f} times stiffer: {why}")
+
+    def _descend(self, point: Point, linearised: Linearised, cautious: bool) -> tuple[Point, Linearised, bool]:
+        """Downhill to where a step is no longer worth it."""
+        options = self.options
+        tolerance = 0.03 if cautious else options.tolerance
+        for iteration in itertools.count():
+            step = self._step(point, linearised)
+            decrement = float(np.sqrt(step @ linearised.hessian @ step))
+            if decrement <= tolerance or np.abs(step).max() <= options.least_step:
+                return point, linearised, True
+            if iteration == options.max_iterations:
+                return point, linearised, False
+            reached, share, newton = self._search(point, linearised, step, cautious)
+            record = GaussNewtonStep(len(self._history) + 1, point.objective, decrement, share, newton)
+            self._history.append(record)
+            if self._on_step is not None:
+                self._on_step(record)
+            if reached is None:
+                # what is left is rounding of the objective, or nothing better lies this way
+                return point, linearised, decrement <= 10.0 * tolerance
+            point, linearised = reached
+        raise AssertionError("unreachable")
+
+    def _step(self, point: Point, linearised: Linearised) -> Floats:
+        """The step of Gauss-Newton among the parameters that are free to move."""
+        theta, gradient, mode = point.state.theta, linearised.gradient, self.problem.mode
+        moving = np.ones(len(gradient), dtype=bool)
+        p = len(theta)
+        moving[:p] = ~((theta <= mode.low) & (gradient[:p] > 0.0))
+        moving[:p] &= ~((theta >= mode.high) & (gradient[:p] < 0.0))
+        step = np.zeros(len(gradient))
+        hessian = linearised.hessian[np.ix_(moving, moving)]
+        # shifts are metres, turns radians and moduli logarithms: one size for all
+        size = np.sqrt(np.diag(hessian))
+        step[moving] = np.linalg.solve(hessian / np.outer(size, size), -gradient[moving] / size) / size
+        return step
+
+    def _search(
+        self, point: Point, linearised: Linearised, step: Floats, cautious: bool
+    ) -> tuple[tuple[Point, Linearised] | None, float, int]:
+        """Halve the step until there is a stable equilibrium of a lower objective; None and 0 if there never is."""
+        problem, mode = self.problem, self.problem.mode
+        p = len(problem.parameters)
+        slope = float(linearised.gradient @ step)
+        share = min(1.0, 1.0 / max(float(np.max(np.abs(step[:p]) / problem.parameters.reach)), 1e-300))
+        newton = 0
+        for _ in range(12):
+            theta = np.clip(point.state.theta + share * step[:p], mode.low, mode.high)
+            # where derivatives say the state will be
+            predicted = point.state.u + np.tensordot(theta - point.state.theta, linearised.du, axes=1)
+            try:
+                problem.parameters.require_possible(theta)
+                state = self._solve_near(theta, predicted, point.state.u)
+                newton += state.newton_iterations
+                trial = problem.at(state, point.nuisances + share * step[p:], cautious)
+                if trial.objective < point.objective + 1e-4 * share * slope:
+                    return (trial, problem.linearise(trial)), share, newton
+            except (InputError, SolveError):
+                # an unstable law, no equilibrium, or one that is unstable: nearer to the last point there is none
+                pass
+            share *= 0.5
+        return None, 0.0, newton
+
+    def _solve_near(self, theta: Floats, predicted: Floats, last: Floats) -> State:
+        try:
+            return self.problem.forward.solve(theta, predicted)
+        except SolveError:
+            # a bold prediction may turn elements inside out
+            return self.problem.forward.solve(theta, last)
+
+
+def require_explained(estimate: Estimate) -> None:
+    """Raise `SolveError` if nearly all rows are gross errors: such an estimate is of nothing."""
+    gross = np.concatenate(estimate.point.gross)
+    explained = int(np.count_nonzero(~gross))
+    if explained < _FEWEST_EXPLAINED * len(gross):
+        names = ", ".join(f"'{observation.name}'" for observation in estimate.problem.observations.each)
+        raise SolveError(
+            f"no estimate: {len(gross) - explained} of {len(gross)} rows recorded in {names} are gross errors, "
+            "farther from what any parameters found make of them than their sigma allows; is the unit, the axes or "
+            "the sigma wrong, or a cause left out?"
+        )

@@ -1,0 +1,164 @@
+"""What the data inform and what they do not, in words.
+
+A direction is told if the data know more of it than the prior did (gain at least 1: the variance at least halves), and
+hidden if they know less than a tenth of that: an estimate along it is the prior, and no finding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.estimation.gauss_newton import Estimate
+from warpbrain.estimation.laplace import Laplace
+from warpbrain.estimation.parameters import Parameter
+
+Floats = NDArray[np.float64]
+#: Parameters with their weights in a direction.
+Parts = Sequence[tuple[Parameter, float]]
+
+#: Gains from which a direction is told, and below which it is hidden.
+TOLD, HIDDEN = 1.0, 0.1
+#: Parts of a direction smaller than this, in standard deviations of the prior, are not spoken of.
+_NEGLIGIBLE = 0.1
+#: A change of the moduli that moves the body by less than this part of its displacement moves nothing.
+_UNMOVED = 1e-4
+#: Two parts of a direction that differ by less than this are the same.
+_ALIKE = 0.1
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """A verdict.
+
+    Attributes
+    ----------
+    informed, weakly_informed : tuple of str
+        Combinations of parameters that the data tell, and that they tell a little.
+    hidden : tuple of str
+        Changes of the parameters that the data do not see.
+    scale_is_hidden : bool
+        All shear moduli together can be changed by a factor, and the data do not see it: the loads are displacements
+        only, and no force was recorded.
+    """
+
+    informed: tuple[str, ...]
+    weakly_informed: tuple[str, ...]
+    hidden: tuple[str, ...]
+    scale_is_hidden: bool
+
+    @property
+    def nothing(self) -> bool:
+        """The data say nothing: the posterior is the prior."""
+        return not self.informed and not self.weakly_informed
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """For people to read."""
+        if self.nothing:
+            said = [
+                "Not identifiable: the recordings say nothing of the tissue. What is given is the prior, no finding."
+            ]
+        else:
+            said = []
+            if self.informed:
+                said.append(f"The recordings inform {_enumerated(self.informed)}.")
+            if self.weakly_informed:
+                said.append(f"They inform a little {_enumerated(self.weakly_informed)}.")
+            if self.hidden:
+                said.append(f"They do not see {_enumerated(self.hidden)}: there the estimate is the prior.")
+        if self.scale_is_hidden:
+            said.append(
+                "Absolute stiffness cannot be told from displacements that displacements cause: a recorded force, or a "
+                "load that is known, such as weight, would tell it."
+            )
+        return tuple(said)
+
+
+def identifiability(estimate: Estimate, posterior: Laplace) -> Identifiability:
+    """What the data of an estimate inform."""
+    each, gains = posterior.parameters.each, posterior.gains
+    told, between = gains >= TOLD, (gains < TOLD) & (gains >= HIDDEN)
+    # one prior standard deviation of a parameter is the unit in which changes of different kinds compare
+    unit = posterior.prior.standard_deviations
+    # a factor on all moduli moves nothing if displacements do it all, and everything under a weight or a force
+    scale = posterior.parameters.is_modulus.astype(np.float64)
+    moved = np.linalg.norm(np.tensordot(scale, estimate.linearised.du, axes=1))
+    known = float(scale @ posterior.information @ scale) / float(scale @ posterior.prior.precision @ scale)
+    return Identifiability(
+        tuple(combination(_parts(each, row, 1.0 / unit)) for row in _reduced(posterior.told[told] * unit)),
+        tuple(combination(_parts(each, row, 1.0 / unit)) for row in _reduced(posterior.told[between] * unit)),
+        tuple(change(_parts(each, row, unit)) for row in _reduced(posterior.undone[gains < HIDDEN] / unit)),
+        known < HIDDEN and bool(moved <= _UNMOVED * np.linalg.norm(estimate.point.state.u)),
+    )
+
+
+def _reduced(rows: Floats) -> Floats:
+    """Other rows of the same span, each with a 1 where the others have zeros: the fewest parameters in each."""
+    rows = rows.copy()
+    for k in range(len(rows)):
+        column = int(np.abs(rows[k]).argmax())
+        rows[k] /= rows[k, column]
+        others = np.arange(len(rows)) != k
+        rows[others] -= np.outer(rows[others, column], rows[k])
+    return rows
+
+
+def _parts(each: Sequence[Parameter], row: Floats, unit: Floats) -> Parts:
+    """Parameters that count, in order; in their own units, the largest 1."""
+    counted = np.flatnonzero(np.abs(row) >= _NEGLIGIBLE * np.abs(row).max()).tolist()
+    weights = row * unit
+    weights = weights / weights[counted][np.abs(weights[counted]).argmax()]
+    return [(each[k], float(weights[k])) for k in counted]
+
+
+def combination(parts: Parts) -> str:
+    """A combination of parameters in words."""
+    if len(parts) == 1:
+        return f"the {_noun(parts[0][0])}"
+    tissues = _enumerated([parameter.tissue for parameter, _ in parts])
+    if _are_opposite(parts):
+        return f"the ratio of the shear moduli of {tissues}"
+    if _are_alike(parts):
+        return f"the geometric mean of the shear moduli of {tissues}"
+    return f"the combination {_sum(parts)}"
+
+
+def change(parts: Parts) -> str:
+    """A change of parameters, in words."""
+    if len(parts) == 1:
+        return f"a change of the {_noun(parts[0][0])}"
+    tissues = _enumerated([parameter.tissue for parameter, _ in parts])
+    if _are_alike(parts):
+        return f"a change of the shear moduli of {tissues} by one factor"
+    if _are_opposite(parts):
+        return f"a change of the ratio of the shear moduli of {tissues}"
+    return f"a change along {_sum(parts)}"
+
+
+def _are_alike(parts: Parts) -> bool:
+    weights = [weight for _, weight in parts]
+    return all(parameter.is_modulus for parameter, _ in parts) and max(weights) - min(weights) < _ALIKE
+
+
+def _are_opposite(parts: Parts) -> bool:
+    moduli = all(parameter.is_modulus for parameter, _ in parts)
+    return moduli and len(parts) == 2 and abs(parts[0][1] + parts[1][1]) < _ALIKE
+
+
+def _sum(parts: Parts) -> str:
+    return " ".join(f"{weight:+.2g} [{parameter.name}]" for parameter, weight in parts)
+
+
+def _noun(parameter: Parameter) -> str:
+    what = {"ln(mu0 / Pa)": "shear modulus", "alpha": "exponent"}.get(
+        parameter.coordinate.name, f"ratio {parameter.coordinate.name}"
+    )
+    return f"{what} of {parameter.tissue}"
+
+
+def _enumerated(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

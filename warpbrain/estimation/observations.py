@@ -1,0 +1,262 @@
+"""Recordings of a case beside a state: residuals, and how they change with it.
+
+A residual is what was recorded less what was computed, at the end of the recording. Recordings whose role is ``"fit"``
+are one thing, those to ``"check"`` with another: no function here looks at both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.boundary import Forced
+from warpbrain.cases.case import Case
+from warpbrain.errors import InputError
+from warpbrain.estimation.registration import rigid_columns
+from warpbrain.recordings.closest import closest_points
+from warpbrain.recordings.comparison import faces_of_set
+from warpbrain.recordings.location import locate
+from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
+from warpbrain.recordings.times import rows_at
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+#: Noise can be estimated from no fewer residuals than this.
+_FEWEST = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """Residuals of one recording at a state, with d components a row.
+
+    Attributes
+    ----------
+    values : (n, d) array
+        Of points 3 components [m]; of a surface the signed distance [m]; of a force those recorded [N].
+    rigid : (n, d, 6) array
+        Derivatives of what was recorded by a rigid motion of it (`registration`).
+    derivative : callable
+        From derivatives of displacement and reactions (p, N, 3) to those of the values (n, d, p).
+    """
+
+    values: Floats
+    rigid: Floats
+    derivative: Callable[[Floats, Floats], Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """One recording.
+
+    Attributes
+    ----------
+    name, kind, unit : str
+    rows : (n,) int array
+        Rows of the recording that count.
+    sigma : (n,) array or None
+        Standard deviation of one component of each row; None: to be estimated.
+    weights : (n,) array
+        Where sigma is estimated, the variance of a row is its square over this; else it is in `sigma` already.
+    size : int
+        Components of a row.
+    positions : (k, 3) array
+        What a wrong registration moves [m]; empty for forces.
+    at : callable
+        From displacement and reactions (N, 3) and the centre of a rigid motion (3,) to `Residuals`.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    rows: Rows
+    sigma: Floats | None
+    weights: Floats
+    size: int
+    positions: Floats
+    at: Callable[[Floats, Floats, Floats], Residuals]
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """Recordings of a case of one role.
+
+    Attributes
+    ----------
+    each : tuple of Observation
+    remarks : tuple of str
+        Recordings that say nothing of tissue, and why.
+    """
+
+    each: tuple[Observation, ...]
+    remarks: tuple[str, ...]
+
+    @classmethod
+    def to_fit(cls, case: Case) -> Observations:
+        """The recordings that a case is fitted to.
+
+        Raises
+        ------
+        InputError
+            If there are none, none of them says anything of tissue, a noise is not positive, or one that is to be
+            estimated has too few residuals for that.
+        """
+        if not any(recording.role == "fit" for recording in case.recordings):
+            checks = f"; its {len(case.recordings)} have role = 'check'" if case.recordings else ""
+            raise InputError(f"{case.path}: no [[recording]] to estimate from{checks}")
+        found = cls._of(case, "fit")
+        if not found.each:
+            raise InputError(f"{case.path}: nothing to estimate from: {'; '.join(found.remarks)}")
+        for observation in found.each:
+            count = observation.size * len(observation.rows)
+            if observation.sigma is None and count < _FEWEST:
+                raise InputError(
+                    f"recording '{observation.name}' holds {count} numbers: too few to estimate their noise from, "
+                    f"which takes {_FEWEST}; give its sigma"
+                )
+        return found
+
+    @classmethod
+    def to_check(cls, case: Case) -> Observations:
+        """The recordings that only score what was estimated without them; `InputError` as from `to_fit`."""
+        return cls._of(case, "check")
+
+    @classmethod
+    def _of(cls, case: Case, role: str) -> Observations:
+        each, remarks = [], []
+        for recording in case.recordings:
+            if recording.role != role:
+                continue
+            if isinstance(recording, ForceRecording) and isinstance(case.boundary(recording.boundary), Forced):
+                remarks.append(
+                    f"recording '{recording.name}' says nothing of tissue: the force of '{recording.boundary}' is given"
+                )
+                continue
+            each.append(_observation(case, recording))
+        return cls(tuple(each), tuple(remarks))
+
+    @property
+    def centre(self) -> Floats:
+        """Mean of all positions that were recorded [m], zero if there are none."""
+        positions = np.concatenate([observation.positions for observation in self.each])
+        return positions.mean(axis=0) if len(positions) else np.zeros(3)
+
+    def at(self, u: Floats, reactions: Floats, centre: Floats | None = None) -> tuple[Residuals, ...]:
+        """Residuals of each recording at a state.
+
+        Parameters
+        ----------
+        u : (N, 3) array
+            Displacement [m].
+        reactions : (N, 3) array
+            Of the constrained components [N].
+        centre : (3,) array, optional
+            Of a rigid motion [m]; that of these recordings by default.
+        """
+        about = self.centre if centre is None else centre
+        return tuple(observation.at(u, reactions, about) for observation in self.each)
+
+
+def _observation(case: Case, recording: Recording) -> Observation:
+    if isinstance(recording, PointsRecording):
+        return _points(case, recording)
+    if isinstance(recording, SurfaceRecording):
+        return _surface(case, recording)
+    if isinstance(recording, ForceRecording):
+        return _force(case, recording)
+    raise InputError(f"recording '{recording.name}': a {recording.kind} is of a specimen, not of a deformed body")
+
+
+def _points(case: Case, recording: PointsRecording) -> Observation:
+    mesh = case.remaining[0]
+    rows = rows_at(recording)
+    weights = np.ones(len(rows)) if recording.weights is None else recording.weights[rows]
+    if not (np.isfinite(weights) & (weights >= 0.0)).all():
+        raise InputError(f"recording '{recording.name}': a weight is negative or no number")
+    rows, weights = rows[weights > 0.0], weights[weights > 0.0]
+    if len(rows) == 0:
+        raise InputError(f"recording '{recording.name}': the weight of every point is zero")
+    matrix = locate(mesh.points, mesh.tetrahedra, recording.points[rows]).matrix(len(mesh.points))
+    positions = recording.points[rows] + recording.displacement[rows]
+
+    def derivative(du: Floats, _dR: Floats) -> Floats:
+        flat = np.asarray(du).transpose(1, 2, 0).reshape(du.shape[1], -1)
+        return -np.asarray(matrix @ flat).reshape(len(rows), 3, len(du))
+
+    def at(u: Floats, _reactions: Floats, centre: Floats) -> Residuals:
+        return Residuals(recording.displacement[rows] - matrix @ u, rigid_columns(positions, centre), derivative)
+
+    sigma = _sigma(recording, rows, weights)
+    return Observation(recording.name, recording.kind, "m", rows, sigma, weights, 3, positions, at)
+
+
+def _surface(case: Case, recording: SurfaceRecording) -> Observation:
+    mesh = case.remaining[0]
+    rows = rows_at(recording)
+    points = recording.points[rows]
+    faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
+    size = float(np.ptp(mesh.points, axis=0).max())
+
+    def at(u: Floats, _reactions: Floats, centre: Floats) -> Residuals:
+        moved = mesh.points + u
+        closest = closest_points(points, moved, faces)
+        nodes, weights = faces[closest.face], closest.weights
+        corners = moved[nodes]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        offset = points - closest.position
+        side = np.where(np.einsum("ni,ni->n", offset, normals) < 0.0, -1.0, 1.0)
+        apart = closest.distance > 1e-12 * size
+        # off an edge of the surface the distance grows along the offset, which is no face's normal
+        directions = np.where(
+            apart[:, None], side[:, None] * offset / np.where(apart, closest.distance, 1.0)[:, None], normals
+        )
+
+        def derivative(du: Floats, _dR: Floats) -> Floats:
+            # the closest point moves along the surface too, which does not change its distance to first order
+            return -np.einsum("nj,ni,pnij->np", directions, weights, du[:, nodes])[:, None, :]
+
+        rigid = np.einsum("nj,njk->nk", directions, rigid_columns(points, centre))[:, None, :]
+        return Residuals((side * closest.distance)[:, None], rigid, derivative)
+
+    ones = np.ones(len(rows))
+    sigma = _sigma(recording, rows, ones)
+    return Observation(recording.name, recording.kind, "m", rows, sigma, ones, 1, points, at)
+
+
+def _force(case: Case, recording: ForceRecording) -> Observation:
+    nodes = case.remaining[0].node_sets[case.boundary(recording.boundary).nodes]
+    rows = rows_at(recording)
+    recorded = np.isfinite(recording.force[rows]).all(axis=0)
+    size = int(recorded.sum())
+    if size == 0:
+        raise InputError(f"recording '{recording.name}' has no component of the force, only the torque")
+    force = recording.force[rows][:, recorded]
+
+    def derivative(_du: Floats, dR: Floats) -> Floats:
+        change = dR[:, nodes].sum(axis=1)[:, recorded]
+        return np.broadcast_to(-change.T, (len(rows), size, len(dR))).copy()
+
+    def at(_u: Floats, reactions: Floats, _centre: Floats) -> Residuals:
+        values = force - reactions[nodes].sum(axis=0)[recorded]
+        return Residuals(values, np.zeros((len(rows), size, 6)), derivative)
+
+    ones = np.ones(len(rows))
+    sigma = _sigma(recording, rows, ones)
+    return Observation(recording.name, recording.kind, "N", rows, sigma, ones, size, np.empty((0, 3)), at)
+
+
+def _sigma(recording: Recording, rows: Rows, weights: Floats) -> Floats | None:
+    """Standard deviation of each row, None if it is to be estimated."""
+    sigmas = getattr(recording, "sigmas", None)
+    if sigmas is None and recording.sigma is None:
+        return None
+    found = np.full(len(rows), recording.sigma, dtype=np.float64) if sigmas is None else np.asarray(sigmas)[rows]
+    for value in found.tolist():
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(f"recording '{recording.name}': sigma = {value:g}: expected a positive number")
+    return found / np.sqrt(weights)

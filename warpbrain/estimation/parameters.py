@@ -1,0 +1,196 @@
+"""The vector `theta` of a case: the coordinates of the laws of its tissues, one tissue after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.cases.case import Case
+from warpbrain.errors import InputError
+from warpbrain.gp.coordinates import Coordinate, coordinates, from_coordinates, to_coordinates
+from warpbrain.physics.laws import Law
+from warpbrain.physics.laws.stability import require_stable
+from warpbrain.simulation.model import Material
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+#: How far one step of an estimation may go, by what a coordinate is: a factor of e in a modulus, so that the next
+#: equilibrium is within reach of the last.
+_REACH = {"ln(mu0 / Pa)": 1.0, "C2 / (C1 + C2)": 0.5, "alpha": 4.0}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of `theta`.
+
+    Attributes
+    ----------
+    tissue : str
+    coordinate : Coordinate
+        What it is of the tissue's law; see `warpbrain.gp.coordinates`.
+    """
+
+    tissue: str
+    coordinate: Coordinate
+
+    @property
+    def name(self) -> str:
+        """With tissue and unit."""
+        return f"{self.tissue}: {self.coordinate.name}"
+
+    @property
+    def is_modulus(self) -> bool:
+        """The logarithm of a shear modulus."""
+        return self.coordinate.name.startswith("ln(mu0")
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What `theta` means in a case.
+
+    Tissues that name one group of the generative model are one tissue: they share their parameters.
+
+    Attributes
+    ----------
+    labels : tuple of tuples of int
+        For each tissue its labels in the simulated mesh, increasing.
+    tissues, groups, laws_of, formulations : tuple of str
+        Name of each, group of the generative model (may be empty), law and formulation.
+    poisson : float
+        Ratio at rest, which is kept.
+    """
+
+    labels: tuple[tuple[int, ...], ...]
+    tissues: tuple[str, ...]
+    groups: tuple[str, ...]
+    laws_of: tuple[str, ...]
+    formulations: tuple[str, ...]
+    poisson: float
+
+    @classmethod
+    def of(cls, case: Case) -> Parameters:
+        """The parameters of a case's tissues; those that were resected whole have none.
+
+        Raises
+        ------
+        InputError
+            If tissues of one group have different laws or formulations.
+        """
+        members: dict[str, list[int]] = {}
+        for label in np.unique(case.remaining[0].tissue).tolist():
+            # a tissue without a group is one of its own
+            members.setdefault(case.tissues[label].prior or f"tissue {label}", []).append(label)
+        first = [case.tissues[labels[0]] for labels in members.values()]
+        for labels, tissue in zip(members.values(), first, strict=True):
+            for label in labels:
+                other = case.tissues[label]
+                if (other.model, other.formulation) != (tissue.model, tissue.formulation):
+                    raise InputError(
+                        f"{case.path}: [tissue.{label}] prior: {other.name} and {tissue.name} are one tissue to the "
+                        f"generative model, '{tissue.prior}', but {other.name} is {other.model} ({other.formulation}) "
+                        f"and {tissue.name} {tissue.model} ({tissue.formulation})"
+                    )
+        return cls(
+            tuple(tuple(labels) for labels in members.values()),
+            tuple(_listed([case.tissues[label].name for label in labels]) for labels in members.values()),
+            tuple(tissue.prior for tissue in first),
+            tuple(tissue.model for tissue in first),
+            tuple(tissue.formulation for tissue in first),
+            case.poisson,
+        )
+
+    @property
+    def each(self) -> tuple[Parameter, ...]:
+        """Every number of `theta`, in order."""
+        pairs = zip(self.tissues, self.laws_of, strict=True)
+        return tuple(Parameter(tissue, coordinate) for tissue, law in pairs for coordinate in coordinates(law))
+
+    def __len__(self) -> int:
+        return sum(len(coordinates(law)) for law in self.laws_of)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """With tissue and unit."""
+        return tuple(parameter.name for parameter in self.each)
+
+    @property
+    def low(self) -> Floats:
+        """Where each ends, shape (p,)."""
+        return np.array([parameter.coordinate.low for parameter in self.each])
+
+    @property
+    def high(self) -> Floats:
+        """Where each ends, shape (p,)."""
+        return np.array([parameter.coordinate.high for parameter in self.each])
+
+    @property
+    def reach(self) -> Floats:
+        """How far one step of an estimation may go, shape (p,)."""
+        return np.array([_REACH[parameter.coordinate.name] for parameter in self.each])
+
+    @property
+    def is_modulus(self) -> Bools:
+        """Which are logarithms of shear moduli, shape (p,)."""
+        return np.array([parameter.is_modulus for parameter in self.each])
+
+    def theta_of(self, laws: Sequence[Law]) -> Floats:
+        """The vector (p,) of the law of each tissue.
+
+        Raises
+        ------
+        InputError
+            If a tissue has another law than in the case, or an Ogden law of several terms.
+        """
+        found: list[float] = []
+        for law, tissue, name in zip(laws, self.tissues, self.laws_of, strict=True):
+            if law.name != name:
+                raise InputError(f"{tissue}: found the law {law.name}, expected {name}")
+            found.extend(to_coordinates(law))
+        return np.array(found)
+
+    def laws(self, theta: ArrayLike) -> tuple[Law, ...]:
+        """The law of each tissue.
+
+        Raises
+        ------
+        InputError
+            If `theta` is not as long as there are parameters, or not finite.
+        """
+        point = np.asarray(theta, dtype=np.float64)
+        if point.shape != (len(self),) or not np.isfinite(point).all():
+            raise InputError(f"theta = {point.tolist()}: expected {len(self)} numbers: {', '.join(self.names)}")
+        laws, at = [], 0
+        for name in self.laws_of:
+            size = len(coordinates(name))
+            laws.append(from_coordinates(name, point[at : at + size].tolist()))
+            at += size
+        return tuple(laws)
+
+    def materials(self, theta: ArrayLike) -> dict[int, Material]:
+        """Materials by tissue label; `InputError` as from `laws`."""
+        each = zip(self.labels, self.laws(theta), self.formulations, strict=True)
+        return {label: Material(law, self.poisson, shape) for labels, law, shape in each for label in labels}
+
+    def applied(self, case: Case, theta: ArrayLike) -> Case:
+        """The case with the laws of `theta`; `InputError` as from `laws`."""
+        tissues = dict(case.tissues)
+        for labels, law in zip(self.labels, self.laws(theta), strict=True):
+            for label in labels:
+                tissues[label] = replace(tissues[label], law=law)
+        return replace(case, tissues=tissues)
+
+    def require_possible(self, theta: ArrayLike) -> None:
+        """Raise `InputError` if a tissue's law is not stable; see `warpbrain.physics.laws.stability`."""
+        for tissue, law, formulation in zip(self.tissues, self.laws(theta), self.formulations, strict=True):
+            try:
+                require_stable(law, self.poisson, formulation)
+            except InputError as error:
+                raise InputError(f"{tissue}: {error}") from None
+
+
+def _listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,0 +1,202 @@
+"""What is known of a case's tissue after its recordings: the answer of an estimation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.case import Case
+from warpbrain.estimation.chain import Chain
+from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.identifiability import Identifiability, identifiability
+from warpbrain.estimation.importance import Importance
+from warpbrain.estimation.modes import Mode, probabilities
+from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.parameters import Parameter, Parameters
+from warpbrain.estimation.prediction import Prediction, predictions
+from warpbrain.gp.prior import Prior
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Marginal:
+    """What is known of one parameter.
+
+    Attributes
+    ----------
+    parameter : Parameter
+    estimate : float
+        The most probable value.
+    mean, deviation : float
+        Of the posterior.
+    interval : (float, float)
+        95 % of the posterior lie between, as much below as above.
+    prior_mean, prior_deviation : float
+    prior_interval : (float, float)
+        95 % of the prior.
+    """
+
+    parameter: Parameter
+    estimate: float
+    mean: float
+    deviation: float
+    interval: tuple[float, float]
+    prior_mean: float
+    prior_deviation: float
+    prior_interval: tuple[float, float]
+
+    @property
+    def shrinkage(self) -> float:
+        """By how much of the prior's the standard deviation fell: 0, nothing was learnt; 1, all."""
+        return 1.0 - self.deviation / self.prior_deviation
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """The answer.
+
+    Attributes
+    ----------
+    case : Case
+    prior : Prior
+    modes : tuple of Mode
+        The most probable first.
+    remarks : tuple of str
+        What a user should know of how it was found.
+    differences : tuple of Difference
+        The error of the mesh each time it was computed; the last one counts. Empty if it was left out.
+    importance : Importance
+        The check of Laplace's approximation.
+    doubts : tuple of str
+        Why that is not to be believed; empty if it is.
+    chain : Chain or None
+        What takes its place then.
+    solves : mapping of str to int
+        Equilibria by what they were for.
+    seconds : mapping of str to float
+        Wall time by stage.
+    """
+
+    case: Case
+    prior: Prior
+    modes: tuple[Mode, ...]
+    remarks: tuple[str, ...]
+    differences: tuple[Difference, ...]
+    importance: Importance
+    doubts: tuple[str, ...]
+    chain: Chain | None
+    solves: Mapping[str, int]
+    seconds: Mapping[str, float]
+
+    @property
+    def best(self) -> Mode:
+        """The most probable mode."""
+        return self.modes[0]
+
+    @property
+    def parameters(self) -> Parameters:
+        """What `theta` means."""
+        return self.best.estimate.problem.parameters
+
+    @property
+    def method(self) -> str:
+        """``"laplace"`` or ``"chain"``: what marginals and correlation are of."""
+        return "laplace" if self.chain is None else "chain"
+
+    @property
+    def theta(self) -> Floats:
+        """The most probable parameters, shape (p,)."""
+        return self.best.estimate.theta
+
+    @property
+    def mode_probabilities(self) -> Floats:
+        """Of each mode by Laplace."""
+        return probabilities(self.modes)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Of the parameters, shape (p, p)."""
+        if self.chain is None:
+            return self.best.laplace.covariance
+        return np.atleast_2d(np.cov(self.chain.theta, rowvar=False))
+
+    @property
+    def correlation(self) -> Floats:
+        """Shape (p, p)."""
+        deviations = np.sqrt(np.diag(self.covariance))
+        return self.covariance / np.outer(deviations, deviations)
+
+    @cached_property
+    def marginals(self) -> tuple[Marginal, ...]:
+        """Each parameter."""
+        prior = np.percentile(self.prior.theta, [2.5, 97.5], axis=0).T
+        if self.chain is None:
+            mean, interval = self.theta, self.best.laplace.interval()
+        else:
+            mean = self.chain.theta.mean(axis=0)
+            interval = np.percentile(self.chain.theta, [2.5, 97.5], axis=0).T
+        deviations = np.sqrt(np.diag(self.covariance))
+        return tuple(
+            Marginal(
+                parameter,
+                float(self.theta[k]),
+                float(mean[k]),
+                float(deviations[k]),
+                (float(interval[k, 0]), float(interval[k, 1])),
+                float(self.prior.mean[k]),
+                float(np.sqrt(self.prior.covariance[k, k])),
+                (float(prior[k, 0]), float(prior[k, 1])),
+            )
+            for k, parameter in enumerate(self.parameters.each)
+        )
+
+    @cached_property
+    def joint_covariance(self) -> Floats:
+        """Of parameters and nuisances by Laplace, shape (p + q, p + q)."""
+        p = len(self.parameters)
+        problem, information = self.best.estimate.problem, self.best.estimate.linearised.information.copy()
+        information[:p, :p] += problem.mode.gaussian.precision
+        information[p:, p:] += problem.nuisances.precision
+        # metres, radians and plain numbers: one size for all
+        size = np.sqrt(np.diag(information))
+        return np.asarray(np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size))
+
+    @property
+    def nuisances(self) -> tuple[tuple[str, float, float], ...]:
+        """Name, estimate and standard deviation of each."""
+        p = len(self.parameters)
+        names = self.best.estimate.problem.nuisances.names
+        values, deviations = self.best.estimate.point.nuisances, np.sqrt(np.diag(self.joint_covariance))[p:]
+        return tuple(zip(names, values.tolist(), deviations.tolist(), strict=True))
+
+    @cached_property
+    def identifiability(self) -> Identifiability:
+        """What the recordings tell at all."""
+        return identifiability(self.best.estimate, self.best.laplace)
+
+    @cached_property
+    def predictions(self) -> tuple[Prediction, ...]:
+        """Recordings that were fitted, then those that check; these are looked at here for the first time."""
+        fitted = self.best.estimate.problem.observations
+        both = (("fit", fitted), ("check", Observations.to_check(self.case)))
+        return tuple(
+            one
+            for role, observations in both
+            for one in predictions(self.best, role, observations, self.joint_covariance)
+        )
+
+    @property
+    def fitted_case(self) -> Case:
+        """The case with the most probable laws."""
+        return self.parameters.applied(self.case, self.theta)
+
+    @property
+    def displacement(self) -> Floats:
+        """Of each node [m], shape (n, 3): of the most probable state, less the error of the mesh."""
+        point = self.best.estimate.point
+        return self.best.estimate.problem.nuisances.observed(point.state, point.nuisances)[0]

@@ -1,0 +1,75 @@
+"""The same body in smaller elements: every tetrahedron cut into eight of an eighth of its volume."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.surface import boundary_faces
+from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
+
+#: Corners 0 to 3 and the midpoints of edges 01, 02, 03, 12, 13, 23 as 4 to 9: what is cut off at each corner.
+_CORNERS = np.array([[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]])
+#: Diagonals of the octahedron that is left, each with the other four corners in a ring about it.
+_DIAGONALS = np.array([[4, 9], [5, 8], [6, 7]])
+_RINGS = np.array([[5, 6, 8, 7], [4, 7, 9, 6], [4, 5, 9, 8]])
+
+
+def refined(mesh: TetMesh) -> tuple[TetMesh, Ints]:
+    """Cut every tetrahedron into eight, through the midpoints of its edges.
+
+    The four at the corners are similar to the whole; the octahedron between them is cut along its shortest diagonal, so
+    that elements do not become worse without limit (Bey 1995, Computing 55, 355).
+
+    Returns
+    -------
+    mesh : TetMesh
+        Nodes 0 to n - 1 are those of the mesh it is of, elements 8 e to 8 e + 7 are in element e. A midpoint is in a
+        node set if both ends of its edge are; in a set of nodes of the surface only if the edge lies on the surface
+        too.
+    ends : (n', 2) int array
+        For each node the two between which it lies in the middle; an old one lies between itself and itself.
+    """
+    sides = np.sort(mesh.tetrahedra[:, EDGES], axis=2).reshape(-1, 2)
+    edges, number = np.unique(sides, axis=0, return_inverse=True)
+    count = len(mesh.points)
+    points = np.concatenate([mesh.points, mesh.points[edges].mean(axis=1)])
+    nodes = np.concatenate([mesh.tetrahedra, count + number.reshape(-1, 6)], axis=1)
+    children = np.concatenate([nodes[:, _CORNERS], _octahedra(points, nodes)], axis=1).reshape(-1, 4)
+    surface, outer = _on_surface(mesh, edges)
+    node_sets = {}
+    for name, members in mesh.node_sets.items():
+        both = members[edges].all(axis=1)
+        if not (members & ~surface).any():
+            both &= outer
+        node_sets[name] = np.concatenate([members, both])
+    element_sets = {name: np.repeat(members, 8) for name, members in mesh.element_sets.items()}
+    ends = np.concatenate([np.repeat(np.arange(count)[:, None], 2, axis=1), edges]).astype(np.int32)
+    return TetMesh(points, children, np.repeat(mesh.tissue, 8), node_sets, element_sets), ends
+
+
+def _octahedra(points: Floats, nodes: NDArray[np.int64]) -> Ints:
+    """The four tetrahedra (m, 4, 4) about the shortest diagonal of each octahedron, positively oriented."""
+    ends = points[nodes[:, _DIAGONALS]]
+    shortest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).argmin(axis=1)
+    every = np.arange(len(nodes))[:, None]
+    diagonal = nodes[every, _DIAGONALS[shortest]]
+    ring = nodes[every, _RINGS[shortest]]
+    found = np.stack([ring, np.roll(ring, -1, axis=1)], axis=2)
+    found = np.concatenate([np.repeat(diagonal[:, None], 4, axis=1), found], axis=2)
+    edges = points[found[:, :, 1:]] - points[found[:, :, :1]]
+    inverted = np.linalg.det(edges) < 0.0
+    found[inverted] = found[inverted][:, [1, 0, 2, 3]]
+    return np.asarray(found, dtype=np.int32)
+
+
+def _on_surface(mesh: TetMesh, edges: Ints) -> tuple[Bools, Bools]:
+    """Which nodes (n,) and which edges (k,) are of the boundary."""
+    faces = boundary_faces(mesh.tetrahedra)
+    nodes = np.zeros(len(mesh.points), dtype=bool)
+    nodes[faces] = True
+    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+    count = len(mesh.points)
+    keys = edges.astype(np.int64) @ [count, 1]
+    return nodes, np.isin(keys, sides.astype(np.int64) @ [count, 1])
