@@ -22,10 +22,9 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.forward import Forward, State
+from warpbrain.estimation.forward import ROUGH, Forward, State
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.resection import Resection
-from warpbrain.simulation.equilibrium import EquilibriumOptions
 
 Floats = NDArray[np.float64]
 
@@ -89,12 +88,12 @@ class FinerMesh:
         mesh, ends = refined(coarse)
         # the tissue is out already
         mechanisms = tuple(m for m in case.mechanisms if not isinstance(m, Resection))
-        options = EquilibriumOptions(tolerance=1e-7)
-        self._forward = Forward(replace(case, mesh=mesh, mechanisms=mechanisms), theta, device, options)
+        self._forward = Forward(replace(case, mesh=mesh, mechanisms=mechanisms), theta, device)
         rows = np.repeat(np.arange(len(ends)), 2)
         shape = (len(ends), len(coarse.points))
         self._prolong: Any = csr_matrix((np.full(2 * len(ends), 0.5), (rows, ends.ravel())), shape=shape)
-        self._last: State | None = None
+        #: The last error on the finer mesh, with which the next state there is predicted.
+        self._last: Floats | float = 0.0
 
     @property
     def solves(self) -> int:
@@ -109,15 +108,15 @@ class FinerMesh:
         SolveError
             If there is no equilibrium on the finer mesh.
         """
-        start = self._prolong @ state.u if self._last is None else self._last.u
+        start = self._prolong @ state.u
         try:
-            finer = self._forward.solve(state.theta, start)
+            finer = self._forward.solve(state.theta, start + self._last, ROUGH)
         except SolveError as error:
             raise SolveError(
                 f"the error of the mesh is not known: on elements of half the size {error}; it can be left out, and "
                 "then the estimate holds for this mesh only"
             ) from None
-        self._last = finer
+        self._last = finer.u - start
         count = len(state.u)
         # a reaction between two nodes goes to both of them, so that resultants stay
         reactions = self._prolong.T @ finer.reactions

@@ -34,6 +34,8 @@ Floats = NDArray[np.float64]
 
 #: The error of the mesh is computed again until the estimate moves by no more than this, in standard deviations.
 _SETTLED = 0.1
+#: Tolerance of Gauss-Newton before the error of the mesh is known.
+_BEFORE = 0.1
 #: And no more often than this.
 _MOST_DIFFERENCES = 4
 
@@ -55,7 +57,8 @@ class EstimationOptions:
         Equilibria of the chain that replaces it where it fails.
     seed : int
         Of those draws.
-    gauss_newton : GaussNewtonOptions
+    tolerance : float
+        Of Gauss-Newton, see `GaussNewtonOptions`.
     """
 
     likelihood: Likelihood = field(default_factory=Likelihood)
@@ -64,7 +67,7 @@ class EstimationOptions:
     samples: int = 64
     chain: int = 300
     seed: int = 0
-    gauss_newton: GaussNewtonOptions = field(default_factory=GaussNewtonOptions)
+    tolerance: float = 3e-3
 
     def __post_init__(self) -> None:
         for name, least in (("samples", 25), ("chain", 10), ("seed", 0)):
@@ -229,7 +232,10 @@ class Estimation:
         text = "Gauss-Newton" + (f", {_where(self.parameters, prior_mode)}" if many else "")
         self.listener.stage(text if start is None else f"{text}, with the error of the mesh")
         problem = Problem(self.forward, self.observations, prior_mode, self.options.likelihood, nuisances)
-        search = GaussNewton(problem, self.options.gauss_newton, self.listener.step)
+        # what is only the start of something better need not be exact
+        final = self.options.discretisation is None or nuisances.difference is not None
+        tolerance = self.options.tolerance if final else max(self.options.tolerance, _BEFORE)
+        search = GaussNewton(problem, GaussNewtonOptions(tolerance), self.listener.step)
         if start is None:
             found = search.solve()
         else:

@@ -16,6 +16,10 @@ from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
 
+#: Out-of-balance force of an equilibrium, relative: where differences of residuals must mean something, and where what
+#: is left of it need only be far below any noise.
+EXACT, ROUGH = 1e-9, 1e-5
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -46,26 +50,32 @@ class Forward:
     theta : (p,) array
         Parameters to begin with; any that are stable.
     device : str, optional
-    options : EquilibriumOptions, optional
-        By default to 1e-9, so that differences of residuals mean something.
 
     Attributes
     ----------
-    solves, newton_iterations : int
-        Equilibria that were asked for, and what they took.
+    solves : int
+        Equilibria that were asked for.
     """
 
-    def __init__(
-        self, case: Case, theta: Floats, device: str | None = None, options: EquilibriumOptions | None = None
-    ) -> None:
+    def __init__(self, case: Case, theta: Floats, device: str | None = None) -> None:
         self.parameters = Parameters.of(case)
         self.system = System(model_of(self.parameters.applied(case, theta))[0], device)
-        self.solves = self.newton_iterations = 0
-        self._equilibrium = EquilibriumSolver(self.system, options or EquilibriumOptions(tolerance=1e-9))
+        self.solves = 0
+        self._solvers = {
+            tolerance: EquilibriumSolver(self.system, EquilibriumOptions(tolerance=tolerance))
+            for tolerance in (EXACT, ROUGH)
+        }
         self._sensitivity = SensitivitySolver(self.system)
 
-    def solve(self, theta: Floats, start: Floats | None = None) -> State:
-        """The equilibrium of parameters, from a displacement (n, 3) [m] that is near to it, or from rest.
+    def solve(self, theta: Floats, start: Floats | None = None, tolerance: float = EXACT) -> State:
+        """The equilibrium of parameters.
+
+        Parameters
+        ----------
+        theta : (p,) array
+        start : (n, 3) array, optional
+            A displacement [m] that is near to it; rest by default.
+        tolerance : {EXACT, ROUGH}
 
         Raises
         ------
@@ -74,8 +84,7 @@ class Forward:
         """
         self.solves += 1
         self.system.set_materials(self.parameters.materials(theta))
-        found = self._equilibrium.solve(start=start)
-        self.newton_iterations += len(found.history)
+        found = self._solvers[tolerance].solve(start=start)
         model = self.system.model
         reactions = np.where(model.constrained, found.internal - model.external_forces(), 0.0)
         return State(theta.copy(), found.u, reactions, len(found.history))

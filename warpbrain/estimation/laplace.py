@@ -75,9 +75,9 @@ class Laplace:
 
     def interval(self, probability: float = 0.95) -> Floats:
         """Central interval of each parameter, shape (p, 2), no farther than its range goes."""
-        from scipy.stats import norm
+        from scipy.special import ndtri
 
-        away = norm.ppf(0.5 + 0.5 * probability) * self.standard_deviations
+        away = ndtri(0.5 + 0.5 * probability) * self.standard_deviations
         ends = np.stack([self.theta - away, self.theta + away], axis=1)
         return np.clip(ends, self.parameters.low[:, None], self.parameters.high[:, None])
 

@@ -109,20 +109,20 @@ def predictions(mode: Mode, role: str, observations: Observations, joint: Floats
 
 def gross_errors(residuals: Floats, deviation: Floats, sigma: Floats) -> Bools:
     """Rows (n,) farther away than noise and prediction pass once in ten thousand."""
-    from scipy.stats import chi2
+    from scipy.special import gammaincinv
 
     squares = np.sum(residuals**2 / (deviation**2 + sigma[:, None] ** 2), axis=1)
-    return np.asarray(squares > chi2.ppf(GROSS, residuals.shape[1]))
+    return np.asarray(squares > 2.0 * gammaincinv(0.5 * residuals.shape[1], GROSS))
 
 
 def coverage(residuals: Floats, deviation: Floats, sigma: Floats, gross: Bools) -> tuple[float, ...] | None:
     """Part of the components in their intervals of noise and prediction, normal; None if all rows are gross errors."""
-    from scipy.stats import norm
+    from scipy.special import ndtri
 
     if gross.all():
         return None
     away = (np.abs(residuals) / np.sqrt(deviation**2 + sigma[:, None] ** 2))[~gross]
-    return tuple(float(np.mean(away <= norm.ppf(0.5 + 0.5 * probability))) for probability in INTERVALS)
+    return tuple(float(np.mean(away <= ndtri(0.5 + 0.5 * probability))) for probability in INTERVALS)
 
 
 def _root_mean_square(residuals: Floats) -> float:

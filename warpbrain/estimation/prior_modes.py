@@ -23,7 +23,7 @@ from warpbrain.gp.process import Process
 Floats = NDArray[np.float64]
 
 #: Draws on which the prior rests.
-DRAWS = 1000
+DRAWS = 500
 #: Part of the draws that makes a cluster of signs a mode of its own.
 _LEAST_SHARE = 0.02
 #: Smallest standard deviation of a coordinate that has two ends, relative to its range.

@@ -50,10 +50,10 @@ class Point:
     @property
     def gross(self) -> tuple[Bools, ...]:
         """Which rows of each observation are gross errors."""
-        from scipy.stats import chi2
+        from scipy.special import gammaincinv
 
         pairs = zip(self.residuals, self.weighed, strict=True)
-        return tuple(weighed.squares > chi2.ppf(GROSS, values.shape[1]) for values, weighed in pairs)
+        return tuple(weighed.squares > 2.0 * gammaincinv(0.5 * values.shape[1], GROSS) for values, weighed in pairs)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.forward import State
+from warpbrain.estimation.forward import ROUGH, State
 from warpbrain.estimation.modes import Mode
 from warpbrain.gp.prior import Prior
 
@@ -91,10 +91,10 @@ class Target:
     def _solve(self, theta: Floats, mode: Mode) -> State:
         forward = self.problem.forward
         try:
-            return forward.solve(theta, mode.predicted(theta).u)
+            return forward.solve(theta, mode.predicted(theta).u, ROUGH)
         except SolveError:
             # far from the estimate the prediction may turn elements inside out
-            return forward.solve(theta, mode.estimate.point.state.u)
+            return forward.solve(theta, mode.estimate.point.state.u, ROUGH)
 
     def _log_density(self, state: State, start: Floats) -> tuple[float, Floats]:
         misfit, point = self.problem.without_nuisances(state, start)
