@@ -33,7 +33,7 @@ from warpbrain.gp.prior import Prior
 Floats = NDArray[np.float64]
 
 #: The error of the mesh is computed again until the estimate moves by no more than this, in standard deviations.
-_SETTLED = 0.1
+_SETTLED = 0.2
 #: Tolerance of Gauss-Newton before the error of the mesh is known.
 _BEFORE = 0.1
 #: And no more often than this.

@@ -1,8 +1,9 @@
 """The most probable parameters: damped Gauss-Newton on likelihood and prior, solving equilibrium from the last state.
 
 Each iteration differentiates the equilibrium (`warpbrain.simulation.sensitivity`), takes the step of weighted least
-squares, and starts the next equilibrium where the derivatives say it will be. A step is halved until the objective
-falls. Parameters at an end of their range stay there while the objective pushes them out.
+squares with what the last one taught of the curvature, and starts the next equilibrium where the derivatives say it will
+be. A step is halved until the objective falls. Parameters at an end of their range stay there while the objective pushes
+them out.
 
 Far from the estimate most of a residual is no noise yet, and a Student t would take nearly all rows for gross errors
 and settle for a few. So the noise is first taken to be as large as the residuals say, and what is known of it after
@@ -169,10 +170,11 @@ class GaussNewton:
     def _descend(self, point: Point, linearised: Linearised, cautious: bool) -> tuple[Point, Linearised, bool]:
         """Downhill to where a step is no longer worth it."""
         options = self.options
-        tolerance = 0.03 if cautious else options.tolerance
+        tolerance = max(0.1, options.tolerance) if cautious else options.tolerance
+        hessian = linearised.hessian
         for iteration in itertools.count():
-            step = self._step(point, linearised)
-            decrement = float(np.sqrt(step @ linearised.hessian @ step))
+            step = self._step(point, linearised, hessian)
+            decrement = float(np.sqrt(step @ hessian @ step))
             if decrement <= tolerance or np.abs(step).max() <= options.least_step:
                 return point, linearised, True
             if iteration == options.max_iterations:
@@ -185,18 +187,20 @@ class GaussNewton:
             if reached is None:
                 # what is left is rounding of the objective, or nothing better lies this way
                 return point, linearised, decrement <= 10.0 * tolerance
+            taken = reached[0].coordinates - point.coordinates
+            hessian = _secant(reached[1].hessian, taken, reached[1].gradient - linearised.gradient)
             point, linearised = reached
         raise AssertionError("unreachable")
 
-    def _step(self, point: Point, linearised: Linearised) -> Floats:
-        """The step of Gauss-Newton among the parameters that are free to move."""
+    def _step(self, point: Point, linearised: Linearised, whole: Floats) -> Floats:
+        """The step of Gauss-Newton with a Hessian among the parameters that are free to move."""
         theta, gradient, mode = point.state.theta, linearised.gradient, self.problem.mode
         moving = np.ones(len(gradient), dtype=bool)
         p = len(theta)
         moving[:p] = ~((theta <= mode.low) & (gradient[:p] > 0.0))
         moving[:p] &= ~((theta >= mode.high) & (gradient[:p] < 0.0))
         step = np.zeros(len(gradient))
-        hessian = linearised.hessian[np.ix_(moving, moving)]
+        hessian = whole[np.ix_(moving, moving)]
         # shifts are metres, turns radians and moduli logarithms: one size for all
         size = np.sqrt(np.diag(hessian))
         step[moving] = np.linalg.solve(hessian / np.outer(size, size), -gradient[moving] / size) / size
@@ -234,6 +238,21 @@ class GaussNewton:
         except SolveError:
             # a bold prediction may turn elements inside out
             return self.problem.forward.solve(theta, last)
+
+
+def _secant(hessian: Floats, step: Floats, change: Floats) -> Floats:
+    """A Hessian that knows by how much the gradient changed along the last step (the update of BFGS).
+
+    Gauss and Newton's leaves out what large residuals times second derivatives add, which makes it converge slowly
+    where much of what was recorded is not explained.
+    """
+    along = float(change @ step)
+    bent = hessian @ step
+    expected = float(step @ bent)
+    # a change of a tenth or of ten times what was expected is not of a neighbourhood that a parabola describes
+    if not 0.1 * expected < along < 10.0 * expected:
+        return hessian
+    return hessian - np.outer(bent, bent) / expected + np.outer(change, change) / along
 
 
 def require_explained(estimate: Estimate) -> None:

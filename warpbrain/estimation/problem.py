@@ -48,6 +48,11 @@ class Point:
     objective: float
 
     @property
+    def coordinates(self) -> Floats:
+        """Parameters and nuisances, shape (p + q,)."""
+        return np.concatenate([self.state.theta, self.nuisances])
+
+    @property
     def gross(self) -> tuple[Bools, ...]:
         """Which rows of each observation are gross errors."""
         from scipy.special import gammaincinv
