@@ -32,12 +32,15 @@ class State:
         Displacement [m], and what holds the constrained components [N].
     newton_iterations : int
         That it took.
+    passed_unstable : bool
+        The way to it led past states with an indefinite tangent: a slowly growing load may reach another one.
     """
 
     theta: Floats
     u: Floats
     reactions: Floats
     newton_iterations: int
+    passed_unstable: bool = False
 
 
 class Forward:
@@ -87,7 +90,7 @@ class Forward:
         found = self._solvers[tolerance].solve(start=start)
         model = self.system.model
         reactions = np.where(model.constrained, found.internal - model.external_forces(), 0.0)
-        return State(theta.copy(), found.u, reactions, len(found.history))
+        return State(theta.copy(), found.u, reactions, len(found.history), found.unstable_iterations > 0)
 
     def differentiate(self, state: State) -> Sensitivities:
         """Derivatives of a state by its parameters; `SolveError` if it is unstable."""

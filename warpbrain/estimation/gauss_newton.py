@@ -1,9 +1,9 @@
 """The most probable parameters: damped Gauss-Newton on likelihood and prior, solving equilibrium from the last state.
 
 Each iteration differentiates the equilibrium (`warpbrain.simulation.sensitivity`), takes the step of weighted least
-squares with what the last one taught of the curvature, and starts the next equilibrium where the derivatives say it will
-be. A step is halved until the objective falls. Parameters at an end of their range stay there while the objective pushes
-them out.
+squares with what the last one taught of the curvature, and starts the next equilibrium where the derivatives say it
+will be. A step is halved until the objective falls. Parameters at an end of their range stay there while the objective
+pushes them out.
 
 Far from the estimate most of a residual is no noise yet, and a Student t would take nearly all rows for gross errors
 and settle for a few. So the noise is first taken to be as large as the residuals say, and what is known of it after

@@ -1,0 +1,198 @@
+"""`warpbrain estimate`: the tissue that a case's recordings are of."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from warpbrain.errors import InputError
+from warpbrain.terminal.progress import Progress
+
+if TYPE_CHECKING:
+    from warpbrain.cases.case import Case
+    from warpbrain.estimation.estimate import EstimationOptions
+
+#: Steps of Gauss-Newton, as printed.
+_HEADER = "  step    objective   to go [sd]    taken   Newton"
+
+
+def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "estimate",
+        help="estimate tissue from a case's recordings",
+        description="Estimates the laws of a case's tissues from its recordings, and says how well they are known. "
+        "Writes estimate.json, predictions and figures, or sweep.csv and its figure.",
+    )
+    add = parser.add_argument
+    add("--case", required=True, metavar="NAME", help="0529, ... (see warpbrain cases), or the path of a case folder")
+    add("--tissue", choices=("single", "multi"), default="multi", help="one tissue, or grey and white (default)")
+    add("--model", metavar="LAW", help="neo-hookean, mooney-rivlin or ogden for every tissue (default: the case's own)")
+    add(
+        "--method",
+        choices=("posterior", "grid"),
+        default="posterior",
+        help="posterior (default), or the paper's sweep over 17 curves a tissue",
+    )
+    add(
+        "--gp",
+        metavar="MODEL",
+        help="generative model: hierarchical (default), coregionalised (default of --method grid) or a folder",
+    )
+    add(
+        "--registration",
+        nargs=2,
+        type=float,
+        metavar=("MM", "DEG"),
+        help="standard deviations of a rigid error of registration, to be estimated along (default: there is none)",
+    )
+    add(
+        "--nu",
+        type=float,
+        default=4.0,
+        metavar="NU",
+        help="degrees of freedom of the noise (default: 4, robust to gross errors; inf: normal)",
+    )
+    add("--no-discretisation", action="store_true", help="take the mesh for exact")
+    add("--samples", type=int, default=64, metavar="N", help="equilibria that check the posterior (default: 64)")
+    add("--seed", type=int, default=0, metavar="S", help="of these draws (default: 0)")
+    add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
+    add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-estimate-CASE-TISSUE)")
+    add("--quiet", action="store_true", help="print nothing but errors")
+    parser.set_defaults(call=_run)
+
+
+def _run(options: argparse.Namespace) -> None:
+    asked = _options(options)
+    say: Callable[..., None] = _silent if options.quiet else print
+
+    from warpbrain.atomic import output_folder, safe_name
+    from warpbrain.cases.shipped import find_case
+    from warpbrain.simulation.system import find_device
+    from warpbrain.terminal.quiet import start_warp_quietly
+
+    start_warp_quietly()
+    find_device(options.device)
+    case = find_case(options.case, options.tissue)
+    if case.specimen is not None:
+        raise InputError(
+            f"{case.path}: [specimen]: tissue is estimated from a deformed body, not from a specimen's tests"
+        )
+    if options.model is not None:
+        case = case.with_law(options.model)
+    out = output_folder(options.out or Path(f"warpbrain-estimate-{safe_name(case.name)}-{options.tissue}"))
+    say(case.title)
+    if case.origin == "stand-in":
+        say("  a stand-in, not a patient: what is estimated is the tissue of a model")
+    if options.method == "grid":
+        _sweep(options, case, out, say)
+    else:
+        _estimate(options, asked, case, out, say)
+
+
+def _options(options: argparse.Namespace) -> EstimationOptions:
+    """What is asked for; refuses bad numbers before anything is computed."""
+    from warpbrain.estimation.discretisation import Discretisation
+    from warpbrain.estimation.estimate import EstimationOptions
+    from warpbrain.estimation.likelihood import Likelihood
+    from warpbrain.estimation.registration import Registration
+
+    registration = None
+    if options.registration is not None:
+        shift, turn = options.registration
+        if not (shift > 0.0 and turn > 0.0 and math.isfinite(shift + turn)):
+            raise InputError(f"--registration {shift:g} {turn:g}: expected two positive numbers [mm] and [degrees]")
+        registration = Registration(0.001 * shift, math.radians(turn))
+    if not options.nu > 0.0:
+        raise InputError(f"--nu {options.nu:g}: expected a positive number of degrees of freedom, or inf")
+    return EstimationOptions(
+        Likelihood(options.nu),
+        None if options.no_discretisation else Discretisation(),
+        registration,
+        samples=options.samples,
+        seed=options.seed,
+    )
+
+
+def _estimate(
+    options: argparse.Namespace, asked: EstimationOptions, case: Case, out: Path, say: Callable[..., None]
+) -> None:
+    from warpbrain.estimation.estimate import Estimation, Listener
+    from warpbrain.estimation.gauss_newton import GaussNewtonStep
+    from warpbrain.estimation.prior_modes import prior_of
+    from warpbrain.gp.trained import find_model
+    from warpbrain.report import estimate_picture
+    from warpbrain.report.estimate import describe_estimate, estimate_lines
+    from warpbrain.report.estimate_files import write_predictions
+    from warpbrain.report.files import write_summary
+    from warpbrain.simulation.system import find_device
+
+    progress = Progress("equilibria", options.quiet)
+
+    def on_stage(text: str) -> None:
+        progress.clear()
+        say("", text, *([_HEADER] if text.startswith("Gauss-Newton") else []), sep="\n")
+
+    def on_step(step: GaussNewtonStep) -> None:
+        say(
+            f"  {step.iteration:>4} {step.objective:>12.3f} {step.decrement:>12.4f} {step.step:>8.3g} "
+            f"{step.newton_iterations:>8}"
+        )
+
+    prior = prior_of(case, find_model(options.gp or "hierarchical"), seed=asked.seed)
+    listener = Listener(on_stage, on_step, progress.show)
+    try:
+        posterior = Estimation(case, prior, asked, options.device, listener).run()
+    finally:
+        progress.clear()
+    said = describe_estimate(posterior, asked, find_device(options.device).alias)
+    say("", *estimate_lines(said), sep="\n")
+    write_predictions(out / "predictions.csv", posterior)
+    estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)
+    estimate_picture.write_observed_against_predicted(out / "predicted.png", posterior)
+    estimate_picture.write_residuals(out / "residuals.png", posterior)
+    write_summary(out / "estimate.json", said)
+    say("", f"written to {out}: estimate.json, predictions.csv, posterior.png, predicted.png, residuals.png", sep="\n")
+
+
+def _sweep(options: argparse.Namespace, case: Case, out: Path, say: Callable[..., None]) -> None:
+    from warpbrain.estimation.parameters import Parameters
+    from warpbrain.estimation.sweep import VALUES, SweepPoint, sweep
+    from warpbrain.gp.trained import find_model
+    from warpbrain.report.fingerprints import fingerprint_of
+    from warpbrain.report.sweep import TABLE, columns, read_sweep, sweep_lines, write_sweep
+    from warpbrain.report.sweep_picture import write_sweep_picture
+
+    # the paper's process on the paper's data
+    model = find_model(options.gp or "coregionalised", "corrected" if options.gp else "as_published")
+    parameters = Parameters.of(case)
+    header = columns(parameters, fingerprint_of(case, model.name, model.variant))
+    path = out / TABLE
+    known = read_sweep(path, header, len(parameters.tissues))
+    total = len(VALUES) ** len(parameters.tissues)
+    say(f"sweep of {total} equilibria" + (f", {len(known)} of which are there already" if known else ""))
+    progress = Progress("sweep", options.quiet)
+    found = dict(known)
+
+    def on_point(point: SweepPoint) -> None:
+        found[point.k] = point
+        write_sweep(path, header, found.values())
+        progress.show(len(found) / total, ", ".join(f"k = {k:+.2f}" for k in point.k))
+
+    try:
+        finished = sweep(case, model, VALUES, known, options.device, on_point)
+    finally:
+        progress.clear()
+    say(*sweep_lines(finished), sep="\n")
+    beside = out / "estimate.json"
+    estimate = json.loads(beside.read_text(encoding="utf-8")) if beside.exists() else None
+    write_sweep_picture(out / "sweep.png", finished, case.title, estimate)
+    say("", f"written to {out}: {TABLE}, sweep.png", sep="\n")
+
+
+def _silent(*_values: object, **_options: object) -> None:
+    """Stands for `print` where nothing is to be said."""

@@ -1,0 +1,170 @@
+"""The paper's own search: curves of the generative model at steps of its standard deviation, one equilibrium each.
+
+Curve `k` of a tissue lies `k` standard deviations from the mean of its group; `k` takes 17 values from -2 to 2, and for
+two tissues all 289 pairs. The best is the one of the least root mean square distance from what was recorded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.case import Case
+from warpbrain.cases.drawn import require_groups
+from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.forward import Forward
+from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.parameters import Parameters
+from warpbrain.gp.process import Process
+from warpbrain.gp.sampling import law_of_curve
+
+Floats = NDArray[np.float64]
+#: Steps of each tissue.
+Steps = tuple[float, ...]
+
+#: The paper's values of `k`.
+VALUES: Steps = tuple(np.linspace(-2.0, 2.0, 17).tolist())
+
+
+@dataclass(frozen=True)
+class SweepPoint:
+    """One equilibrium of a sweep.
+
+    Attributes
+    ----------
+    k : tuple of float
+        Of each tissue.
+    theta : tuple of float
+        Parameters of the laws of these curves.
+    error : float or None
+        Root mean square distance at the recordings that are fitted [m] (of forces [N], if only forces were recorded);
+        None if there is no equilibrium.
+    reason : str
+        Why there is none.
+    """
+
+    k: Steps
+    theta: Steps
+    error: float | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A finished sweep.
+
+    Attributes
+    ----------
+    parameters : Parameters
+    unit : {"m", "N"}
+        Of the errors.
+    points : tuple of SweepPoint
+    """
+
+    parameters: Parameters
+    unit: str
+    points: tuple[SweepPoint, ...]
+
+    @property
+    def best(self) -> SweepPoint:
+        """Of the least error; `SolveError` if no point has an equilibrium."""
+        solved = [point for point in self.points if point.error is not None]
+        if not solved:
+            raise SolveError(f"the sweep found no equilibrium at any of {len(self.points)} points: {self._reason}")
+        return min(solved, key=lambda point: point.error or 0.0)
+
+    @property
+    def _reason(self) -> str:
+        return self.points[0].reason if self.points else "it has none"
+
+
+def sweep(
+    case: Case,
+    model: Process,
+    values: Sequence[float] = VALUES,
+    known: Mapping[Steps, SweepPoint] | None = None,
+    device: str | None = None,
+    on_point: Callable[[SweepPoint], None] | None = None,
+) -> Sweep:
+    """Sweep the curves of a generative model.
+
+    Parameters
+    ----------
+    case : Case
+        Its laws say what kind of law each tissue has.
+    model : Process
+    values : sequence of float
+        Of `k`.
+    known : mapping, optional
+        Points of an interrupted sweep by their `k`, which are not computed again.
+    device : str, optional
+    on_point : callable, optional
+        Called with each new point.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to compare with, or a tissue has no group, or one that the model has seen no study of.
+    """
+    observations = Observations.to_fit(case)
+    unit = "m" if any(observation.unit == "m" for observation in observations.each) else "N"
+    parameters = Parameters.of(case)
+    require_groups(case, [label for labels in parameters.labels for label in labels], model)
+    curves = [
+        {k: law_of_curve(model, group, k, law).law() for k in values}
+        for group, law in zip(parameters.groups, parameters.laws_of, strict=True)
+    ]
+    found = dict(known or {})
+    forward: Forward | None = None
+    near: Floats | None = None
+    order = _neighbours(values, len(curves))
+    for k in order:
+        if k in found:
+            continue
+        theta = parameters.theta_of([laws[step] for laws, step in zip(curves, k, strict=True)])
+        error, reason = None, ""
+        try:
+            parameters.require_possible(theta)
+            forward = forward or Forward(case, theta, device)
+            try:
+                state = forward.solve(theta, near)
+            except SolveError:
+                state = forward.solve(theta)
+            if not state.passed_unstable:
+                near = state.u
+            parts = observations.at(state.u, state.reactions)
+            error = _error(
+                [
+                    part.values
+                    for part, observation in zip(parts, observations.each, strict=True)
+                    if observation.unit == unit
+                ]
+            )
+        except (InputError, SolveError) as failure:
+            reason = str(failure)
+        found[k] = SweepPoint(k, tuple(theta.tolist()), error, reason)
+        if on_point is not None:
+            on_point(found[k])
+    return Sweep(parameters, unit, tuple(found[k] for k in order))
+
+
+def _neighbours(values: Sequence[float], tissues: int) -> list[Steps]:
+    """All combinations, each beside the one before it; from the stiffest, where an equilibrium is surest."""
+    order: list[Steps] = [()]
+    for _ in range(tissues):
+        falling = tuple(sorted(values, reverse=True))
+        order = [
+            (*head, step)
+            for number, head in enumerate(order)
+            for step in (falling if number % 2 == 0 else tuple(reversed(falling)))
+        ]
+    return order
+
+
+def _error(residuals: Sequence[Floats]) -> float:
+    squares = np.concatenate([np.sum(values**2, axis=1) for values in residuals])
+    return math.sqrt(float(squares.mean()))

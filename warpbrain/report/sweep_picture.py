@@ -1,0 +1,118 @@
+"""The error surface of a sweep, with the posterior's estimate on it where there is one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.estimation.sweep import Sweep
+from warpbrain.report import views
+from warpbrain.report.files import MILLIMETRES
+
+Floats = NDArray[np.float64]
+
+_SWEEP, _BEST, _ESTIMATE = "#0072B2", "#D55E00", "#000000"
+
+
+def write_sweep_picture(path: Path, sweep: Sweep, title: str, estimate: Mapping[str, Any] | None = None) -> None:
+    """Draw the error over the shear moduli of one tissue, or of the first two.
+
+    Parameters
+    ----------
+    path : Path
+        PNG file.
+    sweep : Sweep
+    title : str
+    estimate : mapping, optional
+        What `describe_estimate` said of the same case.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6.4, 5.2))
+    if len(sweep.parameters.tissues) == 1:
+        _draw_curve(axes, sweep, estimate)
+    else:
+        _draw_surface(figure, axes, sweep, estimate)
+    axes.set_title(title, parse_math=False, fontsize=10)
+    axes.legend(fontsize=9, loc="upper right")
+    figure.tight_layout()
+    views.save(figure, path)
+    plt.close(figure)
+
+
+def _shown(sweep: Sweep) -> tuple[float, str]:
+    return (MILLIMETRES, "mm") if sweep.unit == "m" else (1.0, "N")
+
+
+def _moduli(sweep: Sweep) -> Floats:
+    """Shear moduli [Pa] of every point, shape (n, tissues)."""
+    return np.array([[law.shear_modulus for law in sweep.parameters.laws(point.theta)] for point in sweep.points])
+
+
+def _estimated(estimate: Mapping[str, Any] | None, tissue: str) -> tuple[float, float, float] | None:
+    """Estimate and interval of a tissue's shear modulus [Pa]."""
+    for one in [] if estimate is None else estimate["parameters"]:
+        if one["tissue"] == tissue and one["name"] == "shear modulus":
+            return one["estimate"], *one["interval_95"]
+    return None
+
+
+def _draw_curve(axes: Any, sweep: Sweep, estimate: Mapping[str, Any] | None) -> None:
+    factor, unit = _shown(sweep)
+    moduli = _moduli(sweep)[:, 0]
+    errors = np.array([np.nan if point.error is None else factor * point.error for point in sweep.points])
+    order = np.argsort(moduli)
+    axes.plot(moduli[order], errors[order], "o-", color=_SWEEP, markersize=5, label="sweep")
+    best = int(np.nanargmin(errors))
+    axes.plot(moduli[best], errors[best], "s", color=_BEST, markersize=9, label="best of the sweep")
+    found = _estimated(estimate, sweep.parameters.tissues[0])
+    if found is not None:
+        axes.axvline(found[0], color=_ESTIMATE, label="estimate")
+        axes.axvspan(found[1], found[2], color=_ESTIMATE, alpha=0.15, linewidth=0, label="95 % interval")
+    axes.set_xscale("log")
+    axes.set_xlabel(f"shear modulus of {sweep.parameters.tissues[0]} [Pa]")
+    axes.set_ylabel(f"RMSE at the fitted recordings [{unit}]")
+
+
+def _draw_surface(figure: Any, axes: Any, sweep: Sweep, estimate: Mapping[str, Any] | None) -> None:
+    factor, unit = _shown(sweep)
+    # of more than two tissues: the plane through the best point
+    inside = [point for point in sweep.points if point.k[2:] == sweep.best.k[2:]]
+    plane = Sweep(sweep.parameters, sweep.unit, tuple(sorted(inside, key=lambda point: point.k)))
+    size = len({point.k[0] for point in plane.points})
+    moduli = _moduli(plane)[:, :2].reshape(size, -1, 2)
+    errors = np.array([np.nan if point.error is None else factor * point.error for point in plane.points])
+    values = np.ma.masked_invalid(errors.reshape(size, -1))
+    # far from the best the error says no more than that it is far
+    top = min(float(values.max()), 3.0 * float(values.min()) + 1e-9)
+    levels = np.linspace(float(values.min()), top, 13)
+    filled = axes.contourf(moduli[..., 0], moduli[..., 1], values, levels=levels, cmap="viridis_r", extend="max")
+    axes.contour(moduli[..., 0], moduli[..., 1], values, levels=levels[::2], colors="white", linewidths=0.5)
+    solved = ~np.isnan(errors)
+    flat = moduli.reshape(-1, 2)
+    axes.scatter(flat[solved, 0], flat[solved, 1], s=3, color="0.3", linewidths=0, label="sweep")
+    if not solved.all():
+        axes.scatter(flat[~solved, 0], flat[~solved, 1], s=14, marker="x", color="0.3", label="no equilibrium")
+    best = _moduli(Sweep(sweep.parameters, sweep.unit, (sweep.best,)))[0]
+    axes.plot(best[0], best[1], "s", color=_BEST, markeredgecolor="white", markersize=10, label="best of the sweep")
+    found = [_estimated(estimate, tissue) for tissue in sweep.parameters.tissues[:2]]
+    if found[0] is not None and found[1] is not None:
+        (x, *ends_x), (y, *ends_y) = found
+        across = [[x - ends_x[0]], [ends_x[1] - x]], [[y - ends_y[0]], [ends_y[1] - y]]
+        axes.errorbar(
+            [x], [y], xerr=across[0], yerr=across[1], fmt="o", color=_ESTIMATE, markeredgecolor="white", capsize=4,
+            markersize=8, label="estimate, 95 % intervals",
+        )  # fmt: skip
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    first, second = sweep.parameters.tissues[:2]
+    axes.set_xlabel(f"shear modulus of {first} [Pa]")
+    axes.set_ylabel(f"shear modulus of {second} [Pa]")
+    figure.colorbar(filled, ax=axes).set_label(f"RMSE at the fitted recordings [{unit}]")
