@@ -79,9 +79,7 @@ def _run(options: argparse.Namespace) -> None:
     find_device(options.device)
     case = find_case(options.case, options.tissue)
     if case.specimen is not None:
-        raise InputError(
-            f"{case.path}: [specimen]: tissue is estimated from a deformed body, not from a specimen's tests"
-        )
+        raise InputError(f"{case.path}: [specimen]: tissue is estimated from a deformed body, not from tests")
     if options.model is not None:
         case = case.with_law(options.model)
     out = output_folder(options.out or Path(f"warpbrain-estimate-{safe_name(case.name)}-{options.tissue}"))

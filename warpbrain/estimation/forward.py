@@ -53,6 +53,8 @@ class Forward:
     theta : (p,) array
         Parameters to begin with; any that are stable.
     device : str, optional
+    added : (n, 3) array, optional
+        Nodal forces [N] beside the loads of the case.
 
     Attributes
     ----------
@@ -60,10 +62,13 @@ class Forward:
         Equilibria that were asked for.
     """
 
-    def __init__(self, case: Case, theta: Floats, device: str | None = None) -> None:
+    def __init__(self, case: Case, theta: Floats, device: str | None = None, added: Floats | None = None) -> None:
         self.parameters = Parameters.of(case)
         self.system = System(model_of(self.parameters.applied(case, theta))[0], device)
         self.solves = 0
+        self._external = self.system.model.external_forces()
+        if added is not None:
+            self._external = self._external + added
         self._solvers = {
             tolerance: EquilibriumSolver(self.system, EquilibriumOptions(tolerance=tolerance))
             for tolerance in (EXACT, ROUGH)
@@ -87,9 +92,8 @@ class Forward:
         """
         self.solves += 1
         self.system.set_materials(self.parameters.materials(theta))
-        found = self._solvers[tolerance].solve(start=start)
-        model = self.system.model
-        reactions = np.where(model.constrained, found.internal - model.external_forces(), 0.0)
+        found = self._solvers[tolerance].solve(self._external, start)
+        reactions = np.where(self.system.model.constrained, found.internal - self._external, 0.0)
         return State(theta.copy(), found.u, reactions, len(found.history), found.unstable_iterations > 0)
 
     def differentiate(self, state: State) -> Sensitivities:

@@ -218,7 +218,8 @@ def estimate_lines(said: Mapping[str, Any]) -> list[str]:
         interval, prior = (f"{_number(low)} to {_number(high)}" for low, high in ends)
         lines.append(
             f"  {one['tissue']:<16.16} {one['name']:<15} {_number(one['estimate']):>9} "
-            f"{_number(one['standard_deviation']):>8}   {interval:<19}   {prior:<16} {100 * one['shrinkage']:>7.0f} %  {unit}"
+            f"{_number(one['standard_deviation']):>8}   {interval:<19}   {prior:<16} "
+            f"{100 * one['shrinkage']:>7.0f} %  {unit}"
         )
     lines += _check_lines(said)
     lines += ["", "RMSE at recordings      count   before    after    noise   in 50 %   in 95 %   gross errors"]
@@ -260,8 +261,8 @@ def _check_lines(said: Mapping[str, Any]) -> list[str]:
         )
     if mesh is not None:
         lines.append(
-            f"  error of the mesh: {mesh['amount']:.2f} +- {mesh['standard_deviation']:.2f} times what elements of half "
-            f"the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square"
+            f"  error of the mesh: {mesh['amount']:.2f} +- {mesh['standard_deviation']:.2f} times what elements of "
+            f"half the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square"
         )
     if said["registration"] is not None:
         shift = ", ".join(f"{value:.2f}" for value in said["registration"]["shift_mm"])

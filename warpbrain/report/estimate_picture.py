@@ -29,12 +29,12 @@ def write_prior_and_posterior(path: Path, posterior: Posterior) -> None:
     """Draw the density of each parameter before and after."""
     plt = _plotting()
     marginals = posterior.marginals
-    figure, axes = plt.subplots(1, len(marginals), figsize=(4.6 * len(marginals), 3.8), squeeze=False)
+    figure, axes = plt.subplots(1, len(marginals), figsize=(max(4.6 * len(marginals), 6.4), 3.8), squeeze=False)
     for column, marginal in enumerate(marginals):
         draws = None if posterior.chain is None else posterior.chain.theta[:, column]
         _draw_marginal(axes[0, column], marginal, posterior.prior.theta[:, column], draws)
     axes[0, 0].legend(fontsize=9, frameon=False)
-    figure.suptitle(posterior.case.title, parse_math=False)
+    figure.suptitle(posterior.case.title, parse_math=False, fontsize=10)
     figure.tight_layout()
     views.save(figure, path)
     plt.close(figure)
@@ -72,7 +72,7 @@ def write_observed_against_predicted(path: Path, posterior: Posterior) -> None:
     # a distance to a surface has no sign that was recorded: before, after is all there is to compare
     shown = [one for one in posterior.predictions if one.kind != "surface"]
     units = list(dict.fromkeys(one.unit for one in shown)) or ["m"]
-    figure, axes = plt.subplots(1, len(units), figsize=(5.4 * len(units), 5.2), squeeze=False)
+    figure, axes = plt.subplots(1, len(units), figsize=(5.4 * len(units), 6.0), squeeze=False)
     for column, unit in enumerate(units):
         _draw_pairs(axes[0, column], [one for one in shown if one.unit == unit], unit)
     figure.suptitle(posterior.case.title, parse_math=False, fontsize=10)
@@ -107,7 +107,7 @@ def _draw_pairs(axes: Any, predictions: Sequence[Prediction], unit: str) -> None
     axes.set_xlabel(f"predicted {what}, each component [{name}]")
     axes.set_ylabel(f"observed {what}, each component [{name}]")
     if predictions:
-        axes.legend(fontsize=8, frameon=False, loc="upper left")
+        axes.legend(fontsize=8, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncol=2)
     else:
         axes.text(0.5, 0.5, "only surfaces were recorded", ha="center", transform=axes.transAxes)
 

@@ -102,9 +102,9 @@ def _draw_surface(figure: Any, axes: Any, sweep: Sweep, estimate: Mapping[str, A
         axes.scatter(flat[~solved, 0], flat[~solved, 1], s=14, marker="x", color="0.3", label="no equilibrium")
     best = _moduli(Sweep(sweep.parameters, sweep.unit, (sweep.best,)))[0]
     axes.plot(best[0], best[1], "s", color=_BEST, markeredgecolor="white", markersize=10, label="best of the sweep")
-    found = [_estimated(estimate, tissue) for tissue in sweep.parameters.tissues[:2]]
-    if found[0] is not None and found[1] is not None:
-        (x, *ends_x), (y, *ends_y) = found
+    along, upwards = (_estimated(estimate, tissue) for tissue in sweep.parameters.tissues[:2])
+    if along is not None and upwards is not None:
+        (x, *ends_x), (y, *ends_y) = along, upwards
         across = [[x - ends_x[0]], [ends_x[1] - x]], [[y - ends_y[0]], [ends_y[1] - y]]
         axes.errorbar(
             [x], [y], xerr=across[0], yerr=across[1], fmt="o", color=_ESTIMATE, markeredgecolor="white", capsize=4,
