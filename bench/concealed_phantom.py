@@ -1,7 +1,7 @@
 """The paper's experiment, concealed: is the phantom's tissue found from what another mesh and another code say?
 
-    python bench/phantom_truth.py single && python bench/phantom_truth.py multi      # what is observed, kept in results/
-    python bench/concealed_phantom.py                                                # writes results/concealed_phantom.json
+    python bench/phantom_truth.py single    # what is observed, kept in results/; and multi
+    python bench/concealed_phantom.py       # writes results/concealed_phantom.json
 
 One estimation goes the whole way, with its check; 99 more, of other points and other noise, take the error of the mesh
 from it and start at its estimate. The truth is read for nothing but to score.

@@ -1,7 +1,7 @@
 """The concealed phantom's truth: another mesh of the same body, quadratic tetrahedra, another code (FElupe).
 
-MMG remeshes the inside of the coarse phantom and keeps its surface, so that both meshes are of one body, held at the same
-triangles and pressed on by the same load: linear between the nodes of the cap, of which each carries an equal share.
+MMG remeshes the inside of the coarse phantom and keeps its surface, so that both meshes are of one body, held at the
+same triangles and pressed on by the same load: linear between the nodes of the cap, of which each has an equal share.
 
     python bench/phantom_truth.py single      # writes results/phantom_truth_single.csv; some minutes
 """

@@ -4,11 +4,12 @@ Linear tetrahedra are too stiff, near nu = 1/2 by several percent of the displac
 Recordings know nothing of elements: fitted as it is, such a mesh finds tissue that is too soft by as much, and says so
 with a standard deviation that is far smaller than that. So what is recorded is taken to be
 
-    H(u_h + a d) + noise,    d = u_(h/2) - u_h,    a ~ N(4/3, 1/4)
+    H(u_h + a d) + noise,    d = u_(h/2) - u_h,    a ~ N(5/3, 0.4^2)
 
-The amount `a` is 4/3 where the error falls with the square of the size (Richardson's extrapolation), and 2 where it
-falls with the size, as at the edge of what is held; it is estimated along with the tissue and integrated out of what is
-said of it. `d` is computed near the estimate and kept, since it changes little as the parameters do.
+If the error falls with the power p of the size, then `a = 2^p / (2^p - 1)` (Richardson's extrapolation): 4/3 for p = 2,
+as on smooth solutions, and 2 for p = 1, as at the edges of what is held and where elements lock. The prior holds both;
+`a` is estimated along with the tissue and integrated out of what is said of it. `d` is computed near the estimate and
+kept, since it changes little as the parameters do.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ class Discretisation:
     mean, deviation : float
     """
 
-    mean: float = 4.0 / 3.0
-    deviation: float = 0.5
+    mean: float = 5.0 / 3.0
+    deviation: float = 0.4
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.mean):
@@ -106,9 +107,9 @@ class FinerMesh:
     def _spread(self, coarse: TetMesh, finer: TetMesh, forces: Floats) -> Floats:
         """Nodal forces on the finer mesh that act as those on the coarse one do.
 
-        A force on a node is taken for a load on the surface around it (in the volume, if a loaded node is inside), linear
-        between nodes: the force over the node's share. On the finer mesh it is the same load, so that meshes of any size
-        have one limit. Resultants stay: sums over shares are exact for functions that are linear in an element.
+        A force on a node is taken for a load on the surface around it (in the volume, if a loaded node is inside),
+        linear between nodes: the force over the node's share. On the finer mesh it is the same load, so that meshes of
+        any size have one limit. Resultants stay: sums over shares are exact for functions linear in an element.
         """
         if not forces.any():
             return np.zeros(finer.points.shape)
