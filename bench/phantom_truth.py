@@ -86,18 +86,21 @@ def solve(case: Case, mesh: TetMesh, total: float) -> Floats:
     points, tetrahedra, edges = quadratic(mesh)
     whole = felupe.Mesh(points, tetrahedra, "tetra10")
     field = felupe.FieldContainer([felupe.Field(felupe.RegionQuadraticTetra(whole), dim=3)])
-    moduli = {label: case.tissues[label].known_law.shear_modulus for label in np.unique(mesh.tissue).tolist()}
-    # one for each tetrahedron, whatever the point of quadrature
-    mu = np.array([moduli[label] for label in mesh.tissue.tolist()])[None]
-    lam = 2.0 * mu * case.poisson / (1.0 - 2.0 * case.poisson)
-    solid = felupe.SolidBody(felupe.NeoHookeCompressible(mu=mu, lmbda=lam), field)
+    items = []
+    for label in np.unique(mesh.tissue).tolist():
+        mu = case.tissues[label].known_law.shear_modulus
+        law = felupe.NeoHookeCompressible(mu=mu, lmbda=2.0 * mu * case.poisson / (1.0 - 2.0 * case.poisson))
+        # a part has all points, so that its field is linked to the whole one
+        part = felupe.Mesh(points, tetrahedra[mesh.tissue == label], "tetra10")
+        own = felupe.FieldContainer([felupe.Field(felupe.RegionQuadraticTetra(part), dim=3)])
+        items.append(felupe.SolidBody(law, own))
     forces = cap_forces(mesh, edges, total)
     assert np.isclose(forces.sum(), -total)
     loaded = np.flatnonzero(forces.any(axis=1))
-    items = [solid, felupe.PointLoad(field, loaded, values=forces[loaded])]
+    items.append(felupe.PointLoad(field, loaded, values=forces[loaded]))
     held = np.concatenate([mesh.node_sets["fixed"], mesh.node_sets["fixed"][edges].all(axis=1) & outer(mesh, edges)])
     dof0, dof1 = felupe.dof.partition(field, {"fixed": felupe.Boundary(field[0], mask=held)})
-    found = felupe.newtonraphson(items=items, dof0=dof0, dof1=dof1, tol=1e-8, solver=_solver, verbose=1)
+    found = felupe.newtonraphson(items=items, x0=field, dof0=dof0, dof1=dof1, tol=1e-8, solver=_solver, verbose=1)
     assert found.success
     return found.x[0].values[: len(mesh.points)]
 
