@@ -296,6 +296,6 @@ def _where(parameters: Parameters, mode: PriorMode) -> str:
     """Which mode, in words: the signs of its exponents."""
     ends = zip(parameters.each, mode.low, strict=True)
     words = [
-        f"{parameter.name} {'>' if low == 0.0 else '<'} 0" for parameter, low in ends if parameter.coordinate.signed
+        f"{parameter.name} {'>' if low > 0.0 else '<'} 0" for parameter, low in ends if parameter.coordinate.signed
     ]
     return ", ".join(words) or "prior"

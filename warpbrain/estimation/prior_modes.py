@@ -98,9 +98,10 @@ def prior_modes(prior: Prior, parameters: Parameters) -> tuple[PriorMode, ...]:
     modes = []
     for number in kept[np.argsort(-counts[kept])]:
         low, high = parameters.low, parameters.high
-        low[signed] = np.where(kinds[number] > 0.0, 0.0, low[signed])
-        high[signed] = np.where(kinds[number] < 0.0, 0.0, high[signed])
         members = prior.theta[cluster.ravel() == number]
+        # no draw lies nearer to zero: there laws are not stable
+        low[signed] = np.where(kinds[number] > 0.0, members[:, signed].min(axis=0), low[signed])
+        high[signed] = np.where(kinds[number] < 0.0, members[:, signed].max(axis=0), high[signed])
         covariance = np.atleast_2d(np.cov(members, rowvar=False))
         # draws that all lie on one end have no spread, but a prior that excludes everything else is no prior
         ranges = parameters.high - parameters.low

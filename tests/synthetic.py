@@ -40,8 +40,10 @@ def block(laws: Mapping[str, Law], load: str, cells: int = 3, formulation: str =
         boundaries.append(Forced(name="finger", nodes="top", total=(0.1, 0.05, -0.2)))
     else:
         mechanisms = (Gravity(direction=(1.0, 0.0, -1.0), density=1000.0),)
+    groups = ("hyperelastic/brain",) if len(laws) == 1 else ("hyperelastic/grey matter", "hyperelastic/white matter")
     tissues = {
-        label: Tissue(name, law, formulation, "", law.name) for label, (name, law) in enumerate(laws.items(), start=1)
+        label: Tissue(name, law, formulation, group, law.name)
+        for label, ((name, law), group) in enumerate(zip(laws.items(), groups, strict=True), start=1)
     }
     return Case(
         "block", "A block", "synthetic", Path("block/case.toml"), mesh, tissues, 1000.0, 0.45,
