@@ -36,6 +36,8 @@ Floats = NDArray[np.float64]
 _SETTLED = 0.2
 #: Tolerance of Gauss-Newton before the error of the mesh is known.
 _BEFORE = 0.1
+#: A mesh whose displacements change by more than this on elements of half the size is too coarse to be corrected well.
+_TOO_COARSE = 0.15
 #: And no more often than this.
 _MOST_DIFFERENCES = 4
 
@@ -265,6 +267,12 @@ class Estimation:
                 break
         else:
             self._remarks.append("the error of the mesh was still changing when it was last computed")
+        part = differences[-1].size / float(np.sqrt(np.mean(np.sum(modes[0].estimate.point.state.u ** 2, axis=1))))
+        if part > _TOO_COARSE:
+            self._remarks.append(
+                f"the mesh is coarse: on elements of half the size displacements change by {100.0 * part:.0f} %; what "
+                "is left of its error may be larger than the intervals"
+            )
         solves["on elements of half the size"] = 0 if finer is None else finer.solves
         solves["estimate with the error of the mesh"] = self.forward.solves - before
         return modes
