@@ -1,0 +1,111 @@
+"""`warpbrain estimate`: from a case folder to tables, files and figures."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from command import Ran, warpbrain
+from synthetic import GREY, WHITE, beads, block, truth
+
+from warpbrain.cases.writing import write_case
+
+QUICK = ("--samples", "25")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A pushed block of two tissues with points to fit and points to check."""
+    case = block({"grey": GREY, "white": WHITE}, "pushed")
+    result = truth(case)
+    fit = replace(beads(result, count=60, noise=1e-4), file="recordings/beads.csv")
+    check = replace(beads(result, seed=1, noise=1e-4), name="check", role="check", file="recordings/check.csv")
+    path = tmp_path_factory.mktemp("cases") / "block"
+    write_case(path, replace(case, recordings=(fit, check)))
+    return path
+
+
+def estimate(*arguments) -> Ran:
+    return warpbrain("estimate", "--device", "cpu", "--case", *arguments)
+
+
+def test_tables_files_and_figures(folder, tmp_path):
+    out = tmp_path / "out"
+    done = estimate(folder, "--out", out, *QUICK, "--registration", "0.5", "0.5")
+    assert (done.status, done.err) == (0, "")
+    for words in ("The recordings inform", "shear modulus", "Pareto k", "error of the mesh", "registration: shifted"):
+        assert words in done.out
+    assert re.search(r"beads +60 .* mm\n +check +40 .* mm, check", done.out)
+    said = json.loads((out / "estimate.json").read_text(encoding="utf-8"))
+    for one, modulus in zip(said["parameters"], (1370.0, 1000.0), strict=True):
+        assert one["unit"] == "Pa" and one["name"] == "shear modulus"
+        low, high = one["interval_95"]
+        assert low < one["estimate"] < high and 0.5 * modulus < low < high < 2.0 * modulus
+        assert 0.0 < one["shrinkage"] < 1.0 and one["prior"]["interval_95"][0] < low
+    assert np.shape(said["correlation"]["matrix"]) == (2, 2)
+    assert said["check_of_laplace"]["draws"] == 25 and said["check_of_laplace"]["pareto_k"] is not None
+    assert [(p["name"], p["role"]) for p in said["predictions"]] == [("beads", "fit"), ("check", "check")]
+    assert all(p["root_mean_square_after"] < p["root_mean_square_before"] for p in said["predictions"])
+    assert all(0.8 < p["coverage"]["95 %"] <= 1.0 for p in said["predictions"])
+    assert said["discretisation"]["difference_root_mean_square_mm"] > 0.0
+    assert len(said["registration"]["shift_mm"]) == 3
+    assert set(said["inputs_sha256"]) == {"case.toml", "mesh.vtu", "recordings/beads.csv", "recordings/check.csv"}
+    assert said["likelihood"]["degrees_of_freedom"] == 4.0 and said["seed"] == 0
+    assert said["versions"]["warpbrain"] and said["seconds"] and said["equilibria"]["check of the posterior"] == 25
+    rows = (out / "predictions.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 1 + 60 + 40
+    for picture in ("posterior.png", "predicted.png", "residuals.png"):
+        assert (out / picture).stat().st_size > 5000
+
+
+def test_a_sweep_goes_on_where_it_was_interrupted(folder, tmp_path):
+    out = tmp_path / "out"
+    done = estimate(folder, "--method", "grid", "--out", out)
+    assert (done.status, done.err) == (0, "")
+    assert "least error of 289 equilibria: RMSE " in done.out
+    table = (out / "sweep.csv").read_text(encoding="utf-8")
+    assert len(table.splitlines()) == 290 and (out / "sweep.png").stat().st_size > 5000
+    lines = table.splitlines(keepends=True)
+    (out / "sweep.csv").write_text("".join(lines[:280]), encoding="utf-8")
+    again = estimate(folder, "--method", "grid", "--out", out)
+    assert again.status == 0 and "279 of which are there already" in again.out
+    assert again.out.splitlines()[-4:-2] == done.out.splitlines()[-4:-2]
+    other = estimate(folder, "--method", "grid", "--out", out, "--gp", "hierarchical")
+    assert other.status == 2 and "a sweep of something else" in other.err
+
+
+def test_quiet_says_nothing(folder, tmp_path):
+    done = estimate(folder, "--out", tmp_path / "out", *QUICK, "--no-discretisation", "--quiet")
+    assert (done.status, done.out, done.err) == (0, "", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--registration", "0", "1"), "expected two positive numbers"),
+        (("--nu", "-1"), "expected a positive number of degrees of freedom"),
+        (("--samples", "3"), "samples = 3: expected a whole number of at least 25"),
+        (("--gp", "nonsense"), "no such generative model"),
+        (("--model", "rubber"), "expected one of"),
+        (("--device", "toaster"), "not found on this machine"),
+    ],
+)
+def test_bad_arguments(folder, tmp_path, arguments, message):
+    done = estimate(folder, "--out", tmp_path / "out", *arguments)
+    assert done.status == 2 and message in done.err and "Traceback" not in done.err
+
+
+def test_a_case_without_recordings(tmp_path):
+    done = estimate("phantom", "--out", tmp_path / "out")
+    assert done.status == 2 and "no [[recording]] to estimate from" in done.err
+
+
+def test_gross_errors_only(tmp_path):
+    case = block({"brain": WHITE}, "pushed")
+    recording = beads(truth(case), count=60)
+    noise = 0.05 * np.random.default_rng(3).normal(size=(60, 3))
+    write_case(tmp_path / "block", replace(case, recordings=(replace(recording, displacement=noise, file="b.csv"),)))
+    done = estimate(tmp_path / "block", "--out", tmp_path / "out", *QUICK)
+    assert done.status == 1 and "are gross errors" in done.err
+    assert not list((tmp_path / "out").iterdir())
