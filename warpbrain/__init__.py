@@ -42,6 +42,7 @@ _HOMES = {
     "cases.writing": ("write_case",),
     "cases.checking": ("check_case",),
     "simulation.observation": ("observe",),
+    "estimation.estimate": ("EstimationOptions", "estimate"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -51,6 +52,7 @@ __all__ = [
     "Equilibrium",
     "EquilibriumOptions",
     "EquilibriumSolver",
+    "EstimationOptions",
     "Gravity",
     "InputError",
     "Law",
@@ -70,6 +72,7 @@ __all__ = [
     "TetMesh",
     "check_case",
     "draw_laws",
+    "estimate",
     "find_case",
     "find_model",
     "model_of",
@@ -95,6 +98,7 @@ if TYPE_CHECKING:
     from warpbrain.cases.shipped import find_case
     from warpbrain.cases.writing import write_case
     from warpbrain.errors import InputError, SolveError
+    from warpbrain.estimation.estimate import EstimationOptions, estimate
     from warpbrain.gp.literature.studies import read_studies
     from warpbrain.gp.prior import Prior
     from warpbrain.gp.sampling import draw_laws

@@ -121,7 +121,6 @@ def _estimate(
 ) -> None:
     from warpbrain.estimation.estimate import Estimation, Listener
     from warpbrain.estimation.gauss_newton import GaussNewtonStep
-    from warpbrain.estimation.prior_modes import prior_of
     from warpbrain.gp.trained import find_model
     from warpbrain.report import estimate_picture
     from warpbrain.report.estimate import describe_estimate, estimate_lines
@@ -141,10 +140,10 @@ def _estimate(
             f"{step.newton_iterations:>8}"
         )
 
-    prior = prior_of(case, find_model(options.gp or "hierarchical"), seed=asked.seed)
+    model = find_model(options.gp or "hierarchical")
     listener = Listener(on_stage, on_step, progress.show)
     try:
-        posterior = Estimation(case, prior, asked, options.device, listener).run()
+        posterior = Estimation(case, model, asked, options.device, listener).run()
     finally:
         progress.clear()
     said = describe_estimate(posterior, asked, find_device(options.device).alias)

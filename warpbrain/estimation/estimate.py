@@ -29,6 +29,7 @@ from warpbrain.estimation.proposal import Proposal
 from warpbrain.estimation.registration import Registration
 from warpbrain.estimation.target import Target
 from warpbrain.gp.prior import Prior
+from warpbrain.gp.process import Process
 
 Floats = NDArray[np.float64]
 
@@ -98,7 +99,7 @@ class Listener:
 
 def estimate(
     case: Case,
-    prior: Prior | None = None,
+    prior: Prior | Process | None = None,
     options: EstimationOptions | None = None,
     device: str | None = None,
     listener: Listener | None = None,
@@ -109,8 +110,8 @@ def estimate(
     ----------
     case : Case
         Its laws say what kind of law each tissue has; their parameters do not count.
-    prior : Prior, optional
-        That of the default generative model unless given; see `warpbrain.estimation.prior_modes.prior_of`.
+    prior : Prior or Process, optional
+        Of the tissues, or the generative model that gives it; the default one unless given.
     options : EstimationOptions, optional
     device : str, optional
         Warp device.
@@ -144,7 +145,7 @@ class Estimation:
     def __init__(
         self,
         case: Case,
-        prior: Prior | None = None,
+        prior: Prior | Process | None = None,
         options: EstimationOptions | None = None,
         device: str | None = None,
         listener: Listener | None = None,
@@ -160,7 +161,7 @@ class Estimation:
         self._remarks += self.observations.remarks
         self.parameters = Parameters.of(case)
         with self._timed("prior"):
-            self.prior = prior_of(case) if prior is None else prior
+            self.prior = prior if isinstance(prior, Prior) else prior_of(case, prior, seed=self.options.seed)
             self.prior_modes = prior_modes(self.prior, self.parameters)
         with self._timed("pre-processing"):
             self.forward = Forward(case, self.prior_modes[0].gaussian.mean, device)

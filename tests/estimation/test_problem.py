@@ -1,0 +1,94 @@
+"""Gradients of the objective against differences of it, and noise against SciPy's distributions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_t, norm
+from synthetic import GREY, WHITE, beads, block, lid, scale, truth
+
+from warpbrain.errors import InputError
+from warpbrain.estimation.discretisation import Discretisation, FinerMesh
+from warpbrain.estimation.forward import Forward
+from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.likelihood import Likelihood
+from warpbrain.estimation.nuisances import Nuisances
+from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.prior_modes import PriorMode
+from warpbrain.estimation.problem import Problem
+from warpbrain.estimation.registration import Registration
+
+THETA = np.log([1200.0, 1100.0])
+
+
+@pytest.fixture(scope="module", params=["given", "estimated"])
+def problem(request: pytest.FixtureRequest) -> Problem:
+    """Points, a surface and a force of a moved block, with every nuisance."""
+    case = block({"grey": GREY, "white": WHITE}, "moved")
+    result = truth(case)
+    sigma = 2e-4 if request.param == "given" else None
+    recordings = (beads(result, noise=3e-4, sigma=sigma), lid(result, sigma=sigma), scale(case, result, "plate", 1e-2))
+    case = replace(case, recordings=recordings)
+    forward = Forward(case, THETA, "cpu")
+    difference = FinerMesh(case, THETA, "cpu").difference(forward.solve(THETA))
+    mode = PriorMode(
+        1.0, Gaussian(np.log([1000.0, 900.0]), np.diag([0.5, 0.6])), np.full(2, -np.inf), np.full(2, np.inf)
+    )
+    nuisances = Nuisances(Discretisation(), difference, Registration())
+    return Problem(forward, Observations.to_fit(case), mode, Likelihood(), nuisances)
+
+
+VALUES = np.array([1.2, 1e-4, -2e-4, 5e-5, 1e-3, 2e-3, -1e-3])
+
+
+def test_the_gradient_is_that_of_the_objective(problem: Problem) -> None:
+    def objective(point: np.ndarray) -> float:
+        return problem.at(problem.forward.solve(point[:2]), point[2:]).objective
+
+    here = np.concatenate([THETA, VALUES])
+    gradient = problem.linearise(problem.at(problem.forward.solve(THETA), VALUES)).gradient
+    steps = np.array([1e-3, 1e-3, 1e-3, *[1e-6] * 3, *[1e-5] * 3])
+    for k, step in enumerate(steps):
+        beside = [objective(here + sign * step * np.eye(9)[k]) for sign in (1.0, -1.0)]
+        expected = (beside[0] - beside[1]) / (2.0 * step)
+        scale_of = np.abs(gradient[k]) + 1e-6 * np.abs(gradient).max() / step
+        assert abs(gradient[k] - expected) < 1e-4 * scale_of
+
+
+def test_nuisances_are_at_their_best_and_integrated_out(problem: Problem) -> None:
+    state = problem.forward.solve(THETA)
+    misfit, best = problem.without_nuisances(state, problem.nuisances.mean)
+    gradient = problem.linearise(best).gradient[2:]
+    size = np.sqrt(np.diag(problem.linearise(best).hessian)[2:])
+    assert np.abs(gradient / size).max() < 0.02
+    other, _ = problem.without_nuisances(state, VALUES)
+    assert other == pytest.approx(misfit, abs=1e-3)
+
+
+@pytest.mark.parametrize("nu", [4.0, np.inf])
+def test_noise_is_the_distribution_that_it_is_said_to_be(nu: float) -> None:
+    case = block({"white": WHITE}, "pushed")
+    observations = Observations.to_fit(replace(case, recordings=(beads(truth(case), sigma=3e-4),)))
+    residuals = 4e-4 * np.random.default_rng(0).normal(size=(40, 3))
+    [weighed] = Likelihood(nu).weigh(observations.each, [residuals])
+    if np.isinf(nu):
+        expected = norm(0.0, 3e-4).logpdf(residuals).sum()
+    else:
+        expected = multivariate_t(np.zeros(3), 9e-8 * np.eye(3), df=nu).logpdf(residuals).sum()
+    assert weighed.negative_log == pytest.approx(-expected)
+
+
+def test_the_estimated_noise_is_the_likeliest() -> None:
+    case = block({"white": WHITE}, "pushed")
+    seen = replace(case, recordings=(beads(truth(case), sigma=None),))
+    residuals = 4e-4 * np.random.default_rng(0).normal(size=(40, 3))
+    [weighed] = Likelihood().weigh(Observations.to_fit(seen).each, [residuals])
+    for factor in (0.95, 1.05):
+        given = replace(seen, recordings=(replace(seen.recordings[0], sigma=factor * weighed.sigma[0]),))
+        [beside] = Likelihood().weigh(Observations.to_fit(given).each, [residuals])
+        assert beside.negative_log > weighed.negative_log
+
+
+def test_degrees_of_freedom_are_positive() -> None:
+    with pytest.raises(InputError, match="nu = 0: expected a positive number"):
+        Likelihood(0.0)
