@@ -23,10 +23,12 @@ ENSEMBLES = {"0529-spread.png": ["--case", "0529", "--tissue", "single", "--grid
 CASES = {"0529-case.png": ["0529"]}
 #: Colours that are left of a picture of curves, and its width [pixel]: a screen's, and a fraction of the bytes.
 PALETTE, WIDTH = 48, 1280
+#: Figures of an estimate and of a sweep of the same case, by file.
+ESTIMATES = {"estimate-0529-sweep.png": "sweep.png", "estimate-0529-residuals.png": "residuals.png"}
 
 
 def main() -> None:
-    """Run or show each case and keep its picture."""
+    """Run, estimate or show each case and keep its pictures; the sweep alone takes minutes."""
     FIGURES.mkdir(exist_ok=True)
     for name, arguments in RUNS.items():
         with tempfile.TemporaryDirectory() as folder:
@@ -36,6 +38,11 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             _warpbrain("ensemble", *arguments, "--out", folder)
             shutil.copy(Path(folder) / "spread.png", FIGURES / name)
+    with tempfile.TemporaryDirectory() as folder:
+        for method in ("posterior", "grid"):
+            _warpbrain("estimate", "--case", "0529", "--method", method, "--out", folder)
+        for name, made in ESTIMATES.items():
+            shutil.copy(Path(folder) / made, FIGURES / name)
     for name, arguments in CASES.items():
         _warpbrain("cases", "show", *arguments, "--out", str(FIGURES / name))
     draw_generative_model()

@@ -58,7 +58,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="degrees of freedom of the noise (default: 4, robust to gross errors; inf: normal)",
     )
     add("--no-discretisation", action="store_true", help="take the mesh for exact")
-    add("--samples", type=int, default=64, metavar="N", help="equilibria that check the posterior (default: 64)")
+    add("--samples", type=int, default=40, metavar="N", help="equilibria that check the posterior (default: 40)")
     add("--seed", type=int, default=0, metavar="S", help="of these draws (default: 0)")
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
     add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-estimate-CASE-TISSUE)")

@@ -67,7 +67,7 @@ class EstimationOptions:
     likelihood: Likelihood = field(default_factory=Likelihood)
     discretisation: Discretisation | None = field(default_factory=Discretisation)
     registration: Registration | None = None
-    samples: int = 64
+    samples: int = 40
     chain: int = 300
     seed: int = 0
     tolerance: float = 3e-3

@@ -115,4 +115,6 @@ def _draw_surface(figure: Any, axes: Any, sweep: Sweep, estimate: Mapping[str, A
     first, second = sweep.parameters.tissues[:2]
     axes.set_xlabel(f"shear modulus of {first} [Pa]")
     axes.set_ylabel(f"shear modulus of {second} [Pa]")
-    figure.colorbar(filled, ax=axes).set_label(f"RMSE at the fitted recordings [{unit}]")
+    figure.colorbar(filled, ax=axes, format="%.3g" if top > 1.1 * float(values.min()) else "%.4g").set_label(
+        f"RMSE at the fitted recordings [{unit}]"
+    )
