@@ -66,14 +66,14 @@ def error(case: Case, points: Floats, u: Floats, displacement: Floats) -> float:
     return 1000.0 * float(np.sqrt(np.mean(np.sum((displacement[nodes] - u) ** 2, axis=1))))
 
 
-def experiment(tissue: str, repetitions: int) -> dict[str, Any]:
+def experiment(tissue: str, repetitions: int, options: EstimationOptions | None = None) -> dict[str, Any]:
     """One tissue mode."""
+    options = options or EstimationOptions()
     with (RESULTS / f"phantom_truth_{tissue}.csv").open(encoding="utf-8") as file:
         table = np.array([[float(value) for value in row] for row in list(csv.reader(file))[1:]])
     points, u, case = 0.001 * table[:, :3], 0.001 * table[:, 3:], pressed(tissue)
     truth = np.log(TRUTH[tissue])
     begun = time.perf_counter()
-    options = EstimationOptions()
     first = Estimation(observed(case, points, u, 0), None, options, "cpu").run()
     whole = time.perf_counter() - begun
     estimates, intervals, errors = [], [], []

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from warpbrain.estimation.estimate import EstimationOptions
+
 BENCH = Path(__file__).parents[2] / "bench"
 
 
@@ -21,8 +23,8 @@ def concealed(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_tissue_is_found_from_another_mesh_and_another_code(concealed) -> None:
-    found = concealed.experiment("single", repetitions=5)
-    assert found["covered"][0] >= 4 and found["first"]["covered"] == [True]
+    found = concealed.experiment("single", 3, EstimationOptions(samples=25))
+    assert found["covered"][0] >= 2 and found["first"]["covered"] == [True]
     assert found["rmse_mm"]["median"] < 0.1
     assert not found["without_error_of_mesh"]["covered"][0]
     assert found["pareto_k"] < 0.7

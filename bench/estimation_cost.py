@@ -1,0 +1,65 @@
+"""What a posterior costs beside the paper's sweep of 289 equilibria: processor seconds, one thread.
+
+python bench/estimation_cost.py [CASE]      # writes results/estimation_cost.json
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from dataclasses import replace
+from typing import Any
+
+from phantom_truth import RESULTS
+
+from warpbrain.cases.shipped import find_case
+from warpbrain.estimation.estimate import Estimation, EstimationOptions
+from warpbrain.estimation.nuisances import Nuisances
+from warpbrain.estimation.prior_modes import prior_of
+from warpbrain.estimation.sweep import sweep
+from warpbrain.gp.trained import trained
+
+
+def error(found: Any) -> float:
+    """Root mean square error at all fitted recordings [mm]."""
+    squares = sum(float((one.after**2).sum()) for one in found.predictions)
+    return 1000.0 * (squares / sum(len(one.after) for one in found.predictions)) ** 0.5
+
+
+def main() -> None:
+    """Estimate, then sweep, on the CPU."""
+    case = find_case(sys.argv[1] if len(sys.argv) > 1 else "0529", "multi")
+    prior = prior_of(case)
+    options = EstimationOptions()
+    # kernels are loaded before the clock runs
+    Estimation(case, prior, options, "cpu").fit(Nuisances())
+    found: dict[str, Any] = {"case": case.name}
+    begun = time.process_time()
+    estimation = Estimation(case, prior, replace(options, discretisation=None), "cpu")
+    estimation.fit(Nuisances())
+    found["Gauss-Newton and Laplace"] = {
+        "seconds": time.process_time() - begun,
+        "equilibria": estimation.forward.solves,
+    }
+    for name, given in (("with the check", None), ("with the error of the mesh and the check", options.discretisation)):
+        begun = time.process_time()
+        posterior = Estimation(case, prior, replace(options, discretisation=given), "cpu").run()
+        found[name] = {
+            "seconds": time.process_time() - begun,
+            "equilibria": dict(posterior.solves),
+            "rmse_mm": error(posterior),
+        }
+    begun = time.process_time()
+    swept = sweep(case, trained("coregionalised", "as_published"), device="cpu")
+    found["sweep"] = {
+        "seconds": time.process_time() - begun,
+        "equilibria": len(swept.points),
+        "rmse_mm": 1000.0 * (swept.best.error or 0.0),
+    }
+    print(json.dumps(found, indent=1))
+    (RESULTS / "estimation_cost.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
