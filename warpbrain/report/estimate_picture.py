@@ -72,11 +72,11 @@ def write_observed_against_predicted(path: Path, posterior: Posterior) -> None:
     # a distance to a surface has no sign that was recorded: before, after is all there is to compare
     shown = [one for one in posterior.predictions if one.kind != "surface"]
     units = list(dict.fromkeys(one.unit for one in shown)) or ["m"]
-    figure, axes = plt.subplots(1, len(units), figsize=(5.4 * len(units), 6.0), squeeze=False)
+    size = (5.4 * len(units), 6.2)
+    figure, axes = plt.subplots(1, len(units), figsize=size, squeeze=False, constrained_layout=True)
     for column, unit in enumerate(units):
         _draw_pairs(axes[0, column], [one for one in shown if one.unit == unit], unit)
     figure.suptitle(posterior.case.title, parse_math=False, fontsize=10)
-    figure.tight_layout()
     views.save(figure, path)
     plt.close(figure)
 
