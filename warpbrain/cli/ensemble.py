@@ -29,9 +29,9 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     parser = commands.add_parser(
         "ensemble",
         help="simulate many samples of a case",
-        description="Simulates a case with many laws of the generative model, to rest or for a number of steps, and "
-        "writes samples.csv, fields.vtu, spread.png and summary.json. What a killed run has computed is kept: the same command "
-        "goes on with what is missing.",
+        description="Simulates a case with many laws of the generative model, to rest or for some steps, and "
+        "writes samples.csv, fields.vtu, spread.png and summary.json. What a killed run has computed is kept: the same "
+        "command goes on with what is missing.",
     )
     add = parser.add_argument
     add(

@@ -9,8 +9,8 @@ from warpbrain.errors import InputError
 from warpbrain.kernels.tetrahedron import PAIRS
 from warpbrain.simulation.system import System
 
-#: Samples beyond which a batch is no faster a sample, by kind of device; docs/ensembles.md has the times. On a CPU a few
-#: at a time are as fast as one, and more only take room in its cache.
+#: Samples beyond which a batch is no faster a sample, by kind of device; docs/ensembles.md has the times. On a CPU a
+#: few at a time are as fast as one, and more only take room in its cache.
 ENOUGH = {"cpu": 1, "cuda": 256}
 #: Part of the free memory that a batch may take.
 SHARE = 0.8
