@@ -8,6 +8,8 @@ device=${2:-cuda:0}
 python=${PYTHON:-python3}
 export PYTHONUNBUFFERED=1
 mkdir -p "$out"
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
 status=0
 run() {
   echo "== $*"
@@ -21,7 +23,8 @@ run() {
   run "$python" -m warpbrain.bench ensemble --device "$device" --precision single --batches 64,256,512 \
     --json "$out/batches_single.json"
   run "$python" bench/batch_choices.py "$device"
-  run "$python" -m warpbrain ensemble --case synthetic --grid --device "$device" --out "$out/sweep"
-  rm -rf "$out/sweep/samples"
+  run "$python" -m warpbrain ensemble --case synthetic --grid --device "$device" --out "$scratch/sweep"
+  cp "$scratch/sweep/summary.json" "$out/sweep.json"
+  cp "$scratch/sweep/samples.csv" "$out/sweep.csv"
 } | tee "$out/log.txt"
 exit "$status"
