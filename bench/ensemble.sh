@@ -26,5 +26,5 @@ run() {
   run "$python" -m warpbrain ensemble --case synthetic --grid --device "$device" --out "$scratch/sweep"
   cp "$scratch/sweep/summary.json" "$out/sweep.json"
   cp "$scratch/sweep/samples.csv" "$out/sweep.csv"
+  exit "$status"
 } | tee "$out/log.txt"
-exit "$status"
