@@ -18,7 +18,9 @@ Floats = NDArray[np.float64]
 
 #: Out-of-balance force of an equilibrium, relative: where differences of residuals must mean something, and where what
 #: is left of it need only be far below any noise.
-EXACT, ROUGH = 1e-9, 1e-5
+EXACT, ROUGH = 1e-7, 1e-5
+#: Of the linear solves for derivatives: what is left of the error is far below a standard deviation of any parameter.
+_DERIVATIVES = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,7 @@ class Forward:
             tolerance: EquilibriumSolver(self.system, EquilibriumOptions(tolerance=tolerance))
             for tolerance in (EXACT, ROUGH)
         }
-        self._sensitivity = SensitivitySolver(self.system)
+        self._sensitivity = SensitivitySolver(self.system, _DERIVATIVES)
 
     def solve(self, theta: Floats, start: Floats | None = None, tolerance: float = EXACT) -> State:
         """The equilibrium of parameters.
