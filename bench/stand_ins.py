@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,6 @@ def estimated(name: str, tissue: str, noise: str) -> dict[str, Any]:
     """One estimation."""
     case = find_case(name, tissue)
     prior = prior_of(case)
-    begun = time.perf_counter()
     options = EstimationOptions(Likelihood(NOISE[noise]), samples=25, chain=60)
     try:
         found = Estimation(case, prior, options, "cpu").run()
@@ -47,7 +45,6 @@ def estimated(name: str, tissue: str, noise: str) -> dict[str, Any]:
         "before_mm": {one.name: 1000.0 * one.error_before for one in found.predictions},
         "after_mm": {one.name: 1000.0 * one.error_after for one in found.predictions},
         "gross_errors": {one.name: int(one.gross.sum()) for one in found.predictions},
-        "seconds": time.perf_counter() - begun,
     }
 
 
@@ -62,6 +59,24 @@ def main() -> None:
                 done.append(estimated(name, tissue, noise))
                 print(json.dumps(done[-1]), flush=True)
                 FILE.write_text(json.dumps(done, indent=1) + "\n", encoding="utf-8")
+    print(*table(done), sep="\n")
+
+
+def table(done: list[dict[str, Any]]) -> list[str]:
+    """Rows for the docs: a line a case, medians last."""
+    ways = [(tissue, noise) for noise in NOISE for tissue in ("single", "multi")]
+    found = {(d["case"], d["tissue"], d["noise"]): d for d in done if "error" not in d}
+    names = list(dict.fromkeys(d["case"] for d in done))
+    lines, rows = [], []
+    for name in names:
+        row = []
+        for place in ("ventricles", "cavity"):
+            row.append(found[name, "single", "robust"]["before_mm"][place])
+            row += [found[name, *way]["after_mm"][place] if (name, *way) in found else math.nan for way in ways]
+        rows.append(row)
+        lines.append(f"| {name} | " + " | ".join(f"{value:.2f}" for value in row) + " |")
+    medians = np.nanmedian(rows, axis=0)
+    return [*lines, "| median | " + " | ".join(f"{value:.2f}" for value in medians) + " |"]
 
 
 if __name__ == "__main__":

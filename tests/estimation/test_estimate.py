@@ -224,6 +224,15 @@ def test_the_same_twice() -> None:
     np.testing.assert_array_equal(first.importance.theta, second.importance.theta)
 
 
+def test_a_law_need_not_be_known_and_what_it_is_does_not_matter() -> None:
+    case = block({"brain": WHITE}, "pushed")
+    seen = replace(case, recordings=(beads(truth(case), noise=1e-4),))
+    unknown = replace(seen, tissues={1: replace(seen.tissues[1], law=None)})
+    first, second, third = (found(c, EstimationOptions(samples=25)) for c in (seen, unknown, with_laws(seen, GREY)))
+    np.testing.assert_array_equal(first.theta, second.theta)
+    np.testing.assert_array_equal(first.theta, third.theta)
+
+
 # -- what cannot be estimated -----------------------------------------------------------------------------------------
 
 
