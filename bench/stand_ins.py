@@ -22,6 +22,9 @@ from warpbrain.estimation.prior_modes import prior_of
 
 #: Degrees of freedom of the noise: the default, and normal noise, which is the paper's least root mean square.
 NOISE = {"robust": 4.0, "normal": math.inf}
+#: What is run. With normal noise and two tissues what no case declares pulls moduli to where equilibria are unstable:
+#: 0614 found no answer within five minutes.
+WAYS = (("single", "robust"), ("multi", "robust"), ("single", "normal"))
 FILE = RESULTS / "stand_ins.json"
 
 
@@ -51,20 +54,18 @@ def estimated(name: str, tissue: str, noise: str) -> dict[str, Any]:
 def main() -> None:
     """All of them."""
     done = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else []
-    for tissue in ("single", "multi"):
-        for noise in NOISE:
-            for name in [name for name in SHIPPED if not name.startswith("phantom")]:
-                if any((d["case"], d["tissue"], d["noise"]) == (name, tissue, noise) for d in done):
-                    continue
-                done.append(estimated(name, tissue, noise))
-                print(json.dumps(done[-1]), flush=True)
-                FILE.write_text(json.dumps(done, indent=1) + "\n", encoding="utf-8")
+    for tissue, noise in WAYS:
+        for name in [name for name in SHIPPED if not name.startswith("phantom")]:
+            if any((d["case"], d["tissue"], d["noise"]) == (name, tissue, noise) for d in done):
+                continue
+            done.append(estimated(name, tissue, noise))
+            print(json.dumps(done[-1]), flush=True)
+            FILE.write_text(json.dumps(done, indent=1) + "\n", encoding="utf-8")
     print(*table(done), sep="\n")
 
 
 def table(done: list[dict[str, Any]]) -> list[str]:
     """Rows for the docs: a line a case, medians last."""
-    ways = [(tissue, noise) for noise in NOISE for tissue in ("single", "multi")]
     found = {(d["case"], d["tissue"], d["noise"]): d for d in done if "error" not in d}
     names = list(dict.fromkeys(d["case"] for d in done))
     lines, rows = [], []
@@ -72,7 +73,7 @@ def table(done: list[dict[str, Any]]) -> list[str]:
         row = []
         for place in ("ventricles", "cavity"):
             row.append(found[name, "single", "robust"]["before_mm"][place])
-            row += [found[name, *way]["after_mm"][place] if (name, *way) in found else math.nan for way in ways]
+            row += [found[name, *way]["after_mm"][place] if (name, *way) in found else math.nan for way in WAYS]
         rows.append(row)
         lines.append(f"| {name} | " + " | ".join(f"{value:.2f}" for value in row) + " |")
     medians = np.nanmedian(rows, axis=0)
