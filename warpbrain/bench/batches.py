@@ -80,7 +80,7 @@ def measure_batches(sizes: list[int], device: str, precision: str) -> Iterator[M
         samples = sorted(whole.samples[:slots], key=lambda sample: sample.stiffness)
         numbers = [sample.number for sample in samples]
         course = whole.course()
-        batch = Batch(system, samples, slots, tolerance=course.tolerance, shapes=course.shapes())
+        batch = Batch(system, samples, slots, tolerance=course.tolerance, shapes=course.shapes(), linger=course.linger)
         # loads kernels and captures the graph
         list(step_batch(batch, course, numbers))
         times = []
@@ -138,7 +138,9 @@ def measure_processes(count: int, samples: int, precision: str, prepare: Prepare
 def measure_sweep(tissue: str, device: str, precision: str) -> tuple[float, int, int, int]:
     """The paper's sweep on the coarse phantom, to rest: seconds, samples, how many failed, and CG iterations."""
     case = find_case("phantom", tissue)
-    job = Job(model_of(case)[0], tuple(swept_samples(case, trained())), precision=precision)
+    job = Job(
+        model_of(case)[0], tuple(swept_samples(case, trained("coregionalised", "as_published"))), precision=precision
+    )
     start = time.perf_counter()
     outcomes = [outcome for ended in Here(device, None).outcomes(job) for outcome in ended]
     seconds = time.perf_counter() - start

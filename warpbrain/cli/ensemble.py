@@ -52,7 +52,11 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="the paper's sweep instead: curves of -2 to 2 standard deviations, 17 for a tissue, 289 pairs for two",
     )
     add("--seed", type=int, metavar="S", help="another sequence of draws (default: 0)")
-    add("--gp", metavar="MODEL", help="generative model: hierarchical (default), coregionalised or a folder")
+    add(
+        "--gp",
+        metavar="MODEL",
+        help="generative model: hierarchical (default), coregionalised (default of --grid) or a folder",
+    )
     add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
     motion = parser.add_mutually_exclusive_group()
     motion.add_argument("--steps", type=int, metavar="N", help="follow the motion for N time steps of 1 ms")
@@ -184,7 +188,10 @@ def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str
     from warpbrain.ensemble.choosing import drawn_samples, swept_samples
     from warpbrain.gp.trained import find_model
 
-    process = find_model(options.gp or "hierarchical")
+    if options.grid and options.gp is None:
+        process = find_model("coregionalised", "as_published")
+    else:
+        process = find_model(options.gp or "hierarchical")
     by = f"the generative model {process.name} ({process.variant})"
     if options.grid:
         return swept_samples(case, process), f"the paper's sweep by {by}"

@@ -96,7 +96,7 @@ class Batch:
         tolerance: float,
         shapes: Floats | None = None,
         max_cg: int = 2000,
-        linger: float = 0.25,
+        linger: float = 0.0,
     ) -> None:
         self.system, self.slots = system, slots
         self._linger = linger

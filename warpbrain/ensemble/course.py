@@ -44,6 +44,9 @@ class Course(abc.ABC):
     ----------
     tolerance : float
         Relative tolerance of the linear solves.
+    linger : float
+        Part of the solves of a pass that may go on in the next one. On an H200 none is best where all take steps of one
+        length, and a quarter in a run to rest, where some need a hundred times the iterations of others.
     time : array
         Of the state of each slot [s].
     steps, cg_iterations : int array
@@ -53,6 +56,7 @@ class Course(abc.ABC):
     """
 
     tolerance: float
+    linger: float = 0.0
 
     def __init__(self, model: Model) -> None:
         self.model = model

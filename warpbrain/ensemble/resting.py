@@ -12,7 +12,7 @@ from warpbrain.ensemble.course import Course, Floats, Slots, Verdict
 from warpbrain.kernels.precision import Precision
 from warpbrain.simulation.held import require_held
 from warpbrain.simulation.model import Model
-from warpbrain.simulation.relaxation import RelaxationOptions, least_residual
+from warpbrain.simulation.relaxation import LINEAR_TOLERANCE, RelaxationOptions, least_residual
 
 
 class Resting(Course):
@@ -35,7 +35,8 @@ class Resting(Course):
         super().__init__(model)
         require_held(model)
         self._options = options
-        self.tolerance = 1e-8
+        self.tolerance = LINEAR_TOLERANCE
+        self.linger = 0.25
         self.goal = least_residual(options.tolerance, precision)
         self._moves = bool(np.any(model.prescribed))
 

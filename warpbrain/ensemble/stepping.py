@@ -37,7 +37,14 @@ def step_samples(system: System, course: Course, samples: Sequence[Sample], slot
         yield impossible
     queue = sorted((s for s in samples if s.materials is not None), key=lambda s: (s.stiffness, s.number))
     if queue:
-        batch = Batch(system, queue, min(slots, len(queue)), tolerance=course.tolerance, shapes=course.shapes())
+        batch = Batch(
+            system,
+            queue,
+            min(slots, len(queue)),
+            tolerance=course.tolerance,
+            shapes=course.shapes(),
+            linger=course.linger,
+        )
         yield from step_batch(batch, course, [sample.number for sample in queue])
 
 
