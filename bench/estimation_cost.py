@@ -8,13 +8,17 @@ from __future__ import annotations
 import json
 import sys
 import time
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from phantom_truth import RESULTS
 
 from warpbrain.cases.shipped import find_case
+from warpbrain.errors import SolveError
 from warpbrain.estimation.estimate import Estimation, EstimationOptions
+from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.prior_modes import prior_of
 from warpbrain.estimation.sweep import sweep
@@ -57,6 +61,13 @@ def main() -> None:
         "equilibria": len(swept.points),
         "rmse_mm": 1000.0 * (swept.best.error or 0.0),
     }
+    begun = time.process_time()
+    forward = Forward(case, np.array(swept.points[0].theta), "cpu")
+    for point in swept.points:
+        # as 289 runs would: each from rest
+        with suppress(SolveError):
+            forward.solve(np.array(point.theta))
+    found["sweep, each from rest"] = {"seconds": time.process_time() - begun, "equilibria": forward.solves}
     print(json.dumps(found, indent=1))
     (RESULTS / "estimation_cost.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 

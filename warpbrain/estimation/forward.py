@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 #: is left of it need only be far below any noise.
 EXACT, ROUGH = 1e-7, 1e-5
 #: Of the linear solves for derivatives: what is left of the error is far below a standard deviation of any parameter.
-_DERIVATIVES = 1e-6
+_DERIVATIVES = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
