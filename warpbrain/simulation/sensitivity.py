@@ -10,9 +10,9 @@ move. Loads are dead and know nothing of the laws. Hence, with the tangent stiff
 parameters of every law (linear in the moduli), so with a step of `epsilon^(1/5)` it is exact to some 1e-12 in double
 precision, and no law has to know its derivatives.
 
-Every parameter is one more right-hand side of one matrix, solved by the system's own conjugate gradients: 0.2 s each
-to 1e-10 on the phantom's 4187 nodes (2-core CPU, 2026-11). SciPy's sparse LU takes 1.1 s for its factors and 0.01 s a
-parameter there, so it would win from six parameters on; but it has no device, and its fill grows faster than the mesh.
+Every parameter is one more right-hand side of one matrix, and conjugate gradients solve for all of them at once
+(`warpbrain.kernels.block_linear`). SciPy's sparse LU takes 1.1 s for its factors on the phantom's 4187 nodes (2-core
+CPU, 2026-11), longer than two parameters take so to 1e-10; it has no device, and its fill grows faster than the mesh.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.errors import SolveError
+from warpbrain.kernels.block_linear import BlockConjugateGradient
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.equilibrium import Equilibrium
 from warpbrain.simulation.model import Material
@@ -71,9 +72,9 @@ class SensitivitySolver:
     def __init__(self, system: System, tolerance: float = 1e-10, max_cg: int = 10_000) -> None:
         self.system = system
         self._step = system.precision.epsilon**0.2
-        self._cg = system.linear_solver(
-            tolerance=max(tolerance, 20.0 * system.precision.epsilon), max_iterations=max_cg, watch_curvature=True
-        )
+        self._tolerance = max(tolerance, 20.0 * system.precision.epsilon)
+        self._max_cg = max_cg
+        self._solvers: dict[int, BlockConjugateGradient] = {}
 
     def solve(self, u: ArrayLike, materials: MaterialsOf, theta: ArrayLike) -> Sensitivities:
         """Derivatives by each parameter.
@@ -101,20 +102,34 @@ class SensitivitySolver:
         system.set_materials(materials(point))
         system.evaluate_tangents()
         system.assemble(k=1.0, m=0.0)
-        self._cg.prepare()
-        moved, reactions, iterations = [], [], []
-        for k, force in enumerate(at_fixed_u):
-            system.load.assign(np.where(constrained, 0.0, -force))
-            system.solution.zero_()
-            self._cg.solve()
-            linear = self._cg.result()
+        if not len(point):
+            none = np.zeros((0, system.size, 3))
+            return Sensitivities(none, none, ())
+        solver = self._solver(len(point))
+        solver.prepare()
+        solved = solver.solve([np.where(constrained, 0.0, -force) for force in at_fixed_u])
+        results = solver.results()
+        for k, linear in enumerate(results):
             _require_solved(linear, k)
-            du = np.where(constrained, 0.0, system.solution.numpy().astype(np.float64))
-            moved.append(du)
-            reactions.append(np.where(constrained, force + system.stiffness_times(du), 0.0))
-            iterations.append(linear.iterations)
-        shape = (len(point), system.size, 3)
-        return Sensitivities(np.reshape(moved, shape), np.reshape(reactions, shape), tuple(iterations))
+        moved = np.where(constrained, 0.0, solved)
+        reactions = [
+            np.where(constrained, force + system.stiffness_times(du), 0.0)
+            for force, du in zip(at_fixed_u, moved, strict=True)
+        ]
+        return Sensitivities(moved, np.array(reactions), tuple(linear.iterations for linear in results))
+
+    def _solver(self, count: int) -> BlockConjugateGradient:
+        if count not in self._solvers:
+            system = self.system
+            self._solvers[count] = BlockConjugateGradient(
+                system.matrix,
+                system.diagonal,
+                count,
+                system.precision,
+                tolerance=self._tolerance,
+                max_iterations=self._max_cg,
+            )
+        return self._solvers[count]
 
     def _force_derivative(self, materials: MaterialsOf, theta: Floats, k: int) -> Floats:
         """`df_int/dtheta_k` at fixed `u`, shape (n, 3)."""
