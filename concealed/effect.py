@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from concealed.body import Body, Bools, Floats
-from warpbrain.physics.gravity import Gravity
+from warpbrain.physics.mechanisms.gravity import Gravity
 
 
 @dataclass(frozen=True, kw_only=True)

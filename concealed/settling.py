@@ -11,7 +11,7 @@ from concealed.effect import Effect
 from concealed.tissue import Tissue
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.gravity import Gravity
+from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.system import System

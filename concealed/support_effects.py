@@ -10,7 +10,7 @@ import numpy as np
 from concealed.body import Body, Bools
 from concealed.effect import Effect
 from warpbrain.mesh import face_vectors
-from warpbrain.physics.gravity import Gravity
+from warpbrain.physics.mechanisms.gravity import Gravity
 
 
 @dataclass(frozen=True, kw_only=True)

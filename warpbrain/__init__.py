@@ -22,8 +22,8 @@ _HOMES = {
     "physics.laws": ("Law", "MooneyRivlin", "NeoHookean", "Ogden"),
     "physics.laws.stability": ("require_stable",),
     "physics.force": ("NodalForce",),
-    "physics.gravity": ("Gravity",),
-    "physics.resection": ("Resection",),
+    "physics.mechanisms.gravity": ("Gravity",),
+    "physics.mechanisms.resection": ("Resection",),
     "simulation.model": ("Damping", "Material", "Model"),
     "simulation.of_case": ("model_of",),
     "simulation.system": ("System",),
@@ -105,10 +105,10 @@ if TYPE_CHECKING:
     from warpbrain.gp.trained import find_model, trained
     from warpbrain.mesh import MeshError, TetMesh, read_mesh, write_mesh
     from warpbrain.physics.force import NodalForce
-    from warpbrain.physics.gravity import Gravity
     from warpbrain.physics.laws import Law, MooneyRivlin, NeoHookean, Ogden
     from warpbrain.physics.laws.stability import require_stable
-    from warpbrain.physics.resection import Resection
+    from warpbrain.physics.mechanisms.gravity import Gravity
+    from warpbrain.physics.mechanisms.resection import Resection
     from warpbrain.simulation.dynamics import Simulator
     from warpbrain.simulation.equilibrium import (
         Equilibrium,

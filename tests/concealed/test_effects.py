@@ -12,8 +12,8 @@ from concealed.support_effects import MisjudgedLevel, Slip, TurnedHead
 from concealed.tissue_effects import Inclusion, Swelling
 from concealed.wall_effects import CavityPressure, VentricularPressure, WallTraction, pressure_forces
 from warpbrain.mesh import boundary_faces, node_areas
-from warpbrain.physics.gravity import Gravity
 from warpbrain.physics.laws.ogden import Ogden
+from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System

@@ -55,7 +55,7 @@ def test_pattern() -> None:
     mesh = cube(3)
     tetrahedra = np.sort(mesh.tetrahedra, axis=1)
     n = len(mesh.points)
-    pattern = build_pattern(tetrahedra, n)
+    pattern = build_pattern([tetrahedra], n)
     together = np.zeros((n, n), dtype=bool)
     for nodes in tetrahedra:
         together[np.ix_(nodes, nodes)] = True

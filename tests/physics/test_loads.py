@@ -9,8 +9,8 @@ from shapes import box, cube, distorted
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.force import NodalForce
-from warpbrain.physics.gravity import CSF_DENSITY, STANDARD_GRAVITY, SURFACE_WIDTH, Gravity
 from warpbrain.physics.load import Load
+from warpbrain.physics.mechanisms.gravity import CSF_DENSITY, STANDARD_GRAVITY, SURFACE_WIDTH, Gravity
 
 MESH = box((4, 3, 20), (0.08, 0.06, 0.1))
 DENSITY = 1211.5

@@ -18,7 +18,7 @@ from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import LAWS
-from warpbrain.physics.resection import Resection
+from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording, TestRecording
 from warpbrain.report.case_picture import _Half, _headline, _Scene, _without, write_case_picture
 from warpbrain.report.views import scale_length

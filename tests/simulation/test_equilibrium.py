@@ -13,8 +13,8 @@ from shapes import box, cube, distorted
 from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.force import NodalForce
-from warpbrain.physics.gravity import Gravity
 from warpbrain.physics.laws import NeoHookean, Ogden
+from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, NewtonStep, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.relaxation import RelaxationOptions, relax_to_rest

@@ -12,8 +12,8 @@ from shapes import box, cube, distorted, tetrahedron
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.force import NodalForce
-from warpbrain.physics.gravity import Gravity
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Damping, Material, Model

@@ -14,8 +14,8 @@ from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, SolveError
-from warpbrain.physics.gravity import Gravity
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
+from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Material, Model

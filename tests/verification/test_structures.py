@@ -15,8 +15,8 @@ from bodies import model_of
 from shapes import box, disc, oriented, quarter, swept, triangle
 
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.gravity import Gravity
 from warpbrain.physics.laws import Law, MooneyRivlin, NeoHookean, Ogden
+from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, solve_equilibrium
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System

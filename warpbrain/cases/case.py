@@ -15,13 +15,10 @@ from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.gravity import Gravity
 from warpbrain.physics.laws import LAWS, Law
-from warpbrain.physics.resection import Resection
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.recordings.recording import Recording
-
-#: What a model is told by; see each one's file in `warpbrain.physics`.
-Mechanism = Gravity | Resection
 
 
 @dataclass(frozen=True)
@@ -82,7 +79,7 @@ class Case:
     density, poisson : float
         [kg/m3] and without unit.
     boundaries : tuple of Boundary
-    mechanisms : tuple of Gravity or Resection
+    mechanisms : tuple of Mechanism
     recordings : tuple of Recording
     remarks : tuple of str
         What a user should know of how the files were read.

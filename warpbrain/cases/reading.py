@@ -73,11 +73,12 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     tissues = read_tissues(context)
     density, poisson = read_body(context)
     boundaries = read_boundaries(context, sets)
-    mechanisms = read_mechanisms(context, axis, density)
+    # with the node sets that files of this folder name
+    mesh = None if sets is None else sets.mesh()
+    mechanisms = read_mechanisms(context, mesh, axis, density)
     recordings = read_recordings(context, sets, {boundary.name for boundary in boundaries})
-    if sets is None:
+    if mesh is None:
         return None
-    mesh = sets.mesh()
     case = Case(
         name=head.get("name", ""),
         title=head.get("title", head.get("name", "")),

@@ -13,12 +13,13 @@ import numpy as np
 
 from warpbrain.atomic import output_folder, safe_name, whole_file
 from warpbrain.cases.boundary import Boundary, Contact, Displaced, Fixed, Forced, Pressed, Sliding
-from warpbrain.cases.case import Case, Mechanism, Tissue
+from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.format.tables import PRIOR
+from warpbrain.cases.parts.mechanisms import in_file
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.mesh import write_mesh
-from warpbrain.physics.gravity import Gravity
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.recordings.recording import (
     ForceRecording,
     PointsRecording,
@@ -70,7 +71,7 @@ def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
     if case.boundaries:
         tables["boundary"] = [_boundary(folder, boundary, frame) for boundary in case.boundaries]
     if case.mechanisms:
-        tables["mechanism"] = [_mechanism(mechanism) for mechanism in case.mechanisms]
+        tables["mechanism"] = [_mechanism(mechanism, frame) for mechanism in case.mechanisms]
     if case.recordings:
         tables["recording"] = [_recording(folder, recording, frame) for recording in case.recordings]
     import tomli_w
@@ -145,11 +146,12 @@ def _write_surface(path: Path, contact: Contact, frame: Frame) -> None:
         meshio.write(temporary, surface, file_format="vtu", binary=True, compression="zlib")
 
 
-def _mechanism(mechanism: Mechanism) -> dict[str, Any]:
-    if isinstance(mechanism, Gravity):
-        assert mechanism.csf_level is not None  # a case's gravity always has one
-        return {"kind": "gravity", "csf_level": 1000.0 * mechanism.csf_level}
-    return {"kind": "resection", "elements": mechanism.elements}
+def _mechanism(mechanism: Mechanism, frame: Frame) -> dict[str, Any]:
+    said = {name: getattr(mechanism, name) for name in mechanism.parameters()}
+    values = {
+        name: in_file(mechanism.parameters()[name], value, frame) for name, value in said.items() if value is not None
+    }
+    return {"kind": mechanism.kind, **values, **_ramp(mechanism.ramp)}
 
 
 def _recording(folder: Path, recording: Recording, frame: Frame) -> dict[str, Any]:

@@ -26,7 +26,8 @@ class AssemblyKernels:
     gather_forces : wp.Kernel
         One thread for a node: the sum of the element forces on it.
     constrained_load : wp.Kernel
-        One thread for a node: subtract `k K d`, of prescribed increments `d`, from the right-hand side.
+        One thread for a node: subtract `k K d`, of prescribed increments `d`, from the right-hand side. The matrix
+        itself cannot be used: it has lost the columns of constrained components.
     """
 
     gather_matrix: Any
@@ -85,10 +86,12 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
 
     @wp.kernel(module=module)
     def constrained_load(
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        block_pairs: wp.array[int],
         first: wp.array[int],
-        corners: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        element_blocks: wp.array2d[mat33],
+        contributions: wp.array[int],
+        element_blocks: wp.array[mat33],
         increment: wp.array[vec3],
         free: wp.array[vec3],
         k: scalar,
@@ -96,17 +99,20 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
     ):
         i = wp.tid()
         f = vec3()
-        for c in range(first[i], first[i + 1]):
-            e = corners[c] / 4
-            a = corners[c] % 4
-            for b in range(4):
-                low = wp.min(a, b)
-                high = wp.max(a, b)
-                # position of the pair in the ten stored blocks
-                K = element_blocks[e, low * 4 - low * (low + 1) / 2 + high]
-                if a > b:
+        for block in range(offsets[i], offsets[i + 1]):
+            d = increment[columns[block]]
+            # most increments are zero: only what is next to a moved node has work to do
+            if wp.dot(d, d) > scalar(0.0):
+                pair = block_pairs[block]
+                transposed = pair < 0
+                if transposed:
+                    pair = -1 - pair
+                K = mat33()
+                for c in range(first[pair], first[pair + 1]):
+                    K += element_blocks[contributions[c]]
+                if transposed:
                     K = wp.transpose(K)
-                f += K * increment[nodes[e][b]]
+                f += K * d
         load[i] = load[i] - wp.cw_mul(free[i], k * f)
 
     return AssemblyKernels(gather_matrix, gather_forces, constrained_load)

@@ -99,6 +99,8 @@ class Simulator:
             raise InputError(f"time step = {time_step} s: expected a positive number")
         self._h = time_step
         self._graph = None
+        for term in self.system.terms:
+            term.set_time_step(time_step)
 
     @property
     def time_step(self) -> float:
@@ -109,6 +111,7 @@ class Simulator:
 
     def apply_loads(self) -> None:
         """Set the external forces to the model's loads at the end of the coming step."""
+        self.system.set_load(time=self.time + self._h)
         factors = tuple(load.factor(self.time + self._h) for load in self.system.model.loads)
         if factors != self._external_factor:
             self.system.external.assign(self.system.model.external_forces(self.time + self._h))
@@ -199,6 +202,12 @@ class Simulator:
             self.assemble_system(first=iteration == 0)
             self.solve_system(first=iteration == 0)
             self.integrate()
+        self._remember()
+
+    def _remember(self) -> None:
+        """Let terms with a memory keep what they need of the step."""
+        for term in self.system.terms:
+            term.advance(self.system.u)
 
     def step(self) -> None:
         """Advance by one time step."""
@@ -222,6 +231,7 @@ class Simulator:
                 self.solve_system(first=iteration == 0)
             with clock.phase(PHASES[3]):
                 self.integrate()
+        self._remember()
         self._finish()
 
     def capture(self) -> None:

@@ -8,6 +8,7 @@ interior can follow. Linear systems are solved inexactly while far from the solu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -202,10 +203,13 @@ class EquilibriumSolver:
         u = np.zeros_like(full) if start is None else np.array(start, dtype=np.float64)
         origin = np.where(model.constrained, u, 0.0)
         self._history = []
+        for term in self.system.terms:
+            term.set_time_step(math.inf)
         done, step = 0.0, self.options.max_load_step
         while done < 1.0:
             load = min(1.0, done + step)
             target = origin + load * (model.prescribed - origin * model.constrained)
+            self.system.set_load(load)
             try:
                 reached, energy, residual = self._newton(u, load, load * full, target)
             except _StepFailed as failure:
@@ -344,6 +348,13 @@ class EquilibriumSolver:
         energy, min_J = self.system.energy()
         return energy - float(np.vdot(external, u)), min_J
 
+    def _without_potential(self, u: Floats) -> Floats | None:
+        """Forces [N] that have no potential; None if there is no such term."""
+        if all(term.conservative for term in self.system.terms):
+            return None
+        self.system.u.assign(u)
+        return self.system.forces_without_potential()
+
     def _line_search(
         self, u: Floats, d: Floats, r: Floats, external: Floats, potential: float, moving: bool
     ) -> tuple[float, Floats, float, float]:
@@ -355,10 +366,14 @@ class EquilibriumSolver:
             raise _StepFailed("Newton's direction does not descend: the tangent stiffness is not positive definite")
         alpha = 1.0
         min_J = np.nan
+        before = self._without_potential(u)
         while alpha > 1e-3:
             trial = u + alpha * d
             reached, min_J = self._potential(trial, external)
-            descends = moving or reached <= potential + 1e-4 * alpha * slope + noise
+            after = self._without_potential(trial)
+            # of forces without a potential, the work along the step by the trapezoidal rule
+            work = 0.0 if before is None or after is None else 0.5 * alpha * float(np.vdot(before + after, d))
+            descends = moving or reached + work <= potential + 1e-4 * alpha * slope + noise
             if min_J > 0.0 and np.isfinite(reached) and descends:
                 return alpha, trial, reached, min_J
             alpha *= 0.5

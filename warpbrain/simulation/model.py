@@ -14,6 +14,7 @@ from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import Law
 from warpbrain.physics.load import Load
+from warpbrain.physics.term import Following
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -97,7 +98,9 @@ class Model:
     prescribed : (n, 3) array
         Their values [m] at full load; zero where not given.
     loads : sequence of Load
-        What else acts, each a file of `warpbrain.physics`.
+        Forces that do not follow the deformation.
+    mechanisms : sequence of Following
+        What else acts, each a file of `warpbrain.physics.mechanisms`.
     motions : sequence of Motion
         Histories of prescribed displacements, which end at `prescribed`.
     damping : Damping
@@ -114,6 +117,7 @@ class Model:
     constrained: Bools = None  # type: ignore[assignment]  # nothing constrained
     prescribed: Floats = None  # type: ignore[assignment]  # zero
     loads: Sequence[Load] = ()
+    mechanisms: Sequence[Following] = ()
     motions: Sequence[Motion] = ()
     damping: Damping = field(default_factory=Damping)
 

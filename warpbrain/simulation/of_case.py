@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.cases.boundary import Displaced, Fixed, Forced
+from warpbrain.cases.boundary import Displaced, Fixed, Forced, Pressed
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
-from warpbrain.physics.resection import Resection
+from warpbrain.physics.mechanisms.pressure import Pressure
+from warpbrain.physics.term import Following
 from warpbrain.simulation.model import Material, Model, Motion
 
 
@@ -35,7 +36,8 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
     mesh, nodes = case.remaining
     constrained = np.zeros(mesh.points.shape, dtype=bool)
     prescribed = np.zeros(mesh.points.shape)
-    loads: list[Load] = [m for m in case.mechanisms if not isinstance(m, Resection)]
+    loads: list[Load] = [m for m in case.mechanisms if isinstance(m, Load)]
+    following: list[Following] = [m for m in case.mechanisms if isinstance(m, Following)]
     motions: list[Motion] = []
     for boundary in case.boundaries:
         members = case.mesh.node_sets[boundary.nodes][nodes]
@@ -47,6 +49,8 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
                 motions.append(Motion(members, np.array(boundary.times), np.array(boundary.values)))
         elif isinstance(boundary, Forced):
             loads.append(NodalForce(nodes=boundary.nodes, total=boundary.total, ramp=boundary.ramp))
+        elif isinstance(boundary, Pressed):
+            following.append(Pressure(nodes=boundary.nodes, value=boundary.value, ramp=boundary.ramp))
         elif not isinstance(boundary, Fixed):
             raise InputError(
                 f"{case.path}: [[boundary]] '{boundary.name}' kind: '{boundary.kind}' cannot be simulated yet"
@@ -58,4 +62,4 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
         }
     except InputError as error:
         raise InputError(f"{case.path}: [tissue] {error}") from None
-    return Model(mesh, materials, case.density, constrained, prescribed, loads, motions), nodes
+    return Model(mesh, materials, case.density, constrained, prescribed, loads, following, motions), nodes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.linear import ConjugateGradient
 from warpbrain.kernels.precision import PRECISIONS, Precision
 from warpbrain.kernels.tetrahedron import PAIRS, ElementKernels
+from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import Law
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.pattern import build_pattern
@@ -87,6 +89,8 @@ class System:
         1 for free components, 0 for constrained ones.
     mass : wp.array, shape (n,)
         Lumped masses [kg].
+    terms : list of Term
+        What else acts with forces that follow the deformation.
     seconds : float
         Wall time that the pre-processing took [s].
     """
@@ -100,6 +104,7 @@ class System:
         self.elements = len(model.mesh.tetrahedra)
         self._kernels = assembly_kernels(self.precision)
         self._place_mesh()
+        self.terms = [mechanism.bind(self) for mechanism in model.mechanisms]
         self._place_pattern()
         self.groups = self._group_elements()
         self._place_fields()
@@ -126,7 +131,7 @@ class System:
 
     def _place_pattern(self) -> None:
         p = self.precision
-        pattern = build_pattern(self.tetrahedra, self.size)
+        pattern = build_pattern([self.tetrahedra, *(term.stencils for term in self.terms)], self.size)
         self.pairs = self._array(pattern.pairs, wp.vec2i)
         self.pair_positions = self._array(pattern.positions, wp.vec2i)
         self.pair_first = self._array(pattern.first, int)
@@ -134,6 +139,7 @@ class System:
         self.corner_first = self._array(pattern.corner_first, int)
         self.corners = self._array(pattern.corners, int)
         self.diagonal = self._array(pattern.diagonal, int)
+        self.block_pairs = self._array(pattern.block_pairs, int)
         self.matrix: BsrMatrix = bsr_zeros(self.size, self.size, p.mat33, device=self.device)
         self.matrix.offsets = self._array(pattern.offsets, int)
         self.matrix.columns = self._array(pattern.columns, int)
@@ -201,10 +207,18 @@ class System:
         self.load, self.solution, self.increment = vectors(), vectors(), vectors()
         self.free = self._array(1.0 - self.model.constrained, p.vec3)
         self._all_components = self._array(np.ones((n, 3)), p.vec3)
-        self.element_forces = wp.zeros((m, 4), dtype=p.vec3, device=self.device)
-        self.element_blocks = wp.zeros((m, len(PAIRS)), dtype=p.mat33, device=self.device)
-        self._flat_forces = self.element_forces.flatten()
-        self._flat_blocks = self.element_blocks.flatten()
+        self._flat_forces = wp.zeros(len(self.corners), dtype=p.vec3, device=self.device)
+        self._flat_blocks = wp.zeros(len(self.contributions), dtype=p.mat33, device=self.device)
+        self.element_forces = self._flat_forces[: 4 * m].reshape((m, 4))
+        self.element_blocks = self._flat_blocks[: len(PAIRS) * m].reshape((m, len(PAIRS)))
+        corner, block = 4 * m, len(PAIRS) * m
+        for term in self.terms:
+            count, nodes = term.stencils.shape
+            pairs = nodes * (nodes + 1) // 2
+            forces = self._flat_forces[corner : corner + count * nodes].reshape((count, nodes))
+            blocks = self._flat_blocks[block : block + count * pairs].reshape((count, pairs))
+            term.place(forces, blocks)
+            corner, block = corner + count * nodes, block + count * pairs
         self.element_energy = wp.zeros(m, dtype=p.scalar, device=self.device)
         self.element_J = wp.zeros(m, dtype=p.scalar, device=self.device)
 
@@ -220,6 +234,8 @@ class System:
         """Element forces at `u`."""
         for g in self.groups:
             self._launch(g.kernels.forces, len(g.elements), *self._geometry(g), self.u, self.element_forces)
+        for term in self.terms:
+            term.evaluate_forces(self.u)
 
     def evaluate_tangents(self) -> None:
         """Element forces and tangent blocks at `u`."""
@@ -232,6 +248,8 @@ class System:
                 self.element_forces,
                 self.element_blocks,
             )
+        for term in self.terms:
+            term.evaluate_tangents(self.u)
 
     def gather_forces(self) -> None:
         """Internal forces from the element forces."""
@@ -262,10 +280,12 @@ class System:
         self._launch(
             self._kernels.constrained_load,
             self.size,
-            self.corner_first,
-            self.corners,
-            self.nodes,
-            self.element_blocks,
+            self.matrix.offsets,
+            self.matrix.columns,
+            self.block_pairs,
+            self.pair_first,
+            self.contributions,
+            self._flat_blocks,
             increment,
             self.free,
             self.precision.scalar(k),
@@ -279,10 +299,12 @@ class System:
         self._launch(
             self._kernels.constrained_load,
             self.size,
-            self.corner_first,
-            self.corners,
-            self.nodes,
-            self.element_blocks,
+            self.matrix.offsets,
+            self.matrix.columns,
+            self.block_pairs,
+            self.pair_first,
+            self.contributions,
+            self._flat_blocks,
             self.increment,
             self._all_components,
             self.precision.scalar(-1.0),
@@ -328,12 +350,36 @@ class System:
         return time.perf_counter() - start
 
     def energy(self) -> tuple[float, float]:
-        """Stored energy [J] at `u`, and the smallest `J` of an element (not positive: the energy means nothing)."""
+        """Stored energy [J] at `u`, and the smallest `J` of an element (not positive: the energy means nothing).
+
+        Potentials of terms are in it, of those that have one.
+        """
         for g in self.groups:
             self._launch(
                 g.kernels.energy, len(g.elements), *self._geometry(g), self.u, self.element_energy, self.element_J
             )
-        return float(np.sum(self.element_energy.numpy(), dtype=np.float64)), float(np.min(self.element_J.numpy()))
+        stored = float(np.sum(self.element_energy.numpy(), dtype=np.float64))
+        stored += sum(term.energy(self.u) for term in self.terms if term.conservative)
+        return stored, float(np.min(self.element_J.numpy()))
+
+    def set_load(self, share: float = 1.0, time: float = math.inf) -> None:
+        """Let terms act with a share of what they do at a time [s]; by default in full, long after every ramp."""
+        for term in self.terms:
+            term.set_scale(share * term.factor(time))
+
+    def forces_without_potential(self) -> Floats:
+        """Sum of the forces [N], shape (n, 3), at `u` of the terms that have no potential."""
+        total = np.zeros((self.size, 3))
+        for term in self.terms:
+            if not term.conservative:
+                term.evaluate_forces(self.u)
+                np.add.at(total, term.stencils, term.forces.numpy())
+        return total
+
+    @property
+    def mesh(self) -> TetMesh:
+        """The reference shape."""
+        return self.model.mesh
 
     def most_compressed(self) -> str:
         """Which element had the smallest `J` when the energy was last evaluated, and where it is, for a message."""

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
+import numpy as np
+
 from warpbrain.cases.format.keys import Key, Table
 from warpbrain.frame import AXES, METRES
 from warpbrain.physics.laws import FORMULATIONS, LAWS
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanisms import mechanisms
 
 ORIGINS = ("measured", "stand-in", "synthetic")
 ROLES = ("fit", "check")
@@ -162,22 +169,42 @@ BOUNDARY = Table(
     several=True,
 )
 
+#: What a parameter of a mechanism is in a file.
+_KIND = {
+    "number": "number",
+    "text": "text",
+    "node set": "text",
+    "element set": "text",
+    "position": "vector",
+    "vector": "vector",
+    "numbers": "numbers",
+}
+
+
+def _mechanism_keys(mechanism: type[Mechanism]) -> tuple[Key, ...]:
+    required = mechanism.required()
+    keys = []
+    for name, says in mechanism.parameters().items():
+        doc = says.doc if name in required else f"{says.doc[:-1]}; {_default(mechanism, name)} if absent."
+        unit = "units" if says.kind == "position" else says.unit
+        keys.append(Key(name, (_KIND[says.kind],), doc, unit, name in required, says.choices, says.above, says.below))
+    return (*keys, _RAMP)
+
+
+def _default(mechanism: type[Mechanism], name: str) -> str:
+    default: Any = next(f.default for f in dataclasses.fields(mechanism) if f.name == name)
+    if default is None:
+        return "none"
+    if isinstance(default, str):
+        return f"'{default}'"
+    return ", ".join(f"{value / mechanism.parameters()[name].si:g}" for value in np.ravel(default))
+
+
 MECHANISM = Table(
     "mechanism",
     "Further physics that is assumed to act.",
-    by=Key("kind", ("text",), "Its name.", needed=True, choices=("gravity", "resection")),
-    variants={
-        "gravity": (
-            Key(
-                "csf_level",
-                ("number",),
-                "Height of the fluid's surface against gravity, above the lowest point of the anatomy.",
-                unit="mm",
-                needed=True,
-            ),
-        ),
-        "resection": (Key("elements", ("text",), "Element set that was taken out; 'resection' if absent."),),
-    },
+    by=Key("kind", ("text",), "Its name.", needed=True, choices=tuple(mechanisms())),
+    variants={kind: _mechanism_keys(mechanism) for kind, mechanism in mechanisms().items()},
     several=True,
 )
 

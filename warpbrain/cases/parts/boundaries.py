@@ -13,6 +13,7 @@ from warpbrain.cases.format.table import Reading
 from warpbrain.cases.format.tables import BOUNDARY
 from warpbrain.cases.parts.context import Context
 from warpbrain.cases.parts.node_sets import NodeSets
+from warpbrain.cases.parts.ramps import read_ramp
 from warpbrain.frame import Frame
 from warpbrain.mesh import TetMesh, boundary_faces, components
 from warpbrain.mesh.soundness import open_edges
@@ -57,7 +58,7 @@ def _displaced(context: Context, table: Reading, sets: NodeSets | None, common: 
         if history is None:
             return None
         return Displaced(**common, times=history[0], values=_triples(history[1]), file=value)
-    ramp = _ramp(table)
+    ramp = read_ramp(table)
     if value is None or ramp is None:
         return None
     final = context.frame.lengths(value)
@@ -81,7 +82,7 @@ def _triples(values: Any) -> tuple[tuple[float, float, float], ...]:
 
 
 def _forced(context: Context, table: Reading, sets: NodeSets | None, common: dict[str, str]) -> Boundary | None:
-    ramp = _ramp(table)
+    ramp = read_ramp(table)
     if not table.has("total") or ramp is None:
         return None
     x, y, z = context.frame.directions(table.get("total")).tolist()
@@ -89,7 +90,7 @@ def _forced(context: Context, table: Reading, sets: NodeSets | None, common: dic
 
 
 def _pressed(context: Context, table: Reading, sets: NodeSets | None, common: dict[str, str]) -> Boundary | None:
-    ramp = _ramp(table)
+    ramp = read_ramp(table)
     if not table.has("value") or ramp is None or not _has_faces(table, sets, common["nodes"]):
         return None
     return Pressed(**common, value=float(table.get("value")), ramp=ramp)
@@ -128,18 +129,6 @@ _READERS = {
     "pressure": _pressed,
     "contact": _contact,
 }
-
-
-def _ramp(table: Reading) -> tuple[tuple[float, float], ...] | None:
-    """Pairs of time and factor; None if they are wrong."""
-    if table.named("ramp") and not table.has("ramp"):
-        return None
-    ramp = tuple((float(t), float(f)) for t, f in table.get("ramp", []))
-    for (a, _), (b, _) in itertools.pairwise(ramp):
-        if b <= a:
-            table.problem("ramp", f"times must increase, found {b:g} s after {a:g} s")
-            return None
-    return ramp
 
 
 def _has_faces(table: Reading, sets: NodeSets | None, nodes: str) -> bool:

@@ -1,64 +1,81 @@
-"""The mechanisms that a case assumes to act."""
+"""The mechanisms that a case assumes to act: whatever the registry has."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from warpbrain.cases.case import Mechanism
 from warpbrain.cases.format.table import Reading
 from warpbrain.cases.format.tables import MECHANISM
 from warpbrain.cases.parts.context import Context
+from warpbrain.cases.parts.ramps import read_ramp
 from warpbrain.errors import InputError
-from warpbrain.physics.gravity import Gravity
-from warpbrain.physics.resection import Resection
+from warpbrain.frame import Frame
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Says
+from warpbrain.physics.mechanisms import mechanisms
 
-#: `csf_level` is in mm whatever the case's units, as its page says.
-_METRES_OF_LEVEL = 1e-3
+#: What to do where something of the case itself is missing.
+_CURES = {"gravity_axis": "gravity_axis = [0, -1, 0] for a patient who lies on the back, in RAS"}
 
 
-def read_mechanisms(context: Context, axis: tuple[float, float, float] | None, density: float) -> tuple[Mechanism, ...]:
+def read_mechanisms(
+    context: Context, mesh: TetMesh | None, axis: tuple[float, float, float] | None, density: float
+) -> tuple[Mechanism, ...]:
     """Mechanisms in the order of the file, as far as they are right; `axis` is where 'down' is."""
     found: list[Mechanism] = []
     kinds: set[str] = set()
     for table in context.lists(MECHANISM):
         if table.variant is None:
             continue
-        if table.variant in kinds:
+        mechanism = mechanisms()[table.variant]
+        if table.variant in kinds and not mechanism.several:
             table.problem("kind", f"a second '{table.variant}': it would act twice")
         kinds.add(table.variant)
-        term = _gravity(context, table, axis, density) if table.variant == "gravity" else _resection(context, table)
-        if term is not None:
-            found.append(term)
+        ramp = read_ramp(table)
+        if mesh is None or ramp is None or not all(table.has(name) for name in mechanism.required()):
+            continue
+        values = {
+            name: in_si(says, table.get(name), context.frame)
+            for name, says in mechanism.parameters().items()
+            if table.has(name)
+        }
+        try:
+            found.append(mechanism.of_case(values | {"ramp": ramp}, Facts(mesh, axis, density)))
+        except ParameterError as error:
+            _note(context, table, error)
+        except InputError as error:
+            table.problem("kind", str(error))
     return tuple(found)
 
 
-def _gravity(
-    context: Context, table: Reading, axis: tuple[float, float, float] | None, density: float
-) -> Gravity | None:
-    if axis is None:
-        if "gravity_axis" not in context.tables.get("case", {}):
-            context.problems.add(
-                context.file,
-                "[case] gravity_axis",
-                "missing, but [[mechanism]] gravity needs to know where 'down' is",
-                "gravity_axis = [0, -1, 0] for a patient who lies on the back, in RAS",
-            )
-        return None
-    if context.mesh is None or not table.has("csf_level"):
-        return None
-    # counted from the whole anatomy: a resection must not move the datum
-    lowest = float((-context.mesh.points @ (np.array(axis) / np.linalg.norm(axis))).min())
-    level = _METRES_OF_LEVEL * float(table.get("csf_level"))
-    return Gravity(direction=axis, density=density, csf_level=level, lowest=lowest)
+def in_si(says: Says, value: Any, frame: Frame) -> Any:
+    """A value of a file in SI units and RAS axes."""
+    if says.kind == "position":
+        return tuple(frame.lengths(value).tolist())
+    if says.kind == "vector":
+        return tuple((says.si * frame.directions(value)).tolist())
+    if says.kind == "numbers":
+        return tuple((says.si * np.asarray(value, dtype=float)).tolist())
+    return value if isinstance(value, str) else says.si * float(value)
 
 
-def _resection(context: Context, table: Reading) -> Resection | None:
-    resection = Resection(elements=table.get("elements", "resection"))
-    if context.mesh is None:
-        return None
-    try:
-        resection.remaining(context.mesh)
-    except InputError as error:
-        table.problem("elements", str(error))
-        return None
-    return resection
+def in_file(says: Says, value: Any, frame: Frame) -> Any:
+    """The same back: what a file says."""
+    if says.kind == "position":
+        return frame.file_lengths(value).tolist()
+    if says.kind == "vector":
+        return (frame.directions(value) / says.si).tolist()
+    if says.kind == "numbers":
+        return (np.asarray(value, dtype=float) / says.si).tolist()
+    return value if isinstance(value, str) else value / says.si
+
+
+def _note(context: Context, table: Reading, error: ParameterError) -> None:
+    if error.key in _CURES:
+        # of the case, not of this table; a wrong one is a problem already
+        if error.key not in context.tables.get("case", {}):
+            context.problems.add(context.file, f"[case] {error.key}", str(error), _CURES[error.key])
+    else:
+        table.problem(error.key, str(error))

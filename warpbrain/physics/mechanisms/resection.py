@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanism import Mechanism, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Resection:
+class Resection(Mechanism):
     """Removes the elements of a set before anything is computed; the cavity stays empty and its wall free.
 
     Parameters
@@ -22,7 +23,8 @@ class Resection:
         Name of the element set that was resected.
     """
 
-    elements: str = "resection"
+    elements: str = parameter("Element set that was taken out.", default="resection", kind="element set")
+    kind: ClassVar[str] = "resection"
     sentence: ClassVar[str] = "Tissue was taken out, and what it held moves into the cavity."
 
     def detail(self) -> str:

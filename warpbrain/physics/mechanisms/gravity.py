@@ -11,15 +11,18 @@ step smoothed over 3 mm. The second term is there only if the head was turned si
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Load
+from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, parameter
 
 #: Standard gravity [m/s2] as used by the verification cases of this project.
 STANDARD_GRAVITY = 9.81
@@ -30,7 +33,7 @@ SURFACE_WIDTH = 0.003
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gravity(Load):
+class Gravity(Load, Mechanism):
     """Weight that acts on tissue above the level of the cerebrospinal fluid.
 
     Parameters
@@ -50,9 +53,20 @@ class Gravity(Load):
 
     direction: tuple[float, float, float]
     density: float
-    csf_level: float | None = None
+    csf_level: float | None = parameter(
+        "Height of the fluid's surface against gravity, above the lowest point of the anatomy.",
+        default=None,
+        needed=True,
+        unit="mm",
+        si=1e-3,
+        expectation=Uniform(0.0, 160.0),
+        typical="the brain sinks by 5.7 mm in the mean, by 15 mm at most at the end of surgery",
+        source="Miga et al. 1999; Davson and Segal 1996 (density of the fluid)",
+    )
     lowest: float | None = None
     imaged_direction: tuple[float, float, float] | None = None
+    kind: ClassVar[str] = "gravity"
+    confused_with: ClassVar[tuple[str, ...]] = ("pressure", "swelling")
     sentence: ClassVar[str] = "Cerebrospinal fluid drained, and the brain sinks under the weight it no longer carries."
 
     def __post_init__(self) -> None:
@@ -62,6 +76,14 @@ class Gravity(Load):
             unit_vector("imaged gravity axis", self.imaged_direction)
         if self.csf_level is not None and not np.isfinite(self.csf_level):
             raise InputError(f"gravity: csf_level = {self.csf_level}: expected a finite height")
+
+    @classmethod
+    def of_case(cls, values: Mapping[str, Any], facts: Facts) -> Gravity:
+        if facts.gravity_axis is None:
+            raise ParameterError("gravity_axis", "missing, but [[mechanism]] gravity needs to know where 'down' is")
+        # counted from the whole anatomy: a resection must not move the datum
+        lowest = float((-facts.mesh.points @ unit_vector("gravity_axis", facts.gravity_axis)).min())
+        return cls(direction=facts.gravity_axis, density=facts.density, lowest=lowest, **values)
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""

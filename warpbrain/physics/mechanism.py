@@ -1,0 +1,211 @@
+"""What a mechanism is: a piece of physics that a case can assume, in one file with four faces.
+
+1. what it is: `kind`, `sentence` and `detail`;
+2. its parameters, the fields of the class made by `parameter`: unit, limits, what is expected of them and where that
+   is from. Keys of `case.toml`, arguments of `--with` and the page in the docs are made from them;
+3. what it does: a mechanism is also one of `Load` (forces that do not follow the deformation), `Following` (a term with
+   forces that do), `Altering` (other elements than the tissue's own) or `Removing` (fewer of them);
+4. what it is taken for (`confused_with`) and what must be observed to tell it apart (`needs`).
+
+Whoever lists mechanisms (reading, writing, simulation, diagnosis, docs) walks the registry,
+`warpbrain.physics.mechanisms`.
+"""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.expectation import Expectation
+from warpbrain.physics.ramp import Ramped
+from warpbrain.physics.term import Following
+
+__all__ = ["Altering", "Facts", "Following", "Mechanism", "ParameterError", "Removing", "Says", "parameter"]
+
+#: What the value of a parameter can be: a number, free text, the name of a node set with faces, of an element set, a
+#: position, a vector that is no length, or numbers.
+KINDS = ("number", "text", "node set", "element set", "position", "vector", "numbers")
+
+
+@dataclass(frozen=True)
+class Says:
+    """What is known of a parameter.
+
+    Attributes
+    ----------
+    doc : str
+        One sentence.
+    kind : str
+        One of `KINDS`.
+    unit : str
+        In which users give it.
+    si : float
+        How many of its SI unit one of these is.
+    above, below : float
+        Limits in the user's unit, themselves not allowed.
+    choices : tuple of str
+    needed : bool
+        Whether a case must give it, whatever default the class has.
+    expectation : Expectation or None
+        In the user's unit; None: never estimated.
+    typical : str
+        Range in the literature, with unit.
+    source : str
+    """
+
+    doc: str
+    kind: str = "number"
+    unit: str = ""
+    si: float = 1.0
+    above: float = -math.inf
+    below: float = math.inf
+    choices: tuple[str, ...] = ()
+    needed: bool = False
+    expectation: Expectation | None = None
+    typical: str = ""
+    source: str = ""
+
+
+def parameter(doc: str, *, default: Any = dataclasses.MISSING, **known: Any) -> Any:
+    """A field of a mechanism that users give; see `Says`."""
+    says = Says(doc, **known)
+    assert says.kind in KINDS, says.kind
+    return dataclasses.field(default=default, metadata={"says": says})
+
+
+class ParameterError(InputError):
+    """A parameter that is wrong.
+
+    Attributes
+    ----------
+    key : str
+        Its name.
+    """
+
+    def __init__(self, key: str, message: str) -> None:
+        super().__init__(message)
+        self.key = key
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a mechanism may know of the case that assumes it.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+        The imaged anatomy, whole.
+    gravity_axis : (float, float, float) or None
+    density : float
+        [kg/m3]
+    """
+
+    mesh: TetMesh
+    gravity_axis: tuple[float, float, float] | None = None
+    density: float = 1211.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mechanism(Ramped, abc.ABC):
+    """A piece of physics that a case assumes.
+
+    Parameters
+    ----------
+    ramp : sequence of (time, factor)
+    """
+
+    #: Its name in `case.toml`, on the command line and in a diagnosis.
+    kind: ClassVar[str]
+    #: What it is, in one sentence that a surgeon understands.
+    sentence: ClassVar[str]
+    #: Kinds of mechanisms that have nearly the same effect.
+    confused_with: ClassVar[tuple[str, ...]] = ()
+    #: What must be observed to tell it from others, in words; empty: one deformed state is enough.
+    needs: ClassVar[tuple[str, ...]] = ()
+    #: Whether a case can have several.
+    several: ClassVar[bool] = False
+
+    @classmethod
+    def parameters(cls) -> dict[str, Says]:
+        """What is known of each parameter, by name."""
+        return {f.name: f.metadata["says"] for f in dataclasses.fields(cls) if "says" in f.metadata}
+
+    @classmethod
+    def required(cls) -> tuple[str, ...]:
+        """Names of the parameters that a case must give."""
+        fields = (f for f in dataclasses.fields(cls) if "says" in f.metadata)
+        return tuple(f.name for f in fields if f.default is dataclasses.MISSING or f.metadata["says"].needed)
+
+    @classmethod
+    def of_case(cls, values: Mapping[str, Any], facts: Facts) -> Self:
+        """The mechanism of a case.
+
+        Parameters
+        ----------
+        values : mapping
+            Parameters in SI units and RAS axes, and the ramp.
+        facts : Facts
+
+        Raises
+        ------
+        ParameterError
+            If a parameter makes no sense in this case.
+        """
+        made = cls(**values)
+        made.check(facts.mesh)
+        return made
+
+    def check(self, mesh: TetMesh) -> None:
+        """Raise `ParameterError` if a parameter makes no sense with a mesh: a set that is not there, or is empty."""
+        for name, says in self.parameters().items():
+            if says.kind in ("node set", "element set"):
+                _require_set(name, says.kind, getattr(self, name), mesh)
+
+    def detail(self) -> str:
+        """What the sentence leaves open, for people to read."""
+        said = []
+        for name, says in self.parameters().items():
+            value = getattr(self, name)
+            if value is None or says.kind == "numbers":
+                continue
+            if isinstance(value, str):
+                said.append(f"{name} '{value}'")
+            else:
+                numbers = ", ".join(f"{v / says.si:g}" for v in np.ravel(value))
+                said.append(f"{name} {numbers}{f' {says.unit}' if says.unit else ''}")
+        return f" ({'; '.join(said)})" if said else ""
+
+
+def _require_set(key: str, kind: str, name: str, mesh: TetMesh) -> None:
+    sets = mesh.node_sets if kind == "node set" else mesh.element_sets
+    members = sets.get(name)
+    if members is None:
+        known = ", ".join(sorted(sets)) or "none"
+        raise ParameterError(key, f"the mesh has no {kind} '{name}' (it has {known})")
+    if not members.any():
+        raise ParameterError(key, f"the {kind} '{name}' is empty")
+
+
+@runtime_checkable
+class Altering(Protocol):
+    """A mechanism that changes what the tissue's own elements do."""
+
+    def stiffness_factor(self, mesh: TetMesh) -> NDArray[np.float64]:
+        """Factor (m,) on all moduli of each element at full action."""
+
+
+@runtime_checkable
+class Removing(Protocol):
+    """A mechanism that takes elements away before anything is computed."""
+
+    def remaining(self, mesh: TetMesh) -> tuple[TetMesh, NDArray[np.int32]]:
+        """The mesh that is left, and for each of its nodes the id in the whole mesh."""

@@ -1,0 +1,39 @@
+"""What acts need not act at once, or all the time."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from warpbrain.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ramped:
+    """Something that acts with a factor over time.
+
+    Parameters
+    ----------
+    ramp : sequence of (time, factor)
+        Factor over time [s], linear between the points and constant outside them; 1 if empty.
+    """
+
+    ramp: Sequence[tuple[float, float]] = field(default=())
+
+    def __post_init__(self) -> None:
+        times = [t for t, _ in self.ramp]
+        if not np.all(np.isfinite(np.asarray(self.ramp, dtype=float))):
+            raise InputError(f"ramp = {list(self.ramp)}: times and factors must be finite")
+        if any(b <= a for a, b in itertools.pairwise(times)):
+            raise InputError(f"ramp = {list(self.ramp)}: times must increase")
+
+    def factor(self, time: float = math.inf) -> float:
+        """The ramp's factor at a time [s]; by default long after everything."""
+        if not self.ramp:
+            return 1.0
+        times, factors = zip(*self.ramp, strict=True)
+        return float(np.interp(time, times, factors))

@@ -1,0 +1,114 @@
+"""What a term is: something that acts on a body with forces that follow its deformation.
+
+A mechanism (`warpbrain.physics.mechanism`) is what a user says; a term is what becomes of it on a device. It has a
+family of stencils, each a few nodes on which it acts together (the three of a triangle under pressure, the four of a
+tetrahedron), and writes the forces and tangent blocks of each into arrays that the system then sums in a fixed order.
+The system knows no term by name.
+"""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.kernels.precision import Precision
+from warpbrain.mesh import TetMesh
+
+Ints = NDArray[np.int32]
+
+
+class Body(Protocol):
+    """What a term may know of the system that it becomes part of."""
+
+    @property
+    def mesh(self) -> TetMesh:
+        """The reference shape."""
+
+    @property
+    def device(self) -> Any:
+        """Warp device."""
+
+    @property
+    def precision(self) -> Precision:
+        """Of every array."""
+
+
+class Term(abc.ABC):
+    """A family of stencils with forces, tangent blocks and, if there is one, an energy.
+
+    Forces are internal ones: minus what pushes the nodes. The tangent is symmetric: conjugate gradients need that, and
+    of a term that is not, the symmetric part is taken, at the price of a slower Newton's method.
+
+    Parameters
+    ----------
+    body : Body
+    stencils : (k, s) int array
+        Node ids, ascending in each row.
+
+    Attributes
+    ----------
+    scale : wp.array, shape (1,)
+        Factor on what it does, from 0 to 1 in load steps, times its ramp over time. On the device, so that a captured
+        graph follows it.
+    forces : wp.array of vec3, shape (k, s)
+        [N]
+    blocks : wp.array of mat33, shape (k, s (s + 1) / 2)
+        Tangent blocks [N/m] of the node pairs (a, b), a <= b, row by row.
+    """
+
+    #: Whether `energy` is the potential of the forces. If not, the work along a step stands for its change.
+    conservative: bool = True
+
+    def __init__(self, body: Body, stencils: NDArray[np.integer]) -> None:
+        self.body = body
+        self.stencils = np.ascontiguousarray(stencils, dtype=np.int32)
+        assert bool(np.all(np.diff(self.stencils, axis=1) > 0)), "nodes of a stencil ascend"
+        self.scale = wp.ones(1, dtype=body.precision.scalar, device=body.device)
+        self.forces: wp.array = None
+        self.blocks: wp.array = None
+
+    def place(self, forces: wp.array, blocks: wp.array) -> None:
+        """Take the arrays that forces and blocks are written to."""
+        self.forces, self.blocks = forces, blocks
+
+    def factor(self, time: float) -> float:
+        """Factor of its ramp at a time [s]."""
+        return 1.0
+
+    def set_scale(self, scale: float) -> None:
+        """Set the factor on what it does."""
+        self.scale.fill_(scale)
+
+    def set_time_step(self, h: float) -> None:  # noqa: B027  (most terms have no memory)
+        """Tell a term with a memory how long the coming steps are [s]; infinite in an equilibrium."""
+
+    def advance(self, u: wp.array) -> None:  # noqa: B027
+        """Tell a term with a memory that a step has ended at a displacement [m]."""
+
+    @abc.abstractmethod
+    def evaluate_forces(self, u: wp.array) -> None:
+        """Write the forces at a displacement [m]."""
+
+    @abc.abstractmethod
+    def evaluate_tangents(self, u: wp.array) -> None:
+        """Write forces and blocks."""
+
+    @abc.abstractmethod
+    def energy(self, u: wp.array) -> float:
+        """Potential [J]; 0 if there is none."""
+
+    def array(self, values: Any, dtype: Any) -> wp.array:
+        """An array on the body's device."""
+        return wp.array(values, dtype=dtype, device=self.body.device)
+
+
+@runtime_checkable
+class Following(Protocol):
+    """What makes a term of itself: a mechanism whose forces follow the deformation."""
+
+    def bind(self, body: Body) -> Term:
+        """The term on a body."""
