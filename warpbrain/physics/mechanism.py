@@ -3,8 +3,9 @@
 1. what it is: `kind`, `sentence` and `detail`;
 2. its parameters, the fields of the class made by `parameter`: unit, limits, what is expected of them and where that
    is from. Keys of `case.toml`, arguments of `--with` and the page in the docs are made from them;
-3. what it does: a mechanism is also one of `Load` (forces that do not follow the deformation), `Following` (a term with
-   forces that do), `Altering` (other elements than the tissue's own) or `Removing` (fewer of them);
+3. what it does: a mechanism is also one or several of `Load` (forces that do not follow the deformation), `Following`
+   (a term with forces that do), `Weakening` (softer or stiffer elements), `Growing` (larger or smaller ones),
+   `Substituting` (another law) and `Removing` (fewer elements);
 4. what it is taken for (`confused_with`) and what must be observed to tell it apart (`needs`).
 
 Whoever lists mechanisms (reading, writing, simulation, diagnosis, docs) walks the registry,
@@ -26,10 +27,22 @@ from numpy.typing import NDArray
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Expectation
+from warpbrain.physics.laws import Law
 from warpbrain.physics.ramp import Ramped
 from warpbrain.physics.term import Following
 
-__all__ = ["Altering", "Facts", "Following", "Mechanism", "ParameterError", "Removing", "Says", "parameter"]
+__all__ = [
+    "Facts",
+    "Following",
+    "Growing",
+    "Mechanism",
+    "ParameterError",
+    "Removing",
+    "Says",
+    "Substituting",
+    "Weakening",
+    "parameter",
+]
 
 #: What the value of a parameter can be: a number, free text, the name of a node set with faces, of an element set, a
 #: position, a vector that is no length, or numbers.
@@ -167,7 +180,7 @@ class Mechanism(Ramped, abc.ABC):
     def check(self, mesh: TetMesh) -> None:
         """Raise `ParameterError` if a parameter makes no sense with a mesh: a set that is not there, or is empty."""
         for name, says in self.parameters().items():
-            if says.kind in ("node set", "element set"):
+            if says.kind in ("node set", "element set") and getattr(self, name):
                 _require_set(name, says.kind, getattr(self, name), mesh)
 
     def detail(self) -> str:
@@ -175,7 +188,7 @@ class Mechanism(Ramped, abc.ABC):
         said = []
         for name, says in self.parameters().items():
             value = getattr(self, name)
-            if value is None or says.kind == "numbers":
+            if value is None or value == "" or says.kind == "numbers":
                 continue
             if isinstance(value, str):
                 said.append(f"{name} '{value}'")
@@ -196,11 +209,27 @@ def _require_set(key: str, kind: str, name: str, mesh: TetMesh) -> None:
 
 
 @runtime_checkable
-class Altering(Protocol):
-    """A mechanism that changes what the tissue's own elements do."""
+class Weakening(Protocol):
+    """A mechanism that makes the tissue's own elements softer or stiffer."""
 
-    def stiffness_factor(self, mesh: TetMesh) -> NDArray[np.float64]:
-        """Factor (m,) on all moduli of each element at full action."""
+    def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+        """Factor (m,) on all moduli of each element, where the mechanism acts with a scale from 0 to 1."""
+
+
+@runtime_checkable
+class Growing(Protocol):
+    """A mechanism that makes the tissue's own elements larger or smaller."""
+
+    def growth(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+        """Relative change of volume (m,) of each element without stress, at a scale from 0 to 1."""
+
+
+@runtime_checkable
+class Substituting(Protocol):
+    """A mechanism that says that tissues have another law, or another compressibility, than the case says."""
+
+    def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
+        """Law, Poisson ratio and formulation of a tissue."""
 
 
 @runtime_checkable

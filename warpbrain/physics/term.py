@@ -36,6 +36,22 @@ class Body(Protocol):
     def precision(self) -> Precision:
         """Of every array."""
 
+    @property
+    def tetrahedra(self) -> NDArray[np.integer]:
+        """Nodes (m, 4) of each element, ascending."""
+
+    @property
+    def nodes(self) -> wp.array:
+        """The same on the device."""
+
+    @property
+    def inverse_edges(self) -> wp.array:
+        """Gradients of the shape functions of nodes 1 to 3 as rows, (m,) mat33 [1/m]."""
+
+    @property
+    def shear_moduli(self) -> NDArray[np.float64]:
+        """At rest, of each element (m,) [Pa]."""
+
 
 class Term(abc.ABC):
     """A family of stencils with forces, tangent blocks and, if there is one, an energy.

@@ -14,7 +14,7 @@ from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import Law
 from warpbrain.physics.load import Load
-from warpbrain.physics.term import Following
+from warpbrain.physics.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -99,7 +99,7 @@ class Model:
         Their values [m] at full load; zero where not given.
     loads : sequence of Load
         Forces that do not follow the deformation.
-    mechanisms : sequence of Following
+    mechanisms : sequence of Mechanism
         What else acts, each a file of `warpbrain.physics.mechanisms`.
     motions : sequence of Motion
         Histories of prescribed displacements, which end at `prescribed`.
@@ -117,7 +117,7 @@ class Model:
     constrained: Bools = None  # type: ignore[assignment]  # nothing constrained
     prescribed: Floats = None  # type: ignore[assignment]  # zero
     loads: Sequence[Load] = ()
-    mechanisms: Sequence[Following] = ()
+    mechanisms: Sequence[Mechanism] = ()
     motions: Sequence[Motion] = ()
     damping: Damping = field(default_factory=Damping)
 

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.boundary import Displaced, Fixed, Forced, Pressed
-from warpbrain.cases.case import Case
+from warpbrain.cases.case import Case, Tissue
 from warpbrain.errors import InputError
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
+from warpbrain.physics.mechanism import Removing, Substituting
 from warpbrain.physics.mechanisms.pressure import Pressure
-from warpbrain.physics.term import Following
 from warpbrain.simulation.model import Material, Model, Motion
 
 
@@ -37,7 +37,7 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
     constrained = np.zeros(mesh.points.shape, dtype=bool)
     prescribed = np.zeros(mesh.points.shape)
     loads: list[Load] = [m for m in case.mechanisms if isinstance(m, Load)]
-    following: list[Following] = [m for m in case.mechanisms if isinstance(m, Following)]
+    mechanisms = [m for m in case.mechanisms if not isinstance(m, Removing | Load)]
     motions: list[Motion] = []
     for boundary in case.boundaries:
         members = case.mesh.node_sets[boundary.nodes][nodes]
@@ -50,16 +50,25 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
         elif isinstance(boundary, Forced):
             loads.append(NodalForce(nodes=boundary.nodes, total=boundary.total, ramp=boundary.ramp))
         elif isinstance(boundary, Pressed):
-            following.append(Pressure(nodes=boundary.nodes, value=boundary.value, ramp=boundary.ramp))
+            mechanisms.append(Pressure(nodes=boundary.nodes, value=boundary.value, ramp=boundary.ramp))
         elif not isinstance(boundary, Fixed):
             raise InputError(
                 f"{case.path}: [[boundary]] '{boundary.name}' kind: '{boundary.kind}' cannot be simulated yet"
             )
     try:
         materials = {
-            label: Material(tissue.known_law, case.poisson, tissue.formulation)
+            label: _material(case, label, tissue.known_law, tissue.formulation)
             for label, tissue in case.tissues.items()
         }
     except InputError as error:
         raise InputError(f"{case.path}: [tissue] {error}") from None
-    return Model(mesh, materials, case.density, constrained, prescribed, loads, following, motions), nodes
+    return Model(mesh, materials, case.density, constrained, prescribed, loads, mechanisms, motions), nodes
+
+
+def _material(case: Case, label: int, tissue: Tissue) -> Material:
+    """The material of a tissue, as mechanisms that say something of it have it."""
+    law, poisson, formulation = tissue.known_law, case.poisson, tissue.formulation
+    for mechanism in case.mechanisms:
+        if isinstance(mechanism, Substituting):
+            law, poisson, formulation = mechanism.substitute(label, law, poisson, formulation)
+    return Material(law, poisson, formulation)

@@ -20,6 +20,8 @@ from warpbrain.kernels.precision import PRECISIONS, Precision
 from warpbrain.kernels.tetrahedron import PAIRS, ElementKernels
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import Law
+from warpbrain.physics.laws.grown import grown
+from warpbrain.physics.mechanism import Following, Growing, Weakening
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.pattern import build_pattern
 
@@ -104,10 +106,15 @@ class System:
         self.elements = len(model.mesh.tetrahedra)
         self._kernels = assembly_kernels(self.precision)
         self._place_mesh()
-        self.terms = [mechanism.bind(self) for mechanism in model.mechanisms]
+        self.terms = [m.bind(self) for m in model.mechanisms if isinstance(m, Following)]
+        self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
+        self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
+        self._scales: tuple[float, ...] | None = None
         self._place_pattern()
+        self._growth_stretch: Floats | float = 1.0
         self.groups = self._group_elements()
         self._place_fields()
+        self.set_load()
         self.seconds = time.perf_counter() - start
 
     # -- pre-processing -------------------------------------------------------------------------------------------
@@ -150,7 +157,8 @@ class System:
         groups = []
         for (law_type, formulation), materials in self._grouped(self.model).items():
             members = np.flatnonzero(np.isin(self.model.mesh.tissue, list(materials)))
-            kernels = law_type.device_law(formulation).kernels(self.precision)
+            device_law = law_type.device_law(formulation)
+            kernels = (grown(device_law) if self._growing else device_law).kernels(self.precision)
             parameters = self._array(self._parameters(law_type, materials), self.precision.scalar)
             groups.append(ElementGroup(kernels, self._array(members, int), parameters))
         return groups
@@ -165,11 +173,14 @@ class System:
         return by_code
 
     def _parameters(self, law_type: type[Law], materials: Mapping[int, Material]) -> Floats:
-        """Parameters by element; zero where it is of no tissue of the group."""
+        """Parameters by element; 1 where it is of no tissue of the group."""
         rows = law_type.parameter_rows([material.law for material in materials.values()])
-        parameters = np.zeros((self.elements, 1 + len(rows[0])))
+        # the last column, where something grows, is the growth stretch
+        parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self._growing)))
         for (label, material), row in zip(materials.items(), rows, strict=True):
-            parameters[self.model.mesh.tissue == label] = (material.volumetric_modulus, *row)
+            parameters[self.model.mesh.tissue == label, : 1 + len(row)] = (material.volumetric_modulus, *row)
+        if self._growing:
+            parameters[:, -1] = self._growth_stretch
         return parameters
 
     def set_materials(self, materials: Mapping[int, Material]) -> None:
@@ -366,6 +377,24 @@ class System:
         """Let terms act with a share of what they do at a time [s]; by default in full, long after every ramp."""
         for term in self.terms:
             term.set_scale(share * term.factor(time))
+        altering = (*self._growing, *self._weakening)
+        scales = tuple(share * mechanism.factor(time) for mechanism in altering)
+        if scales == self._scales:
+            return
+        self._scales = scales
+        mesh = self.model.mesh
+        if self._weakening:
+            factor = np.ones(self.elements)
+            for mechanism, scale in zip(self._weakening, scales[len(self._growing) :], strict=True):
+                factor *= mechanism.stiffness_factor(mesh, scale)
+            # a kernel multiplies all that an element does by its volume
+            self.volume.assign(factor * mesh.volumes)
+        if self._growing:
+            change = np.ones(self.elements)
+            for mechanism, scale in zip(self._growing, scales, strict=False):
+                change *= 1.0 + mechanism.growth(mesh, scale)
+            self._growth_stretch = np.cbrt(change)
+            self.set_materials(self.model.materials)
 
     def forces_without_potential(self) -> Floats:
         """Sum of the forces [N], shape (n, 3), at `u` of the terms that have no potential."""
@@ -375,6 +404,12 @@ class System:
                 term.evaluate_forces(self.u)
                 np.add.at(total, term.stencils, term.forces.numpy())
         return total
+
+    @property
+    def shear_moduli(self) -> Floats:
+        """Shear modulus at rest of each element [Pa], shape (m,)."""
+        moduli = {label: material.law.shear_modulus for label, material in self.model.materials.items()}
+        return np.array([moduli[label] for label in self.model.mesh.tissue.tolist()])
 
     @property
     def mesh(self) -> TetMesh:

@@ -1,0 +1,97 @@
+"""Kernels of energies that are added to a tetrahedron's own: functions of `F` with a direction or a tensor.
+
+A term brings two device functions of the deformation gradient and of a row of numbers of its element:
+
+    energy(F, data, e) -> Psi [Pa]
+    moduli(F, g, h, data, e) -> g . dP/dF . h [Pa/m2] for two gradients of shape functions, symmetric in its use
+    stress(F, data, e) -> P [Pa]
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks, store_forces
+
+
+@cache
+def extra_kernels(key: str, energy: Any, stress: Any, moduli: Any, precision: Precision) -> tuple[Any, Any, Any]:
+    """Kernels for forces, forces with tangent blocks, and energies, with one thread for an element of a list.
+
+    Parameters
+    ----------
+    key : str
+        Part of the name of the compiled module.
+    energy, stress, moduli : wp.func
+    precision : Precision
+    """
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = compiled_module(f"{key}_{precision.name}")
+
+    @wp.kernel(module=module)
+    def forces(
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        data: wp.array2d[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        element_forces: wp.array2d[vec3],
+    ):
+        t = wp.tid()
+        e = elements[t]
+        G = inverse_edges[e]
+        F = deformation_gradient(u, nodes[e], G)
+        store_forces(scale[0] * volume[t] * stress(F, data, t), G, element_forces, t)
+
+    @wp.kernel(module=module)
+    def tangents(
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        data: wp.array2d[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        element_forces: wp.array2d[vec3],
+        element_blocks: wp.array2d[mat33],
+    ):
+        t = wp.tid()
+        e = elements[t]
+        G = inverse_edges[e]
+        F = deformation_gradient(u, nodes[e], G)
+        V = scale[0] * volume[t]
+        store_forces(V * stress(F, data, t), G, element_forces, t)
+        a, b, c = G[0], G[1], G[2]
+        store_blocks(
+            V * moduli(F, a, a, data, t),
+            V * moduli(F, a, b, data, t),
+            V * moduli(F, a, c, data, t),
+            V * moduli(F, b, b, data, t),
+            V * moduli(F, b, c, data, t),
+            V * moduli(F, c, c, data, t),
+            element_blocks,
+            t,
+        )
+
+    @wp.kernel(module=module)
+    def energies(
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        data: wp.array2d[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array[scalar],
+    ):
+        t = wp.tid()
+        e = elements[t]
+        F = deformation_gradient(u, nodes[e], inverse_edges[e])
+        out[t] = scale[0] * volume[t] * energy(F, data, t)
+
+    return forces, tangents, energies

@@ -1,0 +1,74 @@
+"""A term whose energy is added to that of tetrahedra: fibres, residual stress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.kernels.extra_energy import extra_kernels
+from warpbrain.physics.term import Body, Term
+
+
+@dataclass(frozen=True)
+class ExtraEnergy:
+    """Device functions of an added energy; see `warpbrain.kernels.extra_energy`."""
+
+    key: str
+    energy: Any
+    stress: Any
+    moduli: Any
+
+
+class ExtraEnergyTerm(Term):
+    """An added energy on some elements of a body.
+
+    Parameters
+    ----------
+    body : Body
+    code : ExtraEnergy
+    elements : (k,) int array
+    data : (k, c) array
+        The numbers of each of these elements.
+    factor : callable
+        Of time [s]: the ramp.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        code: ExtraEnergy,
+        elements: NDArray[np.integer],
+        data: NDArray[np.float64],
+        factor: Callable[[float], float],
+    ) -> None:
+        super().__init__(body, body.tetrahedra[elements])
+        scalar = body.precision.scalar
+        self._factor = factor
+        self._kernels = extra_kernels(code.key, code.energy, code.stress, code.moduli, body.precision)
+        self._elements = self.array(elements, int)
+        self._volume = self.array(body.mesh.volumes[elements], scalar)
+        self._data = self.array(data, scalar)
+        self._energies = wp.zeros(len(elements), dtype=scalar, device=body.device)
+
+    def factor(self, time: float) -> float:
+        return self._factor(time)
+
+    def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
+        body = self.body
+        inputs = [self._elements, body.nodes, body.inverse_edges, self._volume, self._data, self.scale, u, *outputs]
+        wp.launch(kernel, dim=len(self._elements), inputs=inputs, device=body.device)
+
+    def evaluate_forces(self, u: wp.array) -> None:
+        self._launch(self._kernels[0], u, self.forces)
+
+    def evaluate_tangents(self, u: wp.array) -> None:
+        self._launch(self._kernels[1], u, self.forces, self.blocks)
+
+    def energy(self, u: wp.array) -> float:
+        self._launch(self._kernels[2], u, self._energies)
+        return float(np.sum(self._energies.numpy(), dtype=np.float64))

@@ -1,0 +1,47 @@
+"""Tissue that resists compression more than tension: Ogden's law of one term in the place of the case's own.
+
+    Psi = (2 mu0 / alpha^2) (sum_i l_i^alpha - 3) + ...      of the same shear modulus at rest
+
+An exponent of 2 is the neo-Hookean law; a negative one stiffens in compression.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from warpbrain.physics.expectation import Normal
+from warpbrain.physics.laws import Law
+from warpbrain.physics.laws.ogden import Ogden
+from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asymmetry(Mechanism):
+    """Tension-compression asymmetry of all tissues.
+
+    Parameters
+    ----------
+    exponent : float
+        `alpha`, not zero.
+    """
+
+    exponent: float = parameter(
+        "Ogden's exponent; 2 is the neo-Hookean law, a negative one stiffens in compression.",
+        expectation=Normal(2.0, 15.0),
+        typical="-24 to -17 in specimens, -19 in vivo, -4.7 in the classic test",
+        source="Budday et al. 2017; Bennion et al. 2022; Miller and Chinzei 2002 (diagnosis design, M12)",
+    )
+    kind: ClassVar[str] = "asymmetry"
+    sentence: ClassVar[str] = "Tissue resists compression more than tension."
+    confused_with: ClassVar[tuple[str, ...]] = ("fibres",)
+    needs: ClassVar[tuple[str, ...]] = ("regions or tests both in compression and in tension",)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.exponent == 0.0:
+            raise ParameterError("exponent", "found 0, which has no energy")
+
+    def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
+        """See `warpbrain.physics.mechanism.Substituting`."""
+        return Ogden((2.0 * law.shear_modulus / self.exponent,), (self.exponent,)), poisson, formulation

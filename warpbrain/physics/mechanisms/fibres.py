@@ -1,0 +1,141 @@
+"""Fibres: tissue that stiffens along a direction when it is stretched (Gasser, Ogden and Holzapfel 2006).
+
+    Psi = k1/(2 k2) (exp(k2 E^2) - 1),   E = max(0, d (I1 - 3) + (1 - 3 d) (I4 - 1)),   I4 = |F a|^2
+
+with the direction `a`, dispersion `d` from 0 (all parallel) to 1/3 (none preferred). With `H = dE/dF = 2 d F +
+2 (1 - 3 d) F a (x) a`, `P = k1 E exp(k2 E^2) H`. What `I1` adds beside `I4` is the scatter of the fibres.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+
+from warpbrain.errors import InputError
+from warpbrain.physics.expectation import LogNormal, Uniform
+from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
+from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.regions import elements_of
+from warpbrain.physics.term import Body
+
+
+@wp.func
+def _strain(F: Any, a: Any, d: Any):
+    zero = a.dtype(0.0)
+    three = a.dtype(3.0)
+    stretched = F * a
+    E = d * (wp.ddot(F, F) - three) + (a.dtype(1.0) - three * d) * (wp.dot(stretched, stretched) - a.dtype(1.0))
+    return wp.max(E, zero)
+
+
+@wp.func
+def _direction(F: Any, data: wp.array2d[Any], e: int):
+    return wp.vector(data[e, 3], data[e, 4], data[e, 5])
+
+
+@wp.func
+def _energy(F: Any, data: wp.array2d[Any], e: int):
+    k1 = data[e, 0]
+    k2 = data[e, 1]
+    E = _strain(F, _direction(F, data, e), data[e, 2])
+    return k1 / (type(k1)(2.0) * k2) * (wp.exp(k2 * E * E) - type(k1)(1.0))
+
+
+@wp.func
+def _stress(F: Any, data: wp.array2d[Any], e: int):
+    k1 = data[e, 0]
+    k2 = data[e, 1]
+    d = data[e, 2]
+    a = _direction(F, data, e)
+    E = _strain(F, a, d)
+    two = type(k1)(2.0)
+    return k1 * E * wp.exp(k2 * E * E) * two * (d * F + (type(k1)(1.0) - type(k1)(3.0) * d) * wp.outer(F * a, a))
+
+
+@wp.func
+def _moduli(F: Any, g: Any, h: Any, data: wp.array2d[Any], e: int):
+    k1 = data[e, 0]
+    k2 = data[e, 1]
+    d = data[e, 2]
+    a = _direction(F, data, e)
+    E = _strain(F, a, d)
+    one = type(k1)(1.0)
+    two = type(k1)(2.0)
+    along = one - type(k1)(3.0) * d
+    grown = wp.exp(k2 * E * E)
+    first = k1 * E * grown
+    # of max(0, E): none where fibres are slack
+    second = type(k1)(0.0)
+    if type(k1)(0.0) < E:
+        second = k1 * grown * (one + two * k2 * E * E)
+    stretched = F * a
+    Hg = two * (d * (F * g) + along * wp.dot(a, g) * stretched)
+    Hh = two * (d * (F * h) + along * wp.dot(a, h) * stretched)
+    K = second * wp.outer(Hg, Hh)
+    isotropic = first * two * (d * wp.dot(g, h) + along * wp.dot(a, g) * wp.dot(a, h))
+    K[0, 0] += isotropic
+    K[1, 1] += isotropic
+    K[2, 2] += isotropic
+    return K
+
+
+_CODE = ExtraEnergy("fibres", _energy, _stress, _moduli)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fibres(Mechanism):
+    """Fibres of one direction in all tissue or in an element set.
+
+    Parameters
+    ----------
+    direction : (float, float, float)
+        Of any length but zero.
+    stiffness : float
+        `k1` [Pa].
+    exponent : float
+        `k2`.
+    dispersion : float
+        `d`, 0 to 1/3.
+    elements : str
+        Element set; empty: everywhere.
+    """
+
+    direction: tuple[float, float, float] = parameter("Direction of the fibres.", kind="vector")
+    stiffness: float = parameter(
+        "k1, of the fibres together.",
+        unit="Pa",
+        above=0.0,
+        expectation=LogNormal(300.0, 3.0),
+        typical="anisotropy of -3 to 16 % in shear, 0.6 to 1.1 in tension",
+        source="diagnosis design, M10; Gasser, Ogden and Holzapfel 2006",
+    )
+    exponent: float = parameter("k2, how they stiffen.", default=1.0, above=0.0, expectation=LogNormal(1.0, 3.0))
+    dispersion: float = parameter(
+        "How they scatter: 0 all parallel, 1/3 no direction.",
+        default=0.0,
+        above=-1e-12,
+        below=1.0 / 3.0 + 1e-12,
+        expectation=Uniform(0.0, 1.0 / 3.0),
+    )
+    elements: str = parameter("Element set that has them.", default="", kind="element set")
+    kind: ClassVar[str] = "fibres"
+    sentence: ClassVar[str] = "Nerve fibres make the tissue stiffer along their direction."
+    confused_with: ClassVar[tuple[str, ...]] = ("asymmetry", "inclusion")
+    needs: ClassVar[tuple[str, ...]] = ("loads along and across the fibres",)
+    several: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not any(self.direction) or not np.all(np.isfinite(self.direction)):
+            raise ParameterError("direction", f"found {list(self.direction)}, expected 3 numbers that are not all zero")
+        for name in ("stiffness", "exponent"):
+            if not getattr(self, name) > 0.0:
+                raise InputError(f"fibres: {name} = {getattr(self, name)}: expected a positive number")
+
+    def bind(self, body: Body) -> ExtraEnergyTerm:
+        """See `warpbrain.physics.term.Following`."""
+        elements = elements_of(body.mesh, self.elements)
+        a = np.asarray(self.direction) / np.linalg.norm(self.direction)
+        row = [self.stiffness, self.exponent, self.dispersion, *a]
+        return ExtraEnergyTerm(body, _CODE, elements, np.tile(row, (len(elements), 1)), self.factor)

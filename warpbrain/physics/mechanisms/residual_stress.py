@@ -1,0 +1,86 @@
+"""Residual stress: tissue that is under tension before anything is done to it.
+
+    Psi = 1/2 S0 : (C - I),   P = F S0,   S0 = sigma a (x) a
+
+White matter is under tension along its tracts (Xu et al. 2009). Where `S0` changes from place to place it deforms the
+body that holds it; a constant one on a body that is free does too. The imaged shape is taken as the one before this
+tension acted.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+
+from warpbrain.physics.expectation import Normal
+from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
+from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.regions import elements_of
+from warpbrain.physics.term import Body
+
+
+@wp.func
+def _direction(data: wp.array2d[Any], e: int):
+    return wp.vector(data[e, 1], data[e, 2], data[e, 3])
+
+
+@wp.func
+def _energy(F: Any, data: wp.array2d[Any], e: int):
+    stretched = F * _direction(data, e)
+    return type(stretched[0])(0.5) * data[e, 0] * (wp.dot(stretched, stretched) - type(stretched[0])(1.0))
+
+
+@wp.func
+def _stress(F: Any, data: wp.array2d[Any], e: int):
+    a = _direction(data, e)
+    return data[e, 0] * wp.outer(F * a, a)
+
+
+@wp.func
+def _moduli(F: Any, g: Any, h: Any, data: wp.array2d[Any], e: int):
+    a = _direction(data, e)
+    return data[e, 0] * wp.dot(a, g) * wp.dot(a, h) * wp.identity(n=3, dtype=F.dtype)
+
+
+_CODE = ExtraEnergy("residual_stress", _energy, _stress, _moduli)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResidualStress(Mechanism):
+    """A tension along one direction in all tissue or in an element set.
+
+    Parameters
+    ----------
+    tension : float
+        `sigma` [Pa]; negative is compression.
+    direction : (float, float, float)
+        Of any length but zero.
+    elements : str
+        Element set; empty: everywhere.
+    """
+
+    tension: float = parameter(
+        "Stress before anything is done; negative is compression.",
+        unit="Pa",
+        expectation=Normal(0.0, 300.0),
+        typical="100 to 1000 Pa along white-matter tracts of mice",
+        source="Xu et al. 2009 (diagnosis design, M13)",
+    )
+    direction: tuple[float, float, float] = parameter("Direction of the tension.", kind="vector")
+    elements: str = parameter("Element set that is under it.", default="", kind="element set")
+    kind: ClassVar[str] = "residual-stress"
+    sentence: ClassVar[str] = "Tissue is under tension before anything is done to it."
+    confused_with: ClassVar[tuple[str, ...]] = ("swelling",)
+    several: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not any(self.direction) or not np.all(np.isfinite(self.direction)):
+            raise ParameterError("direction", f"found {list(self.direction)}, expected 3 numbers that are not all zero")
+
+    def bind(self, body: Body) -> ExtraEnergyTerm:
+        """See `warpbrain.physics.term.Following`."""
+        elements = elements_of(body.mesh, self.elements)
+        row = [self.tension, *(np.asarray(self.direction) / np.linalg.norm(self.direction))]
+        return ExtraEnergyTerm(body, _CODE, elements, np.tile(row, (len(elements), 1)), self.factor)

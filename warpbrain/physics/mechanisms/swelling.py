@@ -1,0 +1,59 @@
+"""Swelling or shrinkage: tissue would have another volume if nothing held it.
+
+`F = F_e F_g` with `F_g = (1 + g)^(1/3) I`; only `F_e` makes stress (Rodriguez et al. 1994). See
+`warpbrain.physics.laws.grown`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.expectation import Normal
+from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.regions import region_weights
+
+
+@dataclass(frozen=True, kw_only=True)
+class Swelling(Mechanism):
+    """A change of volume of all tissue, of an element set or of a ball.
+
+    Parameters
+    ----------
+    amount : float
+        `g`, relative change of volume without stress; above -1.
+    elements : str
+        Element set; empty: everywhere.
+    centre, radius : optional
+        A ball in its place [m].
+    """
+
+    amount: float = parameter(
+        "Relative change of volume where nothing holds the tissue; negative shrinks.",
+        unit="%",
+        si=1e-2,
+        above=-90.0,
+        below=400.0,
+        expectation=Normal(0.0, 3.0),
+        typical="mannitol takes 5 % of the water of white matter; oedema adds up to 30 %",
+        source="diagnosis design, M7",
+    )
+    elements: str = parameter("Element set that swells.", default="", kind="element set")
+    centre: tuple[float, float, float] | None = parameter("Centre of a ball.", default=None, kind="position")
+    radius: float | None = parameter("Its radius.", default=None, unit="mm", si=1e-3, above=0.0)
+    kind: ClassVar[str] = "swelling"
+    sentence: ClassVar[str] = "Tissue takes up or loses water, and swells or shrinks."
+    confused_with: ClassVar[tuple[str, ...]] = ("pressure", "gravity")
+    several: ClassVar[bool] = True
+
+    def check(self, mesh: TetMesh) -> None:
+        super().check(mesh)
+        region_weights(mesh, self.elements, self.centre, self.radius)
+
+    def growth(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+        """See `warpbrain.physics.mechanism.Growing`."""
+        return scale * self.amount * region_weights(mesh, self.elements, self.centre, self.radius)

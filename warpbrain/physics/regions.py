@@ -1,0 +1,55 @@
+"""Where in a body something is: a ball, an element set, or all of it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanism import ParameterError
+
+Floats = NDArray[np.float64]
+
+
+def region_weights(
+    mesh: TetMesh, elements: str, centre: tuple[float, float, float] | None, radius: float | None
+) -> Floats:
+    """How much each element belongs to a region, 0 to 1, shape (m,).
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    elements : str
+        Element set; empty: not by a set.
+    centre : (float, float, float) or None
+        Of a ball [m].
+    radius : float or None
+        Of the ball [m]; its weight falls smoothly from 1 at its centre to 0 at twice this distance, and is 1/2 at the
+        radius.
+
+    Raises
+    ------
+    ParameterError
+        If both a set and a ball are given, or half a ball, or the region holds nothing.
+    """
+    if (centre is None) != (radius is None):
+        missing = "radius" if radius is None else "centre"
+        raise ParameterError(missing, "missing: a ball has a centre and a radius")
+    if centre is None or radius is None:
+        if not elements:
+            return np.ones(len(mesh.tetrahedra))
+        weights = mesh.element_sets[elements].astype(np.float64)
+    elif elements:
+        raise ParameterError("elements", "given beside centre and radius: a region is a set or a ball")
+    else:
+        middles = mesh.points[mesh.tetrahedra].mean(axis=1)
+        part = np.clip(np.linalg.norm(middles - np.asarray(centre), axis=1) / radius, 0.0, 2.0)
+        weights = 0.5 * (1.0 + np.cos(0.5 * np.pi * part))
+    if not weights.any():
+        raise ParameterError("centre" if centre is not None else "elements", "no element is in this region")
+    return weights
+
+
+def elements_of(mesh: TetMesh, elements: str) -> NDArray[np.int64]:
+    """Ids of the elements of a set; all of them for an empty name."""
+    return np.flatnonzero(mesh.element_sets[elements]) if elements else np.arange(len(mesh.tetrahedra))
