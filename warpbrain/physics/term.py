@@ -105,6 +105,9 @@ class Term(abc.ABC):
     def advance(self, u: wp.array) -> None:  # noqa: B027
         """Tell a term with a memory that a step has ended at a displacement [m]."""
 
+    def forget(self) -> None:  # noqa: B027
+        """Tell a term with a memory that the body is at rest in its reference shape, and always was."""
+
     @abc.abstractmethod
     def evaluate_forces(self, u: wp.array) -> None:
         """Write the forces at a displacement [m]."""

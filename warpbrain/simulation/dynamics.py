@@ -73,6 +73,7 @@ class Simulator:
         self.system = system
         self.newton = newton
         self.time = 0.0
+        self._pending = False
         self.set_time_step(time_step)
         self._kernels = dynamics_kernels(system.precision)
         self.tolerance = finest_tolerance(tolerance, system.precision)
@@ -97,6 +98,7 @@ class Simulator:
         """Change `h` [s]; a captured graph is dropped with the step that it was captured for."""
         if not (np.isfinite(time_step) and time_step > 0.0):
             raise InputError(f"time step = {time_step} s: expected a positive number")
+        self._remember()
         self._h = time_step
         self._graph = None
         for term in self.system.terms:
@@ -128,9 +130,15 @@ class Simulator:
         """Back to rest in the reference shape."""
         rest = np.zeros(self.system.model.mesh.points.shape)
         self.restore(rest, rest, 0.0)
+        for term in self.system.terms:
+            term.forget()
 
     def restore(self, u: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
-        """Set displacement [m] and velocity [m/s], both (n, 3), and time [s]."""
+        """Set displacement [m] and velocity [m/s], both (n, 3), and time [s].
+
+        Of terms with a memory this is for a step back only: the last step is taken to be undone.
+        """
+        self._pending = False
         self.system.u.assign(u)
         self.v.assign(v)
         self.time = time
@@ -191,6 +199,7 @@ class Simulator:
 
     def _finish(self) -> None:
         self.time += self._h
+        self._pending = True
         if self._moving:
             self._v_prescribed.zero_()
             self._moving = False
@@ -202,15 +211,17 @@ class Simulator:
             self.assemble_system(first=iteration == 0)
             self.solve_system(first=iteration == 0)
             self.integrate()
-        self._remember()
 
     def _remember(self) -> None:
-        """Let terms with a memory keep what they need of the step."""
-        for term in self.system.terms:
-            term.advance(self.system.u)
+        """Let terms with a memory keep what they need of the last step: only now is it known that it stands."""
+        if self._pending:
+            for term in self.system.terms:
+                term.advance(self.system.u)
+        self._pending = False
 
     def step(self) -> None:
         """Advance by one time step."""
+        self._remember()
         self.apply_loads()
         if self._graph is not None and self._graph_moves == self._moving:
             wp.capture_launch(self._graph)
@@ -220,6 +231,7 @@ class Simulator:
 
     def timed_step(self, clock: PhaseClock) -> None:
         """Advance by one time step with the clock stopped between phases; slower than `step`."""
+        self._remember()
         self.apply_loads()
         self._begin()
         for iteration in range(self.newton):
@@ -231,7 +243,6 @@ class Simulator:
                 self.solve_system(first=iteration == 0)
             with clock.phase(PHASES[3]):
                 self.integrate()
-        self._remember()
         self._finish()
 
     def capture(self) -> None:

@@ -56,10 +56,7 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
                 f"{case.path}: [[boundary]] '{boundary.name}' kind: '{boundary.kind}' cannot be simulated yet"
             )
     try:
-        materials = {
-            label: _material(case, label, tissue.known_law, tissue.formulation)
-            for label, tissue in case.tissues.items()
-        }
+        materials = {label: _material(case, label, tissue) for label, tissue in case.tissues.items()}
     except InputError as error:
         raise InputError(f"{case.path}: [tissue] {error}") from None
     return Model(mesh, materials, case.density, constrained, prescribed, loads, mechanisms, motions), nodes

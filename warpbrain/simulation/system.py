@@ -385,14 +385,14 @@ class System:
         mesh = self.model.mesh
         if self._weakening:
             factor = np.ones(self.elements)
-            for mechanism, scale in zip(self._weakening, scales[len(self._growing) :], strict=True):
-                factor *= mechanism.stiffness_factor(mesh, scale)
+            for weakening, scale in zip(self._weakening, scales[len(self._growing) :], strict=True):
+                factor *= weakening.stiffness_factor(mesh, scale)
             # a kernel multiplies all that an element does by its volume
             self.volume.assign(factor * mesh.volumes)
         if self._growing:
             change = np.ones(self.elements)
-            for mechanism, scale in zip(self._growing, scales, strict=False):
-                change *= 1.0 + mechanism.growth(mesh, scale)
+            for growing, scale in zip(self._growing, scales, strict=False):
+                change *= 1.0 + growing.growth(mesh, scale)
             self._growth_stretch = np.cbrt(change)
             self.set_materials(self.model.materials)
 

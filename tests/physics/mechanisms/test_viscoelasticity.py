@@ -1,0 +1,137 @@
+"""Viscoelasticity against the hereditary integral, by quadrature."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bodies import forces_at, model_of
+from scipy.integrate import quad
+from shapes import cube
+
+from warpbrain.errors import InputError
+from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
+from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.equilibrium import solve_equilibrium
+from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.system import System
+
+MU = 700.0
+MODULI, TIMES = (2.0, 0.5), (0.3, 4.0)
+
+
+def system_of(*mechanisms: Viscoelasticity, **options) -> System:
+    return System(model_of(cube(1), Material(NeoHookean(MU)), mechanisms=mechanisms, **options), "cpu")
+
+
+def gradient(strain: float) -> np.ndarray:
+    """A shear with some change of volume."""
+    return np.eye(3) + strain * np.array([[0.3, 1.0, 0.0], [0.0, -0.1, 0.0], [0.0, 0.2, 0.1]])
+
+
+def isochoric(F: np.ndarray) -> np.ndarray:
+    C = F.T @ F
+    return MU * np.linalg.det(F) ** (-2.0 / 3.0) * (np.eye(3) - np.trace(C) / 3.0 * np.linalg.inv(C))
+
+
+def stress_over(times: np.ndarray, strains: np.ndarray) -> np.ndarray:
+    """What viscosity adds to the first Piola-Kirchhoff stress of a cube, after each step: the virial of its nodes."""
+    plain, system = system_of(), system_of(Viscoelasticity(moduli=MODULI, times=TIMES))
+    mesh = system.model.mesh
+    found = []
+    for h, strain in zip(np.diff(times), strains[1:], strict=True):
+        u = mesh.points @ (gradient(strain) - np.eye(3)).T
+        for term in system.terms:
+            term.set_time_step(h)
+        forces = forces_at(system, u) - forces_at(plain, u)
+        found.append(forces.T @ mesh.points / mesh.volume)
+        for term in system.terms:
+            term.advance(system.u)
+    return np.array(found)
+
+
+def integral(time: float, strain, rate) -> np.ndarray:
+    """`F sum_i beta_i int_0^t exp(-(t - s)/tau_i) dS/ds ds`, component by component."""
+
+    def component(i: int, j: int) -> float:
+        def integrand(s: float) -> float:
+            h = 1e-5
+            slope = (isochoric(gradient(strain(s) + h)) - isochoric(gradient(strain(s) - h)))[i, j] / (2.0 * h)
+            fading = sum(b * np.exp(-(time - s) / tau) for b, tau in zip(MODULI, TIMES, strict=True))
+            return float(fading * slope * rate(s))
+
+        return quad(integrand, 0.0, time, epsabs=1e-9, epsrel=1e-9, limit=200, points=[min(0.5, time)])[0]
+
+    return gradient(strain(time)) @ np.array([[component(i, j) for j in range(3)] for i in range(3)])
+
+
+def ramp_and_hold(t: float) -> float:
+    return 0.2 * min(t / 0.5, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("strain", "rate"),
+    [
+        (ramp_and_hold, lambda t: 0.4 if t < 0.5 else 0.0),
+        (lambda t: 0.2 * np.sin(3.0 * t), lambda t: 0.6 * np.cos(3.0 * t)),
+    ],
+    ids=["relaxation", "hysteresis"],
+)
+def test_stress_is_the_hereditary_integral_to_second_order(strain, rate):
+    errors = []
+    expected = integral(2.0, strain, rate)
+    for steps in (40, 80):
+        times = np.linspace(0.0, 2.0, steps + 1)
+        found = stress_over(times, np.array([strain(t) for t in times]))
+        errors.append(np.abs(found[-1] - expected).max() / np.abs(expected).max())
+    assert errors[1] < 3e-3
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
+
+
+def test_the_tangent_of_a_step_is_the_slope_of_its_forces():
+    system = system_of(Viscoelasticity(moduli=MODULI, times=TIMES))
+    random = np.random.default_rng(0)
+    u, d = (0.1 * random.uniform(-1.0, 1.0, (system.size, 3)) for _ in range(2))
+    [term] = system.terms
+    term.set_time_step(0.1)
+    system.u.assign(0.5 * u)
+    term.advance(system.u)
+    h = 1e-5
+    change = (forces_at(system, u + h * d) - forces_at(system, u - h * d)) / (2.0 * h)
+    system.u.assign(u)
+    system.evaluate_tangents()
+    assert np.abs(system.stiffness_times(d) - change).max() <= 1e-7 * np.abs(change).max()
+
+
+def held() -> Model:
+    """A cube on a table, its top pulled sideways."""
+    mesh = cube(2)
+    low, high = mesh.points[:, 2] < 1e-9, mesh.points[:, 2] > 1.0 - 1e-9
+    constrained = np.repeat((low | high)[:, None], 3, axis=1)
+    prescribed = np.where(high[:, None], [0.1, 0.0, 0.05], 0.0)
+    return model_of(mesh, Material(NeoHookean(MU)), constrained=constrained, prescribed=prescribed, density=1.0)
+
+
+def test_motion_relaxes_to_the_equilibrium_without_viscosity():
+    model = replace(held(), mechanisms=(Viscoelasticity(moduli=(3.0,), times=(0.05,)),))
+    expected = solve_equilibrium(System(held(), "cpu"))
+    assert np.abs(solve_equilibrium(System(model, "cpu")).u - expected.u).max() < 1e-9
+    system = System(model, "cpu")
+    simulator = Simulator(system, time_step=0.01)
+    simulator.prescribe(model.prescribed)
+    reactions = []
+    for _ in range(60):
+        simulator.step()
+        system.evaluate_forces()
+        system.gather_forces()
+        reactions.append(system.internal.numpy()[model.prescribed[:, 0] > 0.0].sum(axis=0)[0])
+    assert reactions[0] > 2.5 * reactions[-1]
+    top = expected.internal[model.prescribed[:, 0] > 0.0].sum(axis=0)[0]
+    assert reactions[-1] == pytest.approx(top, rel=1e-3)
+    assert np.abs(system.u.numpy() - expected.u).max() < 1e-4
+
+
+@pytest.mark.parametrize(("moduli", "times"), [((1.0,), ()), ((0.0,), (1.0,)), ((1.0,), (-1.0,))])
+def test_branches_that_make_no_sense(moduli, times):
+    with pytest.raises(InputError, match="expected"):
+        Viscoelasticity(moduli=moduli, times=times)

@@ -1,0 +1,231 @@
+"""Viscoelasticity: stress that relaxes, as a Prony series on the isochoric part (Holzapfel 2000, section 6.10).
+
+The case's law is what is left after a long time. Each branch adds a second Piola-Kirchhoff stress `q_i` that follows
+the isochoric neo-Hookean stress of the tissue's shear modulus at rest, `S = mu0 J^(-2/3) (I - I1/3 C^-1)`:
+
+    dq_i/dt + q_i/tau_i = beta_i dS/dt
+    q_i(t + h) = exp(-h/tau_i) q_i(t) + beta_i exp(-h/(2 tau_i)) (S(t + h) - S(t))
+
+(Simo and Hughes, Computational Inelasticity, section 10.3), `P = F sum_i q_i`. Second order in `h`. In an equilibrium
+everything has relaxed.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+
+from warpbrain.kernels.invariants import cofactor
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks, store_forces
+from warpbrain.physics.expectation import LogNormal, LogUniform
+from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.term import Body, Term
+
+
+@dataclass(frozen=True, kw_only=True)
+class Viscoelasticity(Mechanism):
+    """Branches of a Prony series, in all tissues.
+
+    Parameters
+    ----------
+    moduli : tuple of floats
+        `beta_i`, relative to the case's own shear modulus; positive.
+    times : tuple of floats
+        `tau_i` [s], as many; positive.
+    """
+
+    moduli: tuple[float, ...] = parameter(
+        "Modulus of each branch, relative to the case's own, which is what is left in the end.",
+        kind="numbers",
+        expectation=LogNormal(1.0, 2.7),
+        typical="0.7 kPa left and 2.0 kPa that relax in 9.7 s (cortex); 0.3 and 0.9 kPa, 14.9 s (corona radiata)",
+        source="Budday et al. 2017 (diagnosis design, M8)",
+    )
+    times: tuple[float, ...] = parameter(
+        "Relaxation time of each branch.", kind="numbers", unit="s", expectation=LogUniform(1.0, 3000.0)
+    )
+    kind: ClassVar[str] = "viscoelasticity"
+    sentence: ClassVar[str] = "Tissue resists fast deformation more than slow, and its stress relaxes."
+    confused_with: ClassVar[tuple[str, ...]] = ("drainage",)
+    needs: ClassVar[tuple[str, ...]] = ("two times or more, or two rates",)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.moduli) != len(self.times) or not self.times:
+            found = f"found {len(self.times)}, and {len(self.moduli)} of moduli"
+            raise ParameterError("times", f"{found}: expected one of each for every branch")
+        for name in ("moduli", "times"):
+            values = getattr(self, name)
+            if not all(math.isfinite(value) and value > 0.0 for value in values):
+                raise ParameterError(name, f"found {list(values)}, expected positive numbers")
+
+    def bind(self, body: Body) -> "ViscoelasticTerm":
+        """See `warpbrain.physics.term.Following`."""
+        return ViscoelasticTerm(body, self)
+
+
+class ViscoelasticTerm(Term):
+    """`Viscoelasticity` on a device, with its memory."""
+
+    def __init__(self, body: Body, mechanism: Viscoelasticity) -> None:
+        super().__init__(body, body.tetrahedra)
+        self.mechanism = mechanism
+        scalar, mat33 = body.precision.scalar, body.precision.mat33
+        count, branches = len(self.stencils), len(mechanism.times)
+        self._weights = self.array(np.stack([body.mesh.volumes, body.shear_moduli], axis=1), scalar)
+        self._decay = wp.zeros(branches, dtype=scalar, device=body.device)
+        self._response = wp.zeros(branches, dtype=scalar, device=body.device)
+        self._q = wp.zeros((count, branches), dtype=mat33, device=body.device)
+        self._S = wp.zeros(count, dtype=mat33, device=body.device)
+        self._kernels = _kernels(body.precision)
+
+    def factor(self, time: float) -> float:
+        return self.mechanism.factor(time)
+
+    def set_time_step(self, h: float) -> None:
+        times = np.array(self.mechanism.times)
+        self._decay.assign(np.exp(-h / times))
+        self._response.assign(np.array(self.mechanism.moduli) * np.exp(-0.5 * h / times))
+
+    def forget(self) -> None:
+        self._q.zero_()
+        self._S.zero_()
+
+    def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
+        body = self.body
+        inputs = [body.nodes, body.inverse_edges, self._weights, self._decay, self._response, self._q, self._S]
+        wp.launch(kernel, dim=len(self.stencils), inputs=[*inputs, self.scale, u, *outputs], device=body.device)
+
+    def evaluate_forces(self, u: wp.array) -> None:
+        self._launch(self._kernels[0], u, self.forces)
+
+    def evaluate_tangents(self, u: wp.array) -> None:
+        self._launch(self._kernels[1], u, self.forces, self.blocks)
+
+    def advance(self, u: wp.array) -> None:
+        self._launch(self._kernels[2], u)
+
+    def energy(self, u: wp.array) -> float:
+        # only an equilibrium asks, where everything has relaxed
+        return 0.0
+
+
+@cache
+def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
+    """Kernels for forces, forces with tangent blocks, and the end of a step; one thread for an element."""
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = compiled_module(f"viscoelasticity_{precision.name}")
+
+    @wp.func
+    def isochoric(F: mat33, mu: scalar):
+        C = wp.transpose(F) * F
+        J = wp.determinant(F)
+        root = wp.cbrt(J)
+        I1 = wp.trace(C)
+        return mu / (root * root) * (wp.identity(n=3, dtype=scalar) - I1 / scalar(3.0) * wp.inverse(C))
+
+    @wp.func
+    def moduli(F: mat33, S: mat33, q: mat33, mu: scalar, response: scalar, g: vec3, h: vec3):
+        """`g . dP/dF . h`: of the isochoric law times the response, with `q` in the place of its stress."""
+        cof = cofactor(F)
+        J = wp.dot(F[0], cof[0])
+        I1 = wp.ddot(F, F)
+        root = wp.cbrt(J)
+        twice_d1 = mu / (root * root)
+        d1J = -twice_d1 / (scalar(3.0) * J)
+        dJ = d1J * I1
+        dJJ = scalar(-5.0) / scalar(3.0) * dJ / J
+        f, fh, c, ch = F * g, F * h, cof * g, cof * h
+        K = scalar(2.0) * d1J * (wp.outer(f, ch) + wp.outer(c, fh))
+        K += (dJJ + dJ / J) * wp.outer(c, ch) - dJ / J * wp.outer(ch, c)
+        K = response * K
+        isotropic = response * (twice_d1 * wp.dot(g, h) - wp.dot(g, S * h)) + wp.dot(g, q * h)
+        K[0, 0] += isotropic
+        K[1, 1] += isotropic
+        K[2, 2] += isotropic
+        return K
+
+    @wp.kernel(module=module)
+    def forces(
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        weights: wp.array2d[scalar],
+        decay: wp.array[scalar],
+        response: wp.array[scalar],
+        q: wp.array2d[mat33],
+        S_before: wp.array[mat33],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        element_forces: wp.array2d[vec3],
+    ):
+        e = wp.tid()
+        G = inverse_edges[e]
+        F = deformation_gradient(u, nodes[e], G)
+        change = isochoric(F, weights[e, 1]) - S_before[e]
+        total = mat33()
+        for k in range(decay.shape[0]):
+            total += decay[k] * q[e, k] + response[k] * change
+        store_forces(scale[0] * weights[e, 0] * (F * total), G, element_forces, e)
+
+    @wp.kernel(module=module)
+    def tangents(
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        weights: wp.array2d[scalar],
+        decay: wp.array[scalar],
+        response: wp.array[scalar],
+        q: wp.array2d[mat33],
+        S_before: wp.array[mat33],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        element_forces: wp.array2d[vec3],
+        element_blocks: wp.array2d[mat33],
+    ):
+        e = wp.tid()
+        G = inverse_edges[e]
+        F = deformation_gradient(u, nodes[e], G)
+        mu = weights[e, 1]
+        S = isochoric(F, mu)
+        total = mat33()
+        all = scalar(0.0)
+        for k in range(decay.shape[0]):
+            total += decay[k] * q[e, k] + response[k] * (S - S_before[e])
+            all += response[k]
+        V = scale[0] * weights[e, 0]
+        store_forces(V * (F * total), G, element_forces, e)
+        a, b, c = G[0], G[1], G[2]
+        store_blocks(
+            V * moduli(F, S, total, mu, all, a, a),
+            V * moduli(F, S, total, mu, all, a, b),
+            V * moduli(F, S, total, mu, all, a, c),
+            V * moduli(F, S, total, mu, all, b, b),
+            V * moduli(F, S, total, mu, all, b, c),
+            V * moduli(F, S, total, mu, all, c, c),
+            element_blocks,
+            e,
+        )
+
+    @wp.kernel(module=module)
+    def advance(
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        weights: wp.array2d[scalar],
+        decay: wp.array[scalar],
+        response: wp.array[scalar],
+        q: wp.array2d[mat33],
+        S_before: wp.array[mat33],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+    ):
+        e = wp.tid()
+        S = isochoric(deformation_gradient(u, nodes[e], inverse_edges[e]), weights[e, 1])
+        for k in range(decay.shape[0]):
+            q[e, k] = decay[k] * q[e, k] + response[k] * (S - S_before[e])
+        S_before[e] = S
+
+    return forces, tangents, advance
