@@ -25,8 +25,8 @@ EXAMPLES: dict[str, dict] = {
 }
 
 
-#: Those with a memory, whose forces have no energy: each has a file of its own.
-REMEMBERING = {"viscoelasticity"}
+#: Those with a memory, or of a fixed place: each has a file of its own.
+REMEMBERING = {"viscoelasticity", "contact"}
 
 
 def test_every_mechanism_that_acts_within_a_system_has_an_example():

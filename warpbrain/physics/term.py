@@ -49,6 +49,10 @@ class Body(Protocol):
         """Gradients of the shape functions of nodes 1 to 3 as rows, (m,) mat33 [1/m]."""
 
     @property
+    def volumetric_moduli(self) -> NDArray[np.float64]:
+        """`lam` or `K` of each element (m,) [Pa]."""
+
+    @property
     def shear_moduli(self) -> NDArray[np.float64]:
         """At rest, of each element (m,) [Pa]."""
 
@@ -104,6 +108,14 @@ class Term(abc.ABC):
 
     def advance(self, u: wp.array) -> None:  # noqa: B027
         """Tell a term with a memory that a step has ended at a displacement [m]."""
+
+    def augment(self, u: wp.array) -> bool:
+        """Come closer to a constraint that a penalty stands for; whether it was worth it, so that to solve again is."""
+        return False
+
+    def held(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Nodes (k,), repeated if need be, and directions (k, 3) in which it holds them."""
+        return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
 
     def forget(self) -> None:  # noqa: B027
         """Tell a term with a memory that the body is at rest in its reference shape, and always was."""

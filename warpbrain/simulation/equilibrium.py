@@ -80,6 +80,8 @@ class EquilibriumOptions:
         What to do where the tangent is indefinite, at limit and branching points of the equilibrium path. True: go on
         downhill, as the damped body would (snap-through), and say so in the history. False: end there with an error
         that names it. Negative curvature is seen only along the search directions of CG, not in every direction.
+    max_augmentations : int
+        Solves in all to meet the constraints that penalties stand for (contact).
     """
 
     tolerance: float = 1e-8
@@ -91,6 +93,7 @@ class EquilibriumOptions:
     max_cg: int = 10_000
     preconditioner: str = "block-jacobi"
     pass_unstable: bool = True
+    max_augmentations: int = 20
 
     def __post_init__(self) -> None:
         for name in ("tolerance", "min_load_step", "cg_tolerance"):
@@ -198,13 +201,14 @@ class EquilibriumSolver:
             If no equilibrium is found: at what load fraction, where and why.
         """
         model = self.system.model
-        require_held(model)
+        require_held(model, self.system.terms)
         full = model.external_forces() if external is None else external
         u = np.zeros_like(full) if start is None else np.array(start, dtype=np.float64)
         origin = np.where(model.constrained, u, 0.0)
         self._history = []
         for term in self.system.terms:
             term.set_time_step(math.inf)
+            term.forget()
         done, step = 0.0, self.options.max_load_step
         while done < 1.0:
             load = min(1.0, done + step)
@@ -219,7 +223,26 @@ class EquilibriumSolver:
                     raise SolveError(self._no_equilibrium(done, tried, str(failure))) from None
                 continue
             u, done, step = reached, load, min(2.0 * step, self.options.max_load_step)
+            if done == 1.0:
+                u, energy, residual = self._augmented(u, full, target, energy, residual)
         return Equilibrium(u, self.system.internal.numpy().astype(np.float64), energy, residual, tuple(self._history))
+
+    def _augmented(
+        self, u: Floats, full: Floats, target: Floats, energy: float, residual: float
+    ) -> tuple[Floats, float, float]:
+        """Solve again until constraints that penalties stand for are met."""
+        for _ in range(self.options.max_augmentations):
+            self.system.u.assign(u)
+            closer = [term.augment(self.system.u) for term in self.system.terms]
+            if not any(closer):
+                return u, energy, residual
+            try:
+                u, energy, residual = self._newton(u, 1.0, full, target)
+            except _StepFailed as failure:
+                raise SolveError(f"no equilibrium found while coming closer to a contact: {failure}") from None
+        raise SolveError(
+            f"a contact is not closed after {self.options.max_augmentations} augmentations: give it a larger penalty"
+        )
 
     def _no_equilibrium(self, done: float, step: float, why: str) -> str:
         """The last word on a load that found no equilibrium."""

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from warpbrain.errors import InputError
+from warpbrain.physics.term import Term
 from warpbrain.simulation.model import Model
 
 
-def require_held(model: Model) -> None:
+def require_held(model: Model, terms: Sequence[Term] = ()) -> None:
     """Raise `InputError` if a connected part of the body can move as a rigid one.
 
-    Each part needs constrained components that exclude its six rigid motions.
+    Each part needs constrained components, or terms that hold it, that exclude its six rigid motions.
     """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
@@ -22,6 +25,7 @@ def require_held(model: Model) -> None:
     others = mesh.tetrahedra[:, 1:].ravel()
     links = csr_matrix((np.ones(len(first), dtype=np.int8), (first, others)), shape=(count, count))
     parts, part = connected_components(links, directed=False)
+    holding = [term.held() for term in terms]
     for number in range(parts):
         members = np.flatnonzero(part == number)
         x = mesh.points[members] - mesh.points[members].mean(axis=0)
@@ -32,6 +36,10 @@ def require_held(model: Model) -> None:
         for axis in range(3):
             motions[:, :, 3 + axis] = np.cross(np.eye(3)[axis], x) / size
         held = motions[model.constrained[members]]
+        for nodes, directions in holding:
+            own = np.isin(nodes, members)
+            rows = motions[np.searchsorted(members, nodes[own])]
+            held = np.concatenate([held, np.einsum("ki,kij->kj", directions[own], rows)])
         rank = int(np.linalg.matrix_rank(held, tol=1e-6)) if len(held) else 0
         if rank < 6:
             where = 1000.0 * mesh.points[members].mean(axis=0)

@@ -408,8 +408,15 @@ class System:
     @property
     def shear_moduli(self) -> Floats:
         """Shear modulus at rest of each element [Pa], shape (m,)."""
-        moduli = {label: material.law.shear_modulus for label, material in self.model.materials.items()}
-        return np.array([moduli[label] for label in self.model.mesh.tissue.tolist()])
+        return self._by_element({label: m.law.shear_modulus for label, m in self.model.materials.items()})
+
+    @property
+    def volumetric_moduli(self) -> Floats:
+        """`lam` or `K` of each element [Pa], shape (m,)."""
+        return self._by_element({label: m.volumetric_modulus for label, m in self.model.materials.items()})
+
+    def _by_element(self, values: Mapping[int, float]) -> Floats:
+        return np.array([values[label] for label in self.model.mesh.tissue.tolist()])
 
     @property
     def mesh(self) -> TetMesh:

@@ -1,0 +1,144 @@
+"""Contact: a patch test through it, lifting, sliding without loss of energy, and slopes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bodies import energy_at, forces_at, model_of
+from shapes import cube, distorted
+
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.mechanisms.contact import Contact
+from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.equilibrium import solve_equilibrium
+from warpbrain.simulation.model import Damping, Material, Model
+from warpbrain.simulation.system import System
+
+SOFT = Material(NeoHookean(800.0), 0.4)
+
+
+def on_table(mesh: TetMesh) -> TetMesh:
+    z = mesh.points[:, 2]
+    return replace(mesh, node_sets={"below": z < 1e-9, "above": z > 1.0 - 1e-9})
+
+
+def pressed(mesh: TetMesh, down: float, **contact) -> Model:
+    """A block on a table, whose top is moved down and does not slide."""
+    above = mesh.node_sets["above"]
+    constrained = np.zeros(mesh.points.shape, dtype=bool)
+    constrained[above, 2] = True
+    # what a table without friction leaves free: two slides and a turn
+    corner = np.flatnonzero(above & (mesh.points[:, 0] < 1e-9) & (mesh.points[:, 1] < 1e-9))[0]
+    side = np.flatnonzero(above & (mesh.points[:, 0] > 1 - 1e-9) & (mesh.points[:, 1] < 1e-9))[0]
+    constrained[corner] = True
+    constrained[side, 1] = True
+    prescribed = np.where(constrained & [False, False, True], -down, 0.0)
+    mechanisms = (Contact(nodes="below", **contact),)
+    return model_of(mesh, SOFT, constrained=constrained, prescribed=prescribed, mechanisms=mechanisms)
+
+
+def squeezed(stretch: float) -> float:
+    """Lateral stretch of the coupled neo-Hookean block under uniaxial compression."""
+    from scipy.optimize import brentq
+
+    lam, mu = SOFT.volumetric_modulus, SOFT.law.shear_modulus
+    return brentq(lambda t: mu * (t - 1.0 / t) + lam * np.log(stretch * t * t) / t, 0.5, 2.0)
+
+
+@pytest.mark.parametrize("state", ["sliding", "lifting"])
+def test_a_patch_of_one_stress_passes_through_contact(state):
+    mesh = on_table(distorted_inside(3))
+    model = pressed(mesh, 0.2, state=state)
+    u = solve_equilibrium(System(model, "cpu")).u
+    x = mesh.points + u
+    t = squeezed(0.8)
+    corner = x[np.flatnonzero(mesh.node_sets["above"] & (np.abs(mesh.points[:, :2]).max(axis=1) < 1e-9))[0]]
+    expected = mesh.points * [t, t, 0.8] + corner - np.array([0.0, 0.0, 0.8])
+    expected[:, 2] = mesh.points[:, 2] * 0.8
+    assert np.abs(x - expected).max() < 2e-5
+
+
+def distorted_inside(n: int) -> TetMesh:
+    """A cube whose inner nodes are not where a lattice has them."""
+    mesh = cube(n)
+    moved = mesh.points.copy()
+    inner = np.all((moved > 1e-9) & (moved < 1 - 1e-9), axis=1)
+    moved[inner] += np.random.default_rng(0).uniform(-0.05, 0.05, (inner.sum(), 3))
+    return replace(mesh, points=moved)
+
+
+def test_a_block_that_is_lifted_leaves_the_table_without_a_force():
+    mesh = on_table(cube(2))
+    state = solve_equilibrium(System(pressed(mesh, -0.1, state="lifting"), "cpu"))
+    assert np.abs(state.u - [0.0, 0.0, 0.1]).max() < 1e-7
+    assert np.abs(state.internal).max() < 1e-4
+
+
+def test_a_block_that_only_slides_is_stretched():
+    mesh = on_table(cube(2))
+    x = mesh.points + solve_equilibrium(System(pressed(mesh, -0.1, state="sliding"), "cpu")).u
+    assert np.abs(x[:, 2] - 1.1 * mesh.points[:, 2]).max() < 2e-5
+
+
+def test_what_is_stuck_does_not_move():
+    mesh = on_table(cube(2))
+    model = pressed(mesh, 0.1, state="fixed", penalty=1e4)
+    u = solve_equilibrium(System(model, "cpu")).u
+    constrained = model.constrained | mesh.node_sets["below"][:, None]
+    expected = solve_equilibrium(System(replace(model, constrained=constrained, mechanisms=()), "cpu")).u
+    assert np.abs(u - expected).max() < 1e-4
+
+
+def test_a_frictionless_slide_loses_no_energy():
+    mesh = on_table(cube(2))
+    model = model_of(
+        mesh, SOFT, mechanisms=(Contact(nodes="below", state="sliding"),), damping=Damping(0.0, 0.0), density=1000.0
+    )
+    system = System(model, "cpu")
+    simulator = Simulator(system, time_step=1e-3, tolerance=1e-10)
+    velocity = np.tile([0.2, 0.1, 0.0], (system.size, 1))
+    simulator.restore(np.zeros_like(velocity), velocity, 0.0)
+    before = simulator.kinetic_energy()
+    for _ in range(200):
+        simulator.step()
+    assert simulator.kinetic_energy() + system.energy()[0] == pytest.approx(before, rel=1e-6)
+    assert np.abs(system.u.numpy() - [0.04, 0.02, 0.0]).max() < 1e-6
+
+
+def test_friction_holds_back_what_slides():
+    mesh = on_table(cube(2))
+    reactions = []
+    for friction in (0.0, 0.3):
+        model = pressed(mesh, 0.1, state="lifting", friction=friction)
+        above = mesh.node_sets["above"]
+        constrained = model.constrained.copy()
+        constrained[above] = True
+        prescribed = np.where(above[:, None], [0.05, 0.0, -0.1], 0.0)
+        state = solve_equilibrium(System(replace(model, constrained=constrained, prescribed=prescribed), "cpu"))
+        reactions.append(state.internal[above].sum(axis=0))
+    assert abs(reactions[0][0]) < 1e-5 * abs(reactions[0][2])
+    assert 0.1 < abs(reactions[1][0] / reactions[1][2]) < 0.3 + 1e-3
+
+
+@pytest.mark.parametrize(
+    ("state", "augmented"), [("fixed", False), ("sliding", False), ("lifting", False), ("lifting", True)]
+)
+def test_forces_are_the_slope_of_the_energy_and_the_tangent_that_of_the_forces(state, augmented, device):
+    mesh = distorted(cube(3), 0.05)
+    mesh = replace(mesh, node_sets={"all": np.ones(len(mesh.points), dtype=bool)})
+    system = System(model_of(mesh, SOFT, mechanisms=(Contact(nodes="all", state=state),)), device)
+    random = np.random.default_rng(4)
+    u = 0.02 * random.uniform(-1.0, 1.0, mesh.points.shape)
+    if augmented:
+        system.u.assign(u)
+        system.terms[0].augment(system.u)
+        u = u + 0.01 * random.uniform(-1.0, 1.0, mesh.points.shape)
+    d = random.normal(size=u.shape)
+    h = 1e-7
+    slope = (energy_at(system, u + h * d) - energy_at(system, u - h * d)) / (2.0 * h)
+    assert np.vdot(forces_at(system, u), d) == pytest.approx(slope, rel=1e-6)
+    change = (forces_at(system, u + h * d) - forces_at(system, u - h * d)) / (2.0 * h)
+    system.u.assign(u)
+    system.evaluate_tangents()
+    assert np.abs(system.stiffness_times(d) - change).max() <= 1e-6 * np.abs(change).max()
