@@ -50,6 +50,23 @@ def _corners(tetrahedra: ArrayLike, faces: NDArray[np.int64]) -> Ints:
     return np.asarray(tets[faces[:, None] // 4, FACES[faces % 4]], dtype=np.int32)
 
 
+def all_faces(tetrahedra: ArrayLike) -> Ints:
+    """Every triangle of a mesh once, inside and on the boundary.
+
+    Parameters
+    ----------
+    tetrahedra : (m, 4) array
+        Node ids.
+
+    Returns
+    -------
+    (k, 3) int32 array
+        Node ids.
+    """
+    pairs, single = paired_faces(tetrahedra)
+    return _corners(tetrahedra, np.concatenate([pairs[:, 0], single]))
+
+
 def boundary_faces(tetrahedra: ArrayLike) -> Ints:
     """Triangles of the boundary, oriented outwards.
 

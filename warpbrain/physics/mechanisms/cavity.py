@@ -1,0 +1,89 @@
+"""A cavity that opens: tissue is taken out little by little, and fluid presses on the walls.
+
+The elements of the set stay, with their moduli multiplied by `1 - s (1 - r)`, `s` from 0 to 1 over the load and `r` what
+is left of them. No element turns inside out, so walls that meet lean on each other through what is left between them: the
+contact through a third medium of Wriggers, Schroeder and Schwarz (2013). A fluid at the pressure `p` is the energy
+
+    -p J,   P = -p cof F
+
+of these elements: the same pressure on every wall, following it.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.kernels.invariants import cofactor
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.expectation import Normal
+from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
+from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.term import Body
+
+
+@wp.func
+def _energy(F: Any, data: wp.array2d[Any], e: int):
+    J = wp.determinant(F)
+    return data[e, 0] * (type(J)(1.0) - J)
+
+
+@wp.func
+def _stress(F: Any, data: wp.array2d[Any], e: int):
+    return -data[e, 0] * cofactor(F)
+
+
+@wp.func
+def _moduli(F: Any, g: Any, h: Any, data: wp.array2d[Any], e: int):
+    cof = cofactor(F)
+    c = cof * g
+    d = cof * h
+    return -data[e, 0] / wp.determinant(F) * (wp.outer(c, d) - wp.outer(d, c))
+
+
+_CODE = ExtraEnergy("cavity", _energy, _stress, _moduli)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cavity(Mechanism):
+    """Tissue of an element set that is taken out gradually.
+
+    Parameters
+    ----------
+    elements : str
+        Element set.
+    pressure : float
+        Of the fluid in the cavity [Pa], relative to outside.
+    left : float
+        Part of the stiffness that is left in the end.
+    """
+
+    elements: str = parameter("Element set that is taken out.", default="resection", kind="element set")
+    pressure: float = parameter(
+        "Pressure of the fluid in the cavity, relative to outside.",
+        default=0.0,
+        unit="Pa",
+        expectation=Normal(0.0, 200.0),
+        typical="hydrostatic: 10 Pa for each mm of fluid",
+        source="diagnosis design, M6",
+    )
+    left: float = parameter(
+        "Part of its stiffness that is left, through which walls that meet lean on each other.",
+        default=1e-4,
+        above=0.0,
+        below=1.0,
+    )
+    kind: ClassVar[str] = "cavity"
+    sentence: ClassVar[str] = "Tissue is taken out little by little, and the walls of the cavity move in."
+    confused_with: ClassVar[tuple[str, ...]] = ("inclusion", "swelling")
+
+    def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+        """See `warpbrain.physics.mechanism.Weakening`."""
+        return np.where(mesh.element_sets[self.elements], 1.0 - scale * (1.0 - self.left), 1.0)
+
+    def bind(self, body: Body) -> ExtraEnergyTerm:
+        """See `warpbrain.physics.term.Following`."""
+        elements = np.flatnonzero(body.mesh.element_sets[self.elements])
+        return ExtraEnergyTerm(body, _CODE, elements, np.full((len(elements), 1), self.pressure), self.factor)
