@@ -20,6 +20,10 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 
+#: Kinds of elements; the default first.
+ELEMENTS = ("tet4", "tet4-nodal-pressure")
+
+
 @dataclass(frozen=True)
 class Material:
     """A law with its compressibility.
@@ -104,6 +108,8 @@ class Model:
     motions : sequence of Motion
         Histories of prescribed displacements, which end at `prescribed`.
     damping : Damping
+    elements : str
+        One of `ELEMENTS`: plain linear tetrahedra, or ones that do not lock (`warpbrain.simulation.patches`).
 
     Raises
     ------
@@ -120,6 +126,7 @@ class Model:
     mechanisms: Sequence[Mechanism] = ()
     motions: Sequence[Motion] = ()
     damping: Damping = field(default_factory=Damping)
+    elements: str = "tet4"
 
     def __post_init__(self) -> None:
         shape = self.mesh.points.shape
@@ -136,6 +143,8 @@ class Model:
             raise InputError("prescribed: a component that is not constrained has a displacement")
         if not (math.isfinite(self.density) and self.density > 0.0):
             raise InputError(f"density = {self.density:g} kg/m3: expected a positive number")
+        if self.elements not in ELEMENTS:
+            raise InputError(f"elements = {self.elements!r}: expected one of {', '.join(ELEMENTS)}")
         missing = sorted(set(np.unique(self.mesh.tissue).tolist()) - set(self.materials))
         if missing:
             raise InputError(f"materials: no material for tissue {', '.join(map(str, missing))} of the mesh")

@@ -23,6 +23,7 @@ from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.grown import grown
 from warpbrain.physics.mechanism import Following, Growing, Weakening
 from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.patches import KEPT, patch_terms
 from warpbrain.simulation.pattern import build_pattern
 
 Floats = NDArray[np.float64]
@@ -107,6 +108,12 @@ class System:
         self._kernels = assembly_kernels(self.precision)
         self._place_mesh()
         self.terms = [m.bind(self) for m in model.mechanisms if isinstance(m, Following)]
+        if model.elements == "tet4-nodal-pressure":
+            self.terms += patch_terms(
+                self,
+                {label: m.volumetric_modulus - self._own_modulus(m) for label, m in model.materials.items()},
+                {label: m.formulation == "coupled" for label, m in model.materials.items()},
+            )
         self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
         self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
         self._scales: tuple[float, ...] | None = None
@@ -178,10 +185,16 @@ class System:
         # the last column, where something grows, is the growth stretch
         parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self._growing)))
         for (label, material), row in zip(materials.items(), rows, strict=True):
-            parameters[self.model.mesh.tissue == label, : 1 + len(row)] = (material.volumetric_modulus, *row)
+            parameters[self.model.mesh.tissue == label, : 1 + len(row)] = (self._own_modulus(material), *row)
         if self._growing:
             parameters[:, -1] = self._growth_stretch
         return parameters
+
+    def _own_modulus(self, material: Material) -> float:
+        """Volumetric modulus that the elements themselves have [Pa]."""
+        if self.model.elements == "tet4":
+            return material.volumetric_modulus
+        return min(material.volumetric_modulus, KEPT * material.law.shear_modulus)
 
     def set_materials(self, materials: Mapping[int, Material]) -> None:
         """Other parameters for the same laws, in the same arrays: nothing is pre-processed again.
