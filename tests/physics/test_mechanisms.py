@@ -12,7 +12,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.simulation.model import Material
+from warpbrain.simulation.model import ELEMENTS, Material
 from warpbrain.simulation.system import System
 
 #: One of each kind that acts within a system.
@@ -40,23 +40,24 @@ def _of_the_model(mechanism: type[Mechanism]) -> bool:
     return any(hasattr(mechanism, name) for name in ("remaining", "substitute"))
 
 
-def body(*kinds: str, precision: str = "double", device: str = "cpu") -> System:
+def body(*kinds: str, precision: str = "double", device: str = "cpu", elements: str = "tet4") -> System:
     mesh: TetMesh = distorted(cube(3), 0.05, tissues=2)
     middles = mesh.points[mesh.tetrahedra].mean(axis=1)
     sets = {"half": middles[:, 0] > 0.5}
     mesh = replace(mesh, node_sets={"all": np.ones(len(mesh.points), dtype=bool)}, element_sets=sets)
     materials = Material(LAWS["neo-hookean"]), Material(LAWS["ogden -4.7"], 0.4, "uncoupled")
     acts = [mechanisms()[kind](**EXAMPLES[kind]) for kind in kinds]
-    return System(model_of(mesh, *materials, mechanisms=acts), device, precision)
+    return System(model_of(mesh, *materials, mechanisms=acts, elements=elements), device, precision)
 
 
 def state(system: System) -> np.ndarray:
     return 0.03 * np.random.default_rng(1).uniform(-1.0, 1.0, (system.size, 3))
 
 
+@pytest.mark.parametrize("elements", ELEMENTS)
 @pytest.mark.parametrize("kind", [*EXAMPLES, "all at once"])
-def test_forces_are_the_slope_of_the_energy_and_the_tangent_that_of_the_forces(kind, device):
-    system = body(*(EXAMPLES if kind == "all at once" else (kind,)), device=device)
+def test_forces_are_the_slope_of_the_energy_and_the_tangent_that_of_the_forces(kind, elements, device):
+    system = body(*(EXAMPLES if kind == "all at once" else (kind,)), device=device, elements=elements)
     u, d = state(system), np.random.default_rng(2).normal(size=(system.size, 3))
     h = 1e-5
     slope = (energy_at(system, u + h * d) - energy_at(system, u - h * d)) / (2.0 * h)

@@ -53,6 +53,14 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         metavar="MODEL",
         help='generative model of --sample and of mu = "prior": hierarchical (default), coregionalised or a folder',
     )
+    add(
+        "--with",
+        dest="assumed",
+        action="append",
+        default=[],
+        metavar="MECHANISM",
+        help="assume one more mechanism, such as gravity:level=60 (see docs/mechanisms.md); can be given several times",
+    )
     add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
     add("--precision", choices=("double", "single"), default="double", help="default: double")
@@ -178,6 +186,7 @@ def _check(options: argparse.Namespace) -> None:
 
 def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
     """The case as the arguments change it, and which of its laws are the generative model's, if any."""
+    from warpbrain.cases.assuming import assume
     from warpbrain.cases.shipped import find_case
     from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 
@@ -189,6 +198,8 @@ def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
     case = case.with_shear_moduli(moduli)
     if options.poisson is not None:
         case = replace(case, poisson=options.poisson)
+    for said in options.assumed:
+        case = assume(case, said)
     found = _from_prior(options, case)
     if found is not None:
         case = found.case

@@ -21,7 +21,7 @@ Bools = NDArray[np.bool_]
 
 
 #: Kinds of elements; the default first.
-ELEMENTS = ("tet4", "tet4-nodal-pressure")
+ELEMENTS = ("tet4", "tet4-averaged")
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Model:
         Histories of prescribed displacements, which end at `prescribed`.
     damping : Damping
     elements : str
-        One of `ELEMENTS`: plain linear tetrahedra, or ones that do not lock (`warpbrain.simulation.patches`).
+        One of `ELEMENTS`: plain linear tetrahedra, or ones that do not lock (`warpbrain.simulation.averaged`).
 
     Raises
     ------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,8 +22,8 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.grown import grown
 from warpbrain.physics.mechanism import Following, Growing, Weakening
+from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, averaged_terms, own_modulus
 from warpbrain.simulation.model import Material, Model
-from warpbrain.simulation.patches import KEPT, patch_terms
 from warpbrain.simulation.pattern import build_pattern
 
 Floats = NDArray[np.float64]
@@ -56,6 +56,10 @@ def _code(material: Material) -> tuple[type[Law], str, int]:
     return type(material.law), material.formulation, len(material.law.parameters())
 
 
+def _volumetric_modulus(material: Material) -> float:
+    return material.volumetric_modulus
+
+
 @dataclass(frozen=True)
 class ElementGroup:
     """Elements that share a law and formulation: one launch, whatever their tissues."""
@@ -63,6 +67,7 @@ class ElementGroup:
     kernels: ElementKernels
     elements: wp.array
     parameters: wp.array
+    averaged: list[AveragedTerm]
 
 
 class System:
@@ -108,18 +113,13 @@ class System:
         self._kernels = assembly_kernels(self.precision)
         self._place_mesh()
         self.terms = [m.bind(self) for m in model.mechanisms if isinstance(m, Following)]
-        if model.elements == "tet4-nodal-pressure":
-            self.terms += patch_terms(
-                self,
-                {label: m.volumetric_modulus - self._own_modulus(m) for label, m in model.materials.items()},
-                {label: m.formulation == "coupled" for label, m in model.materials.items()},
-            )
         self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
         self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
         self._scales: tuple[float, ...] | None = None
-        self._place_pattern()
         self._growth_stretch: Floats | float = 1.0
         self.groups = self._group_elements()
+        self.terms += [term for group in self.groups for term in group.averaged]
+        self._place_pattern()
         self._place_fields()
         self.set_load()
         self.seconds = time.perf_counter() - start
@@ -166,9 +166,14 @@ class System:
             members = np.flatnonzero(np.isin(self.model.mesh.tissue, list(materials)))
             device_law = law_type.device_law(formulation)
             kernels = (grown(device_law) if self._growing else device_law).kernels(self.precision)
+            averaged = averaged_terms(self, list(materials), kernels) if self._averages else []
             parameters = self._array(self._parameters(law_type, materials), self.precision.scalar)
-            groups.append(ElementGroup(kernels, self._array(members, int), parameters))
+            groups.append(ElementGroup(kernels, self._array(members, int), parameters, averaged))
         return groups
+
+    @property
+    def _averages(self) -> bool:
+        return self.model.elements == "tet4-averaged"
 
     @staticmethod
     def _grouped(model: Model) -> dict[tuple[type[Law], str], dict[int, Material]]:
@@ -179,22 +184,23 @@ class System:
             by_code.setdefault((type(material.law), material.formulation), {})[label] = material
         return by_code
 
-    def _parameters(self, law_type: type[Law], materials: Mapping[int, Material]) -> Floats:
+    def _parameters(
+        self,
+        law_type: type[Law],
+        materials: Mapping[int, Material],
+        modulus: Callable[[Material], float] | None = None,
+    ) -> Floats:
         """Parameters by element; 1 where it is of no tissue of the group."""
+        if modulus is None:
+            modulus = own_modulus if self._averages else _volumetric_modulus
         rows = law_type.parameter_rows([material.law for material in materials.values()])
         # the last column, where something grows, is the growth stretch
         parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self._growing)))
         for (label, material), row in zip(materials.items(), rows, strict=True):
-            parameters[self.model.mesh.tissue == label, : 1 + len(row)] = (self._own_modulus(material), *row)
+            parameters[self.model.mesh.tissue == label, : 1 + len(row)] = (modulus(material), *row)
         if self._growing:
             parameters[:, -1] = self._growth_stretch
         return parameters
-
-    def _own_modulus(self, material: Material) -> float:
-        """Volumetric modulus that the elements themselves have [Pa]."""
-        if self.model.elements == "tet4":
-            return material.volumetric_modulus
-        return min(material.volumetric_modulus, KEPT * material.law.shear_modulus)
 
     def set_materials(self, materials: Mapping[int, Material]) -> None:
         """Other parameters for the same laws, in the same arrays: nothing is pre-processed again.
@@ -220,6 +226,8 @@ class System:
         self.model = model
         for group, ((law_type, _), members) in zip(self.groups, self._grouped(model).items(), strict=True):
             group.parameters.assign(self._parameters(law_type, members))
+            for term in group.averaged:
+                term.set_elements(self._parameters(law_type, members, averaged_modulus), self._weight)
 
     def _place_fields(self) -> None:
         p, n, m = self.precision, self.size, self.elements
@@ -396,18 +404,16 @@ class System:
             return
         self._scales = scales
         mesh = self.model.mesh
-        if self._weakening:
-            factor = np.ones(self.elements)
-            for weakening, scale in zip(self._weakening, scales[len(self._growing) :], strict=True):
-                factor *= weakening.stiffness_factor(mesh, scale)
-            # a kernel multiplies all that an element does by its volume
-            self.volume.assign(factor * mesh.volumes)
-        if self._growing:
-            change = np.ones(self.elements)
-            for growing, scale in zip(self._growing, scales, strict=False):
-                change *= 1.0 + growing.growth(mesh, scale)
-            self._growth_stretch = np.cbrt(change)
-            self.set_materials(self.model.materials)
+        self._weight = np.ones(self.elements)
+        for weakening, scale in zip(self._weakening, scales[len(self._growing) :], strict=True):
+            self._weight *= weakening.stiffness_factor(mesh, scale)
+        # a kernel multiplies all that an element does by its volume
+        self.volume.assign((PART if self._averages else 1.0) * self._weight * mesh.volumes)
+        change = np.ones(self.elements)
+        for growing, scale in zip(self._growing, scales, strict=False):
+            change *= 1.0 + growing.growth(mesh, scale)
+        self._growth_stretch = np.cbrt(change)
+        self.set_materials(self.model.materials)
 
     def forces_without_potential(self) -> Floats:
         """Sum of the forces [N], shape (n, 3), at `u` of the terms that have no potential."""
@@ -457,4 +463,11 @@ class System:
         P = wp.zeros(self.elements, dtype=p.mat33, device=self.device)
         for g in self.groups:
             self._launch(g.kernels.stress, len(g.elements), g.elements, F, g.parameters, density, P)
-        return P.numpy().astype(np.float64)
+        found = P.numpy().astype(np.float64)
+        if self._averages:
+            found *= PART
+            for term in (term for group in self.groups for term in group.averaged):
+                # each of the four patches of an element has a quarter of it
+                elements, patch, stress = term.stress(self.u)
+                np.add.at(found, elements, 0.25 * (1.0 - PART) * stress[patch])
+        return found

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from warpbrain.errors import InputError
 
 if TYPE_CHECKING:
-    from warpbrain.kernels.tetrahedron import DeviceLaw
+    from warpbrain.physics.laws.device import InvariantLaw, PrincipalLaw
 
 FORMULATIONS = ("coupled", "uncoupled")
 
@@ -63,7 +63,7 @@ class Law(abc.ABC):
 
     @classmethod
     @abc.abstractmethod
-    def device_law(cls, formulation: str) -> DeviceLaw:
+    def device_law(cls, formulation: str) -> InvariantLaw | PrincipalLaw:
         """Device code of a formulation."""
 
     @abc.abstractmethod

@@ -1,7 +1,8 @@
 """A membrane inside the tissue: the falx or the tentorium.
 
 On each triangle, with `F` (3 x 2) its deformation gradient in its own plane, `C = F^T F`, thickness `t` and shear
-modulus `mu`, the incompressible neo-Hookean membrane (Bonet and Wood, Nonlinear Continuum Mechanics, 2nd ed., section 6.6)
+modulus `mu`, the incompressible neo-Hookean membrane (Bonet and Wood, Nonlinear Continuum Mechanics, 2nd ed., section
+6.6)
 
     W = A t mu/2 (tr C + 1/det C - 3),   P = t mu F (I - C^-1 / det C)
 """

@@ -1,0 +1,69 @@
+"""Cook's membrane: a slab in plane strain that bends and shears, where linear tetrahedra lock.
+
+Values of P2-P1 elements by DOLFINx on the same lattices (48 x 44/16 mm, mu = 0.4225 N/mm2, 1 N upwards).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bodies import model_of
+from shapes import box
+
+from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.physics.laws import NeoHookean
+from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
+from warpbrain.simulation.model import Material
+from warpbrain.simulation.system import System
+
+MIXED = {0.49: 12.111, 0.499: 11.963}
+
+
+def membrane(n: int) -> TetMesh:
+    mesh = box((n, n, 1), (48.0, 44.0, 1.0))
+    x, y, z = mesh.points.T
+    low, high = 44.0 / 48.0 * x, 44.0 + 16.0 / 48.0 * x
+    return replace(mesh, points=np.stack([x, (1.0 - y / 44.0) * low + y / 44.0 * high, z], axis=1))
+
+
+def bent(n: int, poisson: float, elements: str) -> tuple[float, System]:
+    """Displacement upwards of the upper right corner [mm]."""
+    mesh = membrane(n)
+    constrained = np.zeros(mesh.points.shape, dtype=bool)
+    constrained[:, 2] = True
+    constrained[mesh.points[:, 0] < 1e-9] = True
+    faces = boundary_faces(mesh.tetrahedra)
+    right = faces[np.all(mesh.points[faces][:, :, 0] > 48.0 - 1e-9, axis=1)]
+    corners = mesh.points[right]
+    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    force = np.zeros(mesh.points.shape)
+    np.add.at(force[:, 1], right.ravel(), np.repeat(areas / 16.0 / 3.0, 3))
+    material = Material(NeoHookean(0.4225), poisson, "uncoupled")
+    system = System(model_of(mesh, material, constrained=constrained, elements=elements), "cpu")
+    u = EquilibriumSolver(system, EquilibriumOptions(max_load_step=0.2)).solve(external=force).u
+    return float(u[np.argmin(np.linalg.norm(mesh.points - [48.0, 52.0, 1.0], axis=1)), 1]), system
+
+
+def roughness(system: System) -> float:
+    """How far the pressure of elements is from that around their nodes, relative to its spread, away from the ends."""
+    mesh = system.model.mesh
+    F = system.deformation_gradients()
+    pressure = np.einsum("eij,eij->e", system.stresses(), F) / (3.0 * np.linalg.det(F))
+    corners, share = mesh.tetrahedra.ravel(), np.repeat(mesh.volumes, 4)
+    around = np.bincount(corners, share * np.repeat(pressure, 4)) / np.bincount(corners, share)
+    x = mesh.points[mesh.tetrahedra].mean(axis=1)[:, 0]
+    inner = (x > 8.0) & (x < 44.0)
+    return float((pressure - around[mesh.tetrahedra].mean(axis=1))[inner].std() / pressure[inner].std())
+
+
+def test_plain_tetrahedra_lock():
+    tip, system = bent(16, 0.49, "tet4")
+    assert tip == pytest.approx(7.606, abs=2e-3)
+    assert roughness(system) > 0.9
+
+
+@pytest.mark.parametrize(("poisson", "within"), [(0.49, 0.02), (0.499, 0.04)])
+def test_averaged_ones_do_not_and_their_pressure_is_smooth(poisson, within):
+    tip, system = bent(32, poisson, "tet4-averaged")
+    assert tip == pytest.approx(MIXED[poisson], rel=within)
+    assert roughness(system) < 0.1

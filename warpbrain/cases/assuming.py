@@ -1,0 +1,90 @@
+"""Mechanisms that are said in one line, as on the command line: `gravity:level=60`."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import replace
+from typing import Any
+
+from warpbrain.cases.case import Case
+from warpbrain.cases.parts.mechanisms import in_si
+from warpbrain.errors import InputError
+from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Says
+from warpbrain.physics.mechanisms import mechanisms
+
+
+def assume(case: Case, said: str) -> Case:
+    """The same case with one more mechanism; one that a case can have only once takes the place of the case's own.
+
+    Parameters
+    ----------
+    case : Case
+    said : str
+        ``kind`` or ``kind:key=value,key=value``: values as in `case.toml`, in the case's units and axes; several
+        numbers of one key are joined by ``/``. The last word of a key will do where no other key ends with it.
+
+    Raises
+    ------
+    InputError
+        If there is no such mechanism or key, a value is not one, or something needed is missing.
+
+    Examples
+    --------
+    >>> from warpbrain.cases.shipped import find_case
+    >>> assume(find_case("0529"), "traction:centre=0/0/80,value=0/0/-500").mechanisms[-1].kind
+    'traction'
+    """
+    kind, _, rest = said.partition(":")
+    known = mechanisms()
+    if kind not in known:
+        near = difflib.get_close_matches(kind, known, 1)
+        raise InputError(f"{said}: no mechanism '{kind}': {f'did you mean {near[0]}?' if near else ', '.join(known)}")
+    mechanism = known[kind]
+    values: dict[str, Any] = {}
+    for part in rest.split(",") if rest else []:
+        word, equals, text = part.partition("=")
+        key = _key(said, mechanism, word)
+        if not equals or key in values:
+            raise InputError(f"{said}: {part}: expected KEY=VALUE, each key once")
+        says = mechanism.parameters()[key]
+        values[key] = in_si(says, _value(said, says, key, text), case.frame)
+    missing = [key for key in mechanism.required() if key not in values]
+    if missing:
+        says = mechanism.parameters()[missing[0]]
+        raise InputError(f"{said}: {missing[0]} is missing{f' [{says.unit}]' if says.unit else ''}: {says.doc}")
+    try:
+        made = mechanism.of_case(values, Facts(case.mesh, case.gravity_axis, case.density))
+    except ParameterError as error:
+        raise InputError(f"{said}: {error.key}: {error}") from None
+    except InputError as error:
+        raise InputError(f"{said}: {error}") from None
+    others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
+    return replace(case, mechanisms=(*others, made))
+
+
+def _key(said: str, mechanism: type[Mechanism], word: str) -> str:
+    keys = list(mechanism.parameters())
+    found = [key for key in keys if key == word] or [key for key in keys if key.endswith(f"_{word}")]
+    if len(found) != 1:
+        raise InputError(f"{said}: no key '{word}' of {mechanism.kind}: expected one of {', '.join(keys)}")
+    return found[0]
+
+
+def _value(said: str, says: Says, key: str, text: str) -> Any:
+    if says.kind in ("text", "node set", "element set"):
+        if says.choices and text not in says.choices:
+            raise InputError(f"{said}: {key}: found '{text}', expected one of {', '.join(says.choices)}")
+        return text
+    try:
+        numbers = [float(part) for part in text.split("/")]
+    except ValueError:
+        numbers = []
+    count = {"number": 1, "position": 3, "vector": 3}.get(says.kind)
+    if not numbers or (count is not None and len(numbers) != count):
+        expected = {1: "a number", 3: "three numbers joined by /"}.get(count or 0, "numbers joined by /")
+        raise InputError(f"{said}: {key}: found '{text}', expected {expected}{f' [{says.unit}]' if says.unit else ''}")
+    for number in numbers:
+        if not says.above < number < says.below:
+            limits = f"between {says.above:g} and {says.below:g}"
+            raise InputError(f"{said}: {key}: found {number:g}, expected a number {limits}")
+    return numbers[0] if count == 1 else numbers

@@ -1,0 +1,78 @@
+"""Kernels of a deformation gradient that is the mean over a patch of tetrahedra.
+
+With the mean gradients `G_b = sum_e w_e g_be / sum_e w_e` of the shape function of node b over the elements of a patch,
+`F = I + sum_b u_b (x) G_b` is the mean of the elements' own, and a patch of volume V that has the energy `V Psi(F)`
+acts like an element of many nodes:
+
+    f_b = V P G_b,    K_bc = V G_b . dP/dF . G_c
+
+Stress and moduli are those of the law's own pointwise kernels (`warpbrain.kernels.tetrahedron.ElementKernels`).
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.precision import Precision
+
+
+@dataclass(frozen=True)
+class AveragedKernels:
+    """Kernels of one precision.
+
+    Attributes
+    ----------
+    gradient : wp.Kernel
+        ``(nodes, gradients, u) -> F``, one thread for a patch.
+    forces : wp.Kernel
+        ``(gradients, volume, P) -> forces``, one thread for a node of a patch.
+    tangents : wp.Kernel
+        ``(rows, columns, gradients, volume, moduli) -> blocks``, one thread for a pair of nodes of a patch.
+    """
+
+    gradient: Any
+    forces: Any
+    tangents: Any
+
+
+@cache
+def averaged_kernels(precision: Precision) -> AveragedKernels:
+    """Make (once) the kernels of a precision."""
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = compiled_module(f"averaged_gradient_{precision.name}")
+
+    @wp.kernel(module=module)
+    def gradient(nodes: wp.array2d[int], gradients: wp.array2d[vec3], u: wp.array[vec3], F: wp.array[mat33]):
+        t = wp.tid()
+        found = wp.identity(n=3, dtype=scalar)
+        for b in range(nodes.shape[1]):
+            found += wp.outer(u[nodes[t, b]], gradients[t, b])
+        F[t] = found
+
+    @wp.kernel(module=module)
+    def forces(gradients: wp.array2d[vec3], volume: wp.array[scalar], P: wp.array[mat33], out: wp.array2d[vec3]):
+        t, b = wp.tid()
+        out[t, b] = volume[t] * (P[t] * gradients[t, b])
+
+    @wp.kernel(module=module)
+    def tangents(
+        rows: wp.array[int],
+        columns: wp.array[int],
+        gradients: wp.array2d[vec3],
+        volume: wp.array[scalar],
+        moduli: wp.array3d[mat33],
+        out: wp.array2d[mat33],
+    ):
+        t, pair = wp.tid()
+        g = volume[t] * gradients[t, rows[pair]]
+        h = gradients[t, columns[pair]]
+        K = mat33()
+        for j in range(3):
+            for k in range(3):
+                K += g[j] * h[k] * moduli[t, j, k]
+        out[t, pair] = K
+
+    return AveragedKernels(gradient, forces, tangents)

@@ -1,0 +1,164 @@
+"""Tetrahedra that do not lock: nodally averaged deformation gradients, stabilised (Puso and Solberg 2006).
+
+    Pi = sum_a V_a (Psi(F_a) - s Psi'(F_a)) + s sum_e V_e Psi'(F_e)
+
+`F_a` is the mean of the deformation gradients of the elements of one tissue around node a, weighted by a quarter of
+their volumes, `V_a` that volume. `Psi'` is the law with a volumetric modulus of at most `KEPT` shear moduli, `s` a
+small part. The first sum alone does not lock, and bends better than linear tetrahedra do, but has modes that alternate
+from element to element without energy; the elements' own part gives them some. Energies are linear in the volumetric
+modulus, so the first sum is the law with another one, times 1 - s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.kernels.averaged_gradient import averaged_kernels
+from warpbrain.kernels.tetrahedron import ElementKernels
+from warpbrain.physics.term import Body, Term
+from warpbrain.simulation.model import Material
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+#: `s`, and the largest volumetric modulus [shear moduli] in `Psi'`.
+PART, KEPT = 0.05, 5.0
+
+
+def own_modulus(material: Material) -> float:
+    """Volumetric modulus of `Psi'` [Pa]."""
+    return min(material.volumetric_modulus, KEPT * material.law.shear_modulus)
+
+
+def averaged_modulus(material: Material) -> float:
+    """Volumetric modulus [Pa] of the law whose energy, times 1 - s, is `Psi - s Psi'`."""
+    return (material.volumetric_modulus - PART * own_modulus(material)) / (1.0 - PART)
+
+
+class AveragedTerm(Term):
+    """Patches of as many nodes each, under one law.
+
+    Parameters
+    ----------
+    body : Body
+    nodes : (k, s) int array
+        Nodes of each patch, ascending.
+    elements : list of k int arrays
+        Elements of each patch.
+    kernels : ElementKernels
+        Of the law.
+    """
+
+    def __init__(self, body: Body, nodes: Ints, elements: list[Ints], kernels: ElementKernels) -> None:
+        super().__init__(body, nodes)
+        p, device, count = body.precision, body.device, len(nodes)
+        self._law, self._kernels = kernels, averaged_kernels(p)
+        self._members = np.concatenate(elements)
+        self._owner = np.repeat(np.arange(count), [len(own) for own in elements])
+        self._shares = 0.25 * body.mesh.volumes[self._members]
+        self._nodes = wp.array(self.stencils, dtype=int, device=device)
+        self._gradients = self.array(self._mean_gradients(body), p.vec3)
+        self._volumes = np.zeros(count)
+        self._volume = wp.zeros(count, dtype=p.scalar, device=device)
+        self._parameters: wp.array = None
+        rows, columns = np.triu_indices(nodes.shape[1])
+        self._rows, self._columns = self.array(rows, int), self.array(columns, int)
+        self._all = self.array(np.arange(count), int)
+        self._F = wp.zeros(count, dtype=p.mat33, device=device)
+        self._P = wp.zeros(count, dtype=p.mat33, device=device)
+        self._density = wp.zeros(count, dtype=p.scalar, device=device)
+        self._moduli = wp.zeros((count, 3, 3), dtype=p.mat33, device=device)
+
+    def _mean_gradients(self, body: Body) -> Floats:
+        """`G_b` (k, s, 3) [1/m]."""
+        last = body.inverse_edges.numpy().astype(np.float64)[self._members]
+        own = np.concatenate([-last.sum(axis=1, keepdims=True), last], axis=1)
+        corners = body.tetrahedra[self._members]
+        # where each corner stands among the patch's nodes
+        places = np.stack([np.sum(self.stencils[self._owner] < corners[:, a, None], axis=1) for a in range(4)], axis=1)
+        found = np.zeros((*self.stencils.shape, 3))
+        np.add.at(found, (self._owner[:, None], places), self._shares[:, None, None] * own)
+        return found / self._sum(np.ones(len(body.tetrahedra)))[:, None, None]
+
+    def _sum(self, values: Floats) -> Floats:
+        """Sum of `w_e` times values of elements over each patch."""
+        found = np.bincount(self._owner, self._shares * values[self._members], minlength=len(self.stencils))
+        return found.astype(np.float64)
+
+    def set_elements(self, parameters: Floats, weight: Floats) -> None:
+        """Take what the elements have.
+
+        Parameters
+        ----------
+        parameters : (m, c) array
+            Of the law; each patch takes the mean of its elements.
+        weight : (m,) array
+            Factor on the energy of each element.
+        """
+        volumes = self._sum(np.ones(len(weight)))
+        means = np.stack([self._sum(column) / volumes for column in parameters.T], axis=1)
+        self._parameters = self.array(means, self.body.precision.scalar)
+        self._volumes = (1.0 - PART) * self._sum(weight)
+        self._volume.assign(self._volumes)
+
+    def stress(self, u: wp.array) -> tuple[Ints, Ints, Floats]:
+        """Elements, the patch of each, and the first Piola-Kirchhoff stress of each patch [Pa], (k, 3, 3)."""
+        self._stress(u)
+        return self._members, self._owner, self._P.numpy().astype(np.float64)
+
+    def set_scale(self, scale: float) -> None:
+        # a material is there, however little of the load is
+        super().set_scale(1.0)
+
+    def _stress(self, u: wp.array) -> None:
+        device, count = self.body.device, len(self.stencils)
+        wp.launch(self._kernels.gradient, count, [self._nodes, self._gradients, u, self._F], device=device)
+        inputs = [self._all, self._F, self._parameters, self._density, self._P]
+        wp.launch(self._law.stress, count, inputs, device=device)
+
+    def evaluate_forces(self, u: wp.array) -> None:
+        self._stress(u)
+        inputs = [self._gradients, self._volume, self._P, self.forces]
+        wp.launch(self._kernels.forces, self.stencils.shape, inputs, device=self.body.device)
+
+    def evaluate_tangents(self, u: wp.array) -> None:
+        self.evaluate_forces(u)
+        device, count = self.body.device, len(self.stencils)
+        inputs = [self._all, self._F, self._parameters, self._moduli]
+        wp.launch(self._law.moduli, (count, 3, 3), inputs, device=device)
+        inputs = [self._rows, self._columns, self._gradients, self._volume, self._moduli, self.blocks]
+        wp.launch(self._kernels.tangents, (count, len(self._rows)), inputs, device=device)
+
+    def energy(self, u: wp.array) -> float:
+        self._stress(u)
+        if float(np.linalg.det(self._F.numpy().astype(np.float64)).min()) <= 0.0:
+            return np.inf
+        return float(self._density.numpy().astype(np.float64) @ self._volumes)
+
+
+def node_patches(tetrahedra: NDArray[np.integer], tissue: NDArray[np.integer]) -> Iterator[tuple[int, Ints, Ints]]:
+    """Label, elements and nodes of every patch: the elements of one tissue around each node."""
+    corner_nodes = tetrahedra.ravel()
+    labels = np.repeat(tissue, 4)
+    order = np.lexsort((np.arange(len(corner_nodes)), labels, corner_nodes))
+    keys = np.stack([corner_nodes[order], labels[order]], axis=1)
+    starts = np.flatnonzero(np.r_[True, np.any(keys[1:] != keys[:-1], axis=1)])
+    for start, end in zip(starts, np.r_[starts[1:], len(order)], strict=True):
+        elements = order[start:end] // 4
+        yield int(keys[start, 1]), elements, np.unique(tetrahedra[elements])
+
+
+def averaged_terms(body: Body, labels: Sequence[int], kernels: ElementKernels) -> list[AveragedTerm]:
+    """The patches of some tissues that have one law: a term for each number of nodes."""
+    families: dict[int, list[tuple[Ints, Ints]]] = {}
+    for label, elements, nodes in node_patches(body.tetrahedra, body.mesh.tissue):
+        if label in labels:
+            families.setdefault(len(nodes), []).append((nodes, elements))
+    return [
+        AveragedTerm(body, np.array([nodes for nodes, _ in patches]), [elements for _, elements in patches], kernels)
+        for _, patches in sorted(families.items())
+    ]
