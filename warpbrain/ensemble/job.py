@@ -55,6 +55,13 @@ class Job:
     precision: str = "double"
     versions: dict[str, str] = field(default_factory=_versions)
 
+    def __post_init__(self) -> None:
+        if self.model.mechanisms:
+            kinds = ", ".join(dict.fromkeys(mechanism.kind for mechanism in self.model.mechanisms))
+            raise InputError(f"an ensemble cannot have mechanisms whose forces follow the deformation yet: {kinds}")
+        if self.model.elements != "tet4":
+            raise InputError(f"an ensemble cannot have elements '{self.model.elements}' yet: expected tet4")
+
     def part(self, numbers: Collection[int]) -> Job:
         """The same job for some of its samples, by number."""
         return replace(self, samples=tuple(sample for sample in self.samples if sample.number in numbers))

@@ -29,7 +29,7 @@ from warpbrain.estimation.parameters import Parameters
 from warpbrain.mesh import TetMesh, boundary_faces, node_areas, nodes_of
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.force import NodalForce
-from warpbrain.physics.resection import Resection
+from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.simulation.of_case import model_of
 
 Floats = NDArray[np.float64]

@@ -183,6 +183,10 @@ class Mechanism(Ramped, abc.ABC):
             if says.kind in ("node set", "element set") and getattr(self, name):
                 _require_set(name, says.kind, getattr(self, name), mesh)
 
+    def held(self, mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Nodes (k,), repeated if need be, and directions (k, 3) in which it holds them."""
+        return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
         said = []

@@ -113,10 +113,6 @@ class Term(abc.ABC):
         """Come closer to a constraint that a penalty stands for; whether it was worth it, so that to solve again is."""
         return False
 
-    def held(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Nodes (k,), repeated if need be, and directions (k, 3) in which it holds them."""
-        return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
-
     def forget(self) -> None:  # noqa: B027
         """Tell a term with a memory that the body is at rest in its reference shape, and always was."""
 

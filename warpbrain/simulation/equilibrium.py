@@ -201,7 +201,7 @@ class EquilibriumSolver:
             If no equilibrium is found: at what load fraction, where and why.
         """
         model = self.system.model
-        require_held(model, self.system.terms)
+        require_held(model)
         full = model.external_forces() if external is None else external
         u = np.zeros_like(full) if start is None else np.array(start, dtype=np.float64)
         origin = np.where(model.constrained, u, 0.0)

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from warpbrain.errors import InputError
-from warpbrain.physics.term import Term
 from warpbrain.simulation.model import Model
 
 
-def require_held(model: Model, terms: Sequence[Term] = ()) -> None:
+def require_held(model: Model) -> None:
     """Raise `InputError` if a connected part of the body can move as a rigid one.
 
-    Each part needs constrained components, or terms that hold it, that exclude its six rigid motions.
+    Each part needs constrained components, or mechanisms that hold it, that exclude its six rigid motions.
     """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
@@ -25,7 +22,7 @@ def require_held(model: Model, terms: Sequence[Term] = ()) -> None:
     others = mesh.tetrahedra[:, 1:].ravel()
     links = csr_matrix((np.ones(len(first), dtype=np.int8), (first, others)), shape=(count, count))
     parts, part = connected_components(links, directed=False)
-    holding = [term.held() for term in terms]
+    holding = [mechanism.held(mesh) for mechanism in model.mechanisms]
     for number in range(parts):
         members = np.flatnonzero(part == number)
         x = mesh.points[members] - mesh.points[members].mean(axis=0)

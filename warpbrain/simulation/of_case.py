@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.cases.boundary import Displaced, Fixed, Forced, Pressed
+from warpbrain.cases.boundary import Contact, Displaced, Fixed, Forced, Pressed, Sliding
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.errors import InputError
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Removing, Substituting
+from warpbrain.physics.mechanisms.contact import Contact as SkullContact
 from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.simulation.model import Material, Model, Motion
 
@@ -51,9 +52,17 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
             loads.append(NodalForce(nodes=boundary.nodes, total=boundary.total, ramp=boundary.ramp))
         elif isinstance(boundary, Pressed):
             mechanisms.append(Pressure(nodes=boundary.nodes, value=boundary.value, ramp=boundary.ramp))
-        elif not isinstance(boundary, Fixed):
-            raise InputError(
-                f"{case.path}: [[boundary]] '{boundary.name}' kind: '{boundary.kind}' cannot be simulated yet"
+        elif isinstance(boundary, Sliding):
+            mechanisms.append(SkullContact(nodes=boundary.nodes))
+        elif isinstance(boundary, Contact):
+            mechanisms.append(
+                SkullContact(
+                    nodes=boundary.nodes,
+                    state="lifting",
+                    friction=boundary.friction,
+                    points=boundary.points,
+                    faces=boundary.faces,
+                )
             )
     try:
         materials = {label: _material(case, label, tissue) for label, tissue in case.tissues.items()}

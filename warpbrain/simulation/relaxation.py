@@ -122,7 +122,7 @@ def relax_to_rest(
     options = options or RelaxationOptions()
     clock = clock or PhaseClock(system.device)
     model = system.model
-    require_held(model, system.terms)
+    require_held(model)
     goal = least_residual(options.tolerance, system.precision)
     free = 1.0 - model.constrained
     external = model.external_forces()

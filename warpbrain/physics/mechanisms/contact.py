@@ -90,6 +90,12 @@ class Contact(Mechanism):
             raise ParameterError("nodes", f"node set '{self.nodes}' holds no face of the surface")
         return mesh.points, own
 
+    def held(self, mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        members = np.flatnonzero(mesh.node_sets[self.nodes])
+        if self.state == "fixed":
+            return np.repeat(members, 3), np.tile(np.eye(3), (len(members), 1))
+        return members, _vertex_normals(mesh)[members]
+
     def bind(self, body: Body) -> "ContactTerm":
         """See `warpbrain.physics.term.Following`."""
         return ContactTerm(body, self)
@@ -184,13 +190,6 @@ class ContactTerm(Term):
     def forget(self) -> None:
         self._found.zero_()
         self._pressing.zero_()
-
-    def held(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        members = self.stencils[:, 0].astype(np.int64)
-        if self.mechanism.state == "fixed":
-            return np.repeat(members, 3), np.tile(np.eye(3), (len(members), 1))
-        normals = _vertex_normals(self.body.mesh)[members]
-        return members, normals
 
 
 def _vertex_normals(mesh: TetMesh) -> NDArray[np.float64]:

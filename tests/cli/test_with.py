@@ -1,0 +1,56 @@
+"""`warpbrain run --with`: mechanisms said in one line."""
+
+import json
+
+import pytest
+from command import run
+from folders import write_folder
+
+
+def largest(out):
+    return json.loads((out / "summary.json").read_text())["result"]["displacement_mm"]["top"]["largest"]
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "swelling:amount=5",
+        "pressure:nodes=top,value=40",
+        "inclusion:ratio=4,centre=5/5/5,radius=4",
+        "fibres:direction=1/0/0,stiffness=20000",
+        "residual-stress:tension=100,direction=0/0/1",
+        "compressibility:poisson=0.3",
+        "asymmetry:exponent=-8",
+        "traction:centre=10/10/20,value=0/0/-20,radius=10",
+        "contact:nodes=top",
+    ],
+)
+def test_each_changes_what_happens(tmp_path, said):
+    folder = write_folder(tmp_path / "case")
+    plain = run(folder, "--out", tmp_path / "plain")
+    done = run(folder, "--with", said, "--out", tmp_path / "with")
+    assert (plain.status, done.status) == (0, 0), done.err
+    kind = said.split(":")[0]
+    assert abs(largest(tmp_path / "with") - largest(tmp_path / "plain")) > 1e-4, kind
+
+
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        ("swelling", "swelling: amount is missing [%]"),
+        ("sweling:amount=3", "no mechanism 'sweling': did you mean swelling?"),
+        ("swelling:amount=much", "amount: found 'much', expected a number [%]"),
+        ("swelling:amount=-95", "amount: found -95, expected a number between -90 and 400"),
+        ("swelling:size=3", "no key 'size' of swelling: expected one of amount, elements, centre, radius"),
+        ("swelling:amount=3,radius=5", "centre: missing: a ball has a centre and a radius"),
+        ("swelling:amount=3,amount=4", "each key once"),
+        ("pressure:nodes=nothing,value=3", "nodes: the mesh has no node set 'nothing'"),
+        ("traction:centre=1/2,value=0/0/1", "centre: found '1/2', expected three numbers joined by /"),
+        ("contact:nodes=top,state=glued", "state: found 'glued', expected one of fixed, sliding, lifting"),
+        ("viscoelasticity:moduli=1/2,times=1", "times: found 1, and 2 of moduli"),
+    ],
+)
+def test_what_makes_no_sense_is_told(tmp_path, said, expected):
+    done = run(write_folder(tmp_path / "case"), "--with", said, "--out", tmp_path / "out")
+    assert done.status == 2 and expected in done.err, done.err
+    assert not (tmp_path / "out").exists()
