@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from shapes import box
-from warpbrain.physics.gravity import Gravity
 
 from warpbrain.cases.boundary import Boundary, Displaced, Fixed, Forced
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import Law, NeoHookean
+from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, SurfaceRecording
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.of_case import model_of

@@ -86,7 +86,10 @@ WRONG = {
         r"\[mechanism 2\] kind: a second 'resection'",
     ),
     "kind": (('"force"', '"farce"'), r"\[boundary 2\] kind: found 'farce', expected one of fixed, sliding"),
-    "falx": (("[body]", '[[mechanism]]\nkind = "falx"\n[body]'), r"\[mechanism 1\] kind: found 'falx', expected"),
+    "skull-flap": (
+        ("[body]", '[[mechanism]]\nkind = "skull-flap"\n[body]'),
+        r"\[mechanism 1\] kind: found 'skull-flap', expected",
+    ),
     # files
     "no mesh": (('"mesh.vtu"', '"other.vtu"'), r"\[mesh\] file: no such file: .*other.vtu"),
     "outside": (('"mesh.vtu"', '"../mesh.vtu"'), r"\[mesh\] file: '../mesh.vtu' leaves the case folder"),

@@ -21,7 +21,7 @@ def largest(out):
         "residual-stress:tension=100,direction=0/0/1",
         "compressibility:poisson=0.3",
         "asymmetry:exponent=-8",
-        "traction:centre=10/10/20,value=0/0/-20,radius=10",
+        "traction:centre=15/15/30,value=0/0/-20,radius=15",
         "contact:nodes=top",
     ],
 )
