@@ -54,3 +54,12 @@ def test_what_makes_no_sense_is_told(tmp_path, said, expected):
     done = run(write_folder(tmp_path / "case"), "--with", said, "--out", tmp_path / "out")
     assert done.status == 2 and expected in done.err, done.err
     assert not (tmp_path / "out").exists()
+
+
+def test_elements_that_do_not_lock_move_more(tmp_path):
+    folder = write_folder(tmp_path / "case")
+    stiff = ("--poisson", "0.49")
+    for elements in ("tet4", "tet4-averaged"):
+        done = run(folder, *stiff, "--elements", elements, "--out", tmp_path / elements)
+        assert done.status == 0, done.err
+    assert largest(tmp_path / "tet4-averaged") > 1.05 * largest(tmp_path / "tet4")

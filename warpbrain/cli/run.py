@@ -62,6 +62,12 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="assume one more mechanism, such as gravity:level=60 (see docs/mechanisms.md); can be given several times",
     )
     add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
+    add(
+        "--elements",
+        choices=("tet4", "tet4-averaged"),
+        default="tet4",
+        help="plain tetrahedra (default), or averaged gradients, which do not lock in nearly incompressible tissue",
+    )
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
     add("--precision", choices=("double", "single"), default="double", help="default: double")
     motion = parser.add_mutually_exclusive_group()
@@ -108,7 +114,7 @@ def _run(options: argparse.Namespace) -> None:
 
         run_specimen.run(options, case, say, prior)
         return
-    model, _ = model_of(case)
+    model = replace(model_of(case)[0], elements=options.elements)
     described = tables.describe_case(case, model)
     say(*tables.case_lines(described), *prior_lines(prior), sep="\n")
     system = System(model, options.device, options.precision)

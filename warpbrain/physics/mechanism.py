@@ -197,8 +197,10 @@ class Mechanism(Ramped, abc.ABC):
             if isinstance(value, str):
                 said.append(f"{name} '{value}'")
             else:
-                numbers = ", ".join(f"{v / says.si:g}" for v in np.ravel(value))
-                said.append(f"{name} {numbers}{f' {says.unit}' if says.unit else ''}")
+                # positions are millimetres to people, whatever the case's unit
+                unit, si = ("mm", 1e-3) if says.kind == "position" else (says.unit, says.si)
+                numbers = ", ".join(f"{v / si:g}" for v in np.ravel(value))
+                said.append(f"{name} {numbers}{f' {unit}' if unit else ''}")
         return f" ({'; '.join(said)})" if said else ""
 
 
