@@ -17,6 +17,7 @@ from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.prior_modes import PriorMode
 from warpbrain.estimation.problem import Problem
 from warpbrain.estimation.registration import Registration
+from warpbrain.physics.mechanisms.asymmetry import Asymmetry
 
 THETA = np.log([1200.0, 1100.0])
 
@@ -92,3 +93,9 @@ def test_the_estimated_noise_is_the_likeliest() -> None:
 def test_degrees_of_freedom_are_positive() -> None:
     with pytest.raises(InputError, match="nu = 0: expected a positive number"):
         Likelihood(0.0)
+
+
+def test_a_mechanism_that_says_the_law_is_refused() -> None:
+    case = block({"grey": GREY, "white": WHITE}, "moved")
+    with pytest.raises(InputError, match="'asymmetry': says what law tissues have"):
+        Forward(replace(case, mechanisms=(*case.mechanisms, Asymmetry(exponent=-5.0))), THETA, "cpu")

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
+from warpbrain.errors import InputError
 from warpbrain.estimation.parameters import Parameters
+from warpbrain.physics.mechanism import Substituting
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.sensitivity import Sensitivities, SensitivitySolver
@@ -65,6 +67,12 @@ class Forward:
     """
 
     def __init__(self, case: Case, theta: Floats, device: str | None = None, added: Floats | None = None) -> None:
+        for mechanism in case.mechanisms:
+            if isinstance(mechanism, Substituting):
+                raise InputError(
+                    f"{case.path}: [[mechanism]] kind = '{mechanism.kind}': says what law tissues have, and so does an "
+                    "estimate: leave it out, or write its law into the tissues"
+                )
         self.parameters = Parameters.of(case)
         self.system = System(model_of(self.parameters.applied(case, theta))[0], device)
         self.solves = 0
