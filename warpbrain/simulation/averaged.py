@@ -101,7 +101,11 @@ class AveragedTerm(Term):
         """
         volumes = self._sum(np.ones(len(weight)))
         means = np.stack([self._sum(column) / volumes for column in parameters.T], axis=1)
-        self._parameters = self.array(means, self.body.precision.scalar)
+        if self._parameters is None:
+            self._parameters = self.array(means, self.body.precision.scalar)
+        else:
+            # a captured graph reads this array
+            self._parameters.assign(means)
         self._volumes = (1.0 - PART) * self._sum(weight)
         self._volume.assign(self._volumes)
 

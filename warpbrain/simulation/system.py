@@ -115,7 +115,10 @@ class System:
         self.terms = [m.bind(self) for m in model.mechanisms if isinstance(m, Following)]
         self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
         self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
-        self._scales: tuple[float, ...] | None = None
+        # of what alters elements, as they are now; None: not known yet
+        alters = self._growing or self._weakening or self._averages
+        self._scales: tuple[float, ...] | None = None if alters else ()
+        self._weight = np.ones(self.elements)
         self._growth_stretch: Floats | float = 1.0
         self.groups = self._group_elements()
         self.terms += [term for group in self.groups for term in group.averaged]
