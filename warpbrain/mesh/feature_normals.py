@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.mesh.surface import face_vectors
+
 Floats = NDArray[np.float64]
 
 
@@ -32,9 +34,8 @@ def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats,
         `SHARP`, `HOLLOW`, both or neither, or `RIM`: an edge of one triangle only, or its corner, whose normal is that
         of the face. A region outside has what is sharp as its closest point, a region inside what is hollow.
     """
-    a, b, c = (points[faces[:, i]] for i in range(3))
     normals = np.empty((len(faces), 7, 3))
-    normals[:, 0] = _unit(np.cross(b - a, c - a))
+    normals[:, 0] = _unit(face_vectors(points, faces))
     on_rim = np.zeros((len(faces), 7), dtype=bool)
 
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)

@@ -34,8 +34,8 @@ class ExtraEnergyTerm(Term):
     elements : (k,) int array
     data : (k, c) array
         The numbers of each of these elements.
-    factor : callable
-        Of time [s]: the ramp.
+    ramp : callable
+        Factor over time [s].
     """
 
     def __init__(
@@ -44,19 +44,15 @@ class ExtraEnergyTerm(Term):
         code: ExtraEnergy,
         elements: NDArray[np.integer],
         data: NDArray[np.float64],
-        factor: Callable[[float], float],
+        ramp: Callable[[float], float],
     ) -> None:
-        super().__init__(body, body.tetrahedra[elements])
+        super().__init__(body, body.tetrahedra[elements], ramp)
         scalar = body.precision.scalar
-        self._factor = factor
         self._kernels = extra_kernels(code.key, code.energy, code.stress, code.moduli, body.precision)
         self._elements = self.array(elements, int)
         self._volume = self.array(body.mesh.volumes[elements], scalar)
         self._data = self.array(data, scalar)
         self._energies = wp.zeros(len(elements), dtype=scalar, device=body.device)
-
-    def factor(self, time: float) -> float:
-        return self._factor(time)
 
     def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
         body = self.body

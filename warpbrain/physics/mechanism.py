@@ -159,6 +159,21 @@ class Mechanism(Ramped, abc.ABC):
         return tuple(f.name for f in fields if f.default is dataclasses.MISSING or f.metadata["says"].needed)
 
     @classmethod
+    def described(cls, name: str) -> str:
+        """What a parameter is, and what it is taken to be where a case does not give it."""
+        says = cls.parameters()[name]
+        if name in cls.required():
+            return says.doc
+        default: Any = next(f.default for f in dataclasses.fields(cls) if f.name == name)
+        if default is None or default == "":
+            text = "none"
+        elif isinstance(default, str):
+            text = f"'{default}'"
+        else:
+            text = ", ".join(f"{value / says.si:g}" for value in np.ravel(default))
+        return f"{says.doc[:-1]}; {text} if absent."
+
+    @classmethod
     def of_case(cls, values: Mapping[str, Any], facts: Facts) -> Self:
         """The mechanism of a case.
 

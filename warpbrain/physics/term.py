@@ -9,6 +9,7 @@ The system knows no term by name.
 from __future__ import annotations
 
 import abc
+from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -68,6 +69,8 @@ class Term(abc.ABC):
     body : Body
     stencils : (k, s) int array
         Node ids, ascending in each row.
+    ramp : callable, optional
+        Factor over time [s]; 1 throughout if absent.
 
     Attributes
     ----------
@@ -83,8 +86,9 @@ class Term(abc.ABC):
     #: Whether `energy` is the potential of the forces. If not, the work along a step stands for its change.
     conservative: bool = True
 
-    def __init__(self, body: Body, stencils: NDArray[np.integer]) -> None:
+    def __init__(self, body: Body, stencils: NDArray[np.integer], ramp: Callable[[float], float] | None = None) -> None:
         self.body = body
+        self._ramp = ramp
         self.stencils = np.ascontiguousarray(stencils, dtype=np.int32)
         assert bool(np.all(np.diff(self.stencils, axis=1) > 0)), "nodes of a stencil ascend"
         self.scale = wp.ones(1, dtype=body.precision.scalar, device=body.device)
@@ -97,7 +101,7 @@ class Term(abc.ABC):
 
     def factor(self, time: float) -> float:
         """Factor of its ramp at a time [s]."""
-        return 1.0
+        return 1.0 if self._ramp is None else self._ramp(time)
 
     def set_scale(self, scale: float) -> None:
         """Set the factor on what it does."""

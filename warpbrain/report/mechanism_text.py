@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 import inspect
-from typing import Any
 
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
@@ -41,7 +39,7 @@ def _section(mechanism: type[Mechanism]) -> str:
     lines = [f"## {mechanism.kind}", "", f"*{mechanism.sentence}*", "", inspect.cleandoc(module.__doc__ or ""), ""]
     lines += ["| key | unit | | expected | typical | source |", "|---|---|---|---|---|---|"]
     for name, says in mechanism.parameters().items():
-        doc = says.doc if name in mechanism.required() else f"{says.doc[:-1]}; {_default(mechanism, name)} if absent."
+        doc = mechanism.described(name)
         expected = "" if says.expectation is None else str(says.expectation)
         unit = "`units`" if says.kind == "position" else says.unit
         lines.append(f"| `{name}` | {unit} | {doc} | {expected} | {says.typical} | {says.source} |")
@@ -52,12 +50,3 @@ def _section(mechanism: type[Mechanism]) -> str:
         lines.append(f"Told apart by {', '.join(mechanism.needs)}.")
     lines += [f"[{source.rsplit('/', 1)[1]}]({source})", ""]
     return "\n".join(lines)
-
-
-def _default(mechanism: type[Mechanism], name: str) -> str:
-    default: Any = next(f.default for f in dataclasses.fields(mechanism) if f.name == name)
-    if default is None or default == "":
-        return "none"
-    if isinstance(default, str):
-        return f"`{default}`"
-    return f"{default / mechanism.parameters()[name].si:g}"

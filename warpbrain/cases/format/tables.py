@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any
-
-import numpy as np
-
 from warpbrain.cases.format.keys import Key, Table
 from warpbrain.frame import AXES, METRES
 from warpbrain.physics.laws import FORMULATIONS, LAWS
@@ -185,19 +180,10 @@ def _mechanism_keys(mechanism: type[Mechanism]) -> tuple[Key, ...]:
     required = mechanism.required()
     keys = []
     for name, says in mechanism.parameters().items():
-        doc = says.doc if name in required else f"{says.doc[:-1]}; {_default(mechanism, name)} if absent."
+        doc = mechanism.described(name)
         unit = "units" if says.kind == "position" else says.unit
         keys.append(Key(name, (_KIND[says.kind],), doc, unit, name in required, says.choices, says.above, says.below))
     return (*keys, _RAMP)
-
-
-def _default(mechanism: type[Mechanism], name: str) -> str:
-    default: Any = next(f.default for f in dataclasses.fields(mechanism) if f.name == name)
-    if default is None:
-        return "none"
-    if isinstance(default, str):
-        return f"'{default}'"
-    return ", ".join(f"{value / mechanism.parameters()[name].si:g}" for value in np.ravel(default))
 
 
 MECHANISM = Table(

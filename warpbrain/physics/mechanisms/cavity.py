@@ -22,6 +22,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
 
 
@@ -86,5 +87,5 @@ class Cavity(Mechanism):
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
         """See `warpbrain.physics.term.Following`."""
-        elements = np.flatnonzero(body.mesh.element_sets[self.elements])
+        elements = elements_of(body.mesh, self.elements)
         return ExtraEnergyTerm(body, _CODE, elements, np.full((len(elements), 1), self.pressure), self.factor)

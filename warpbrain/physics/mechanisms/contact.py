@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from warpbrain.kernels.closest import closest_on_triangle
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
-from warpbrain.mesh import TetMesh, boundary_faces, node_areas
+from warpbrain.mesh import TetMesh, boundary_faces, face_vectors, node_areas
 from warpbrain.mesh.feature_normals import HOLLOW, RIM, SHARP, feature_normals
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
@@ -115,7 +115,7 @@ class ContactTerm(Term):
 
     def __init__(self, body: Body, contact: Contact) -> None:
         members = np.flatnonzero(body.mesh.node_sets[contact.nodes])
-        super().__init__(body, members[:, None])
+        super().__init__(body, members[:, None], contact.factor)
         self.mechanism = contact
         precision, device = body.precision, body.device
         points, faces = contact.skull(body.mesh)
@@ -141,9 +141,6 @@ class ContactTerm(Term):
         self._energies = wp.zeros(len(members), dtype=precision.scalar, device=device)
         self._kernels = _kernels(precision)
         self._reach = float(np.linalg.norm(np.ptp(body.mesh.points, axis=0)))
-
-    def factor(self, time: float) -> float:
-        return self.mechanism.factor(time)
 
     def set_scale(self, scale: float) -> None:
         # a wall is there, however little of the load is
@@ -197,9 +194,8 @@ class ContactTerm(Term):
 
 def _vertex_normals(mesh: TetMesh) -> NDArray[np.float64]:
     faces = boundary_faces(mesh.tetrahedra)
-    a, b, c = (mesh.points[faces[:, i]] for i in range(3))
     normals = np.zeros_like(mesh.points)
-    np.add.at(normals, faces.ravel(), np.repeat(np.cross(b - a, c - a), 3, axis=0))
+    np.add.at(normals, faces.ravel(), np.repeat(face_vectors(mesh.points, faces), 3, axis=0))
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     return normals / np.where(lengths > 0.0, lengths, 1.0)
 

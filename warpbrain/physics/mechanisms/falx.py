@@ -21,7 +21,8 @@ from warpbrain.mesh import TetMesh
 from warpbrain.mesh.surface import all_faces
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
-from warpbrain.physics.term import Body, Term
+from warpbrain.physics.term import Body
+from warpbrain.physics.triangle_term import TriangleTerm
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,20 +73,17 @@ class Falx(Mechanism):
         return MembraneTerm(body, self)
 
 
-class MembraneTerm(Term):
+class MembraneTerm(TriangleTerm):
     """`Falx` on a device."""
 
     def __init__(self, body: Body, falx: Falx) -> None:
-        super().__init__(body, np.sort(falx.faces(body.mesh), axis=1))
-        self.mechanism = falx
-        scalar = body.precision.scalar
-        corners = body.mesh.points[self.stencils]
+        faces = np.sort(falx.faces(body.mesh), axis=1)
+        corners = body.mesh.points[faces]
         first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         # two directions in the plane, then the gradients of the shape functions of nodes 1 and 2 in them
         along = first / np.linalg.norm(first, axis=1, keepdims=True)
         across = second - np.einsum("kj,kj->k", second, along)[:, None] * along
-        height = np.linalg.norm(across, axis=1)
-        across /= height[:, None]
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
         edges = np.stack(
             [np.stack([np.einsum("kj,kj->k", e, d) for d in (along, across)], -1) for e in (first, second)], 1
         )
@@ -93,33 +91,12 @@ class MembraneTerm(Term):
         area = 0.5 * np.abs(np.linalg.det(edges))
         modulus = falx.thickness * falx.stiffness / 3.0
         data = np.concatenate([(modulus * area)[:, None], gradients.reshape(-1, 4)], axis=1)
-        self._data = self.array(data, scalar)
-        self._nodes = self.array(self.stencils, wp.vec3i)
-        self._points = self.array(body.mesh.points, body.precision.vec3)
-        self._energies = wp.zeros(len(data), dtype=scalar, device=body.device)
-        self._kernels = _kernels(body.precision)
-
-    def factor(self, time: float) -> float:
-        return self.mechanism.factor(time)
+        super().__init__(body, faces, body.mesh.points, data, _kernels(body.precision), falx.factor)
+        self._always = falx.factor()
 
     def set_scale(self, scale: float) -> None:
         # a membrane is there, however little of the load is
-        super().set_scale(self.mechanism.factor())
-
-    def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
-        inputs = [self._nodes, self._points, self._data, self.scale, u, *outputs]
-        wp.launch(kernel, dim=len(self.stencils), inputs=inputs, device=self.body.device)
-
-    def evaluate_forces(self, u: wp.array) -> None:
-        self._launch(self._kernels[0], u, self.forces)
-
-    def evaluate_tangents(self, u: wp.array) -> None:
-        self.evaluate_forces(u)
-        self._launch(self._kernels[1], u, self.blocks)
-
-    def energy(self, u: wp.array) -> float:
-        self._launch(self._kernels[2], u, self._energies)
-        return float(np.sum(self._energies.numpy(), dtype=np.float64))
+        super().set_scale(self._always)
 
 
 @cache

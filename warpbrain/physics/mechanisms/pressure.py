@@ -25,7 +25,8 @@ from warpbrain.mesh import TetMesh, boundary_faces
 from warpbrain.mesh.soundness import open_edges
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
-from warpbrain.physics.term import Body, Term
+from warpbrain.physics.term import Body
+from warpbrain.physics.triangle_term import TriangleTerm
 
 Ints = NDArray[np.int32]
 
@@ -74,41 +75,23 @@ class Pressure(Mechanism):
         return PressureTerm(body, self)
 
 
-class PressureTerm(Term):
+class PressureTerm(TriangleTerm):
     """`Pressure` on a device."""
 
     def __init__(self, body: Body, pressure: Pressure) -> None:
         faces = pressure.faces(body.mesh)
         order = np.argsort(faces, axis=1)
-        super().__init__(body, np.take_along_axis(faces, order, axis=1))
-        self.conservative = not len(open_edges(faces))
-        self.mechanism = pressure
-        scalar = body.precision.scalar
         # a permutation of three is even if it is a rotation
         even = (order[:, 1] - order[:, 0]) % 3 == 1
-        self._value = self.array(pressure.value * np.where(even, 1.0, -1.0), scalar)
-        self._nodes = self.array(self.stencils, wp.vec3i)
-        self._points = self.array(body.mesh.points - body.mesh.points[faces].mean(axis=(0, 1)), body.precision.vec3)
-        self._energies = wp.zeros(len(faces), dtype=scalar, device=body.device)
-        self._kernels = _kernels(body.precision)
-
-    def factor(self, time: float) -> float:
-        return self.mechanism.factor(time)
-
-    def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
-        inputs = [self._nodes, self._points, self._value, self.scale, u, *outputs]
-        wp.launch(kernel, dim=len(self.stencils), inputs=inputs, device=self.body.device)
-
-    def evaluate_forces(self, u: wp.array) -> None:
-        self._launch(self._kernels[0], u, self.forces)
-
-    def evaluate_tangents(self, u: wp.array) -> None:
-        self.evaluate_forces(u)
-        self._launch(self._kernels[1], u, self.blocks)
-
-    def energy(self, u: wp.array) -> float:
-        self._launch(self._kernels[2], u, self._energies)
-        return float(np.sum(self._energies.numpy(), dtype=np.float64))
+        super().__init__(
+            body,
+            np.take_along_axis(faces, order, axis=1),
+            body.mesh.points - body.mesh.points[faces].mean(axis=(0, 1)),
+            pressure.value * np.where(even, 1.0, -1.0),
+            _kernels(body.precision),
+            pressure.factor,
+        )
+        self.conservative = not len(open_edges(faces))
 
 
 @cache

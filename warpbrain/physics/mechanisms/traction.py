@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.mesh import TetMesh, boundary_faces, face_vectors
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
@@ -69,7 +69,7 @@ class Traction(Load, Mechanism):
     def nodal_forces(self, mesh: TetMesh) -> NDArray[np.float64]:
         faces = boundary_faces(mesh.tetrahedra)
         corners = mesh.points[faces]
-        areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        areas = np.linalg.norm(face_vectors(mesh.points, faces), axis=1)
         shares = np.zeros(faces.shape)
         for weights, part in _RULE:
             at = np.einsum("a,faj->fj", weights, corners)

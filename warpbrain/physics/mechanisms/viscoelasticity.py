@@ -73,7 +73,7 @@ class ViscoelasticTerm(Term):
     """`Viscoelasticity` on a device, with its memory."""
 
     def __init__(self, body: Body, mechanism: Viscoelasticity) -> None:
-        super().__init__(body, body.tetrahedra)
+        super().__init__(body, body.tetrahedra, mechanism.factor)
         self.mechanism = mechanism
         scalar, mat33 = body.precision.scalar, body.precision.mat33
         count, branches = len(self.stencils), len(mechanism.times)
@@ -83,9 +83,6 @@ class ViscoelasticTerm(Term):
         self._q = wp.zeros((count, branches), dtype=mat33, device=body.device)
         self._S = wp.zeros(count, dtype=mat33, device=body.device)
         self._kernels = _kernels(body.precision)
-
-    def factor(self, time: float) -> float:
-        return self.mechanism.factor(time)
 
     def set_time_step(self, h: float) -> None:
         times = np.array(self.mechanism.times)
