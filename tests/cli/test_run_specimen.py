@@ -243,3 +243,30 @@ def test_what_is_refused_is_named(tmp_path, changes, message):
 def test_one_tissue_is_that_of_its_own_file(folder):
     found = run(folder, "--tissue", "single")
     assert found.status == 2 and "case-single.toml" in found.err
+
+
+def test_what_relaxes_is_followed_through_time(tmp_path):
+    """Mechanisms of a case or of `--with`; what cannot act in a specimen, or lacks times, is told first."""
+    alone = CASE[CASE.index('\n[[recording]]\nname = "slide"') :]
+    folder = write(tmp_path / "case", (alone, ""))
+    found = run(folder, "--with", "viscoelasticity:moduli=2,times=0.5", "--out", tmp_path / "out")
+    assert (found.status, found.err) == (0, "")
+    assert "  assumed   the test is quasi-static and follows its recorded times" in found.out
+    assert "rate and history" not in found.out
+    [test] = summary(tmp_path / "out")["solution"]["tests"]
+    assert test["time_s"][0] == 0.0 and test["time_s"][-1] == 3.0
+    assert len(test["time_s"]) == len(test["response"]["values"])
+    slow = {"press.csv": "displacement,force\n0,0\n-0.2,-0.01\n"}
+    slower = write(tmp_path / "slower", (alone, ""), tables=slow)
+    for where, said, expected in (
+        (slower, "viscoelasticity:moduli=2,times=0.5", "no column t"),
+        (folder, "inclusion:ratio=2,centre=0/0/1,radius=1", "means nothing in a [specimen]"),
+    ):
+        found = run(where, "--with", said, "--out", tmp_path / "none")
+        assert found.status == 2 and expected in found.err
+        assert not (tmp_path / "none").exists()
+
+
+def test_elements_that_do_not_lock_say_nothing_of_locking(folder, tmp_path):
+    found = run(folder, "--elements", "tet4-averaged", "--out", tmp_path / "out")
+    assert found.status == 0 and "linear tetrahedra" not in found.out

@@ -2,70 +2,32 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from material_point import LAWS, MATERIALS
 from scipy.optimize import minimize_scalar
+from testing_machine import BRAIN, CUBE, EXACT, case_of, recorded
 
 from warpbrain.cases import specimen as specimens
 from warpbrain.cases.boundary import Fixed
-from warpbrain.cases.case import Case, Tissue
+from warpbrain.cases.case import Tissue
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, SolveError
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
 from warpbrain.physics.mechanisms.gravity import Gravity
-from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.specimen import Rig, compare_test, imposed_values, simulate_test
 from warpbrain.simulation.system import System
 
-QUANTITIES = {
-    "axial": ("displacement", "force"),
-    "stretch": ("stretch", "stress"),
-    "shear": ("displacement", "force"),
-    "torsion": ("angle", "torque"),
-}
-CUBE = Specimen("block", (5e-3, 5e-3, 5e-3), "glued")
 DISC = Specimen("cylinder", (8e-3, 8e-3, 4.541e-3), "glued")
-BRAIN = Material(NeoHookean(1000.0), 0.45)
-EXACT = EquilibriumOptions(tolerance=1e-11)
 
 
 @pytest.fixture
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """Meshes of an eighth of the elements, where no number depends on the mesh."""
     monkeypatch.setattr(specimens, "CELLS", 6)
-
-
-def case_of(specimen: Specimen, material: Material = BRAIN) -> Case:
-    return Case(
-        name="specimen",
-        title="A specimen",
-        origin="synthetic",
-        path=Path("case.toml"),
-        mesh=specimen.mesh(),
-        tissues={1: Tissue("gel", material.law, material.formulation)},
-        density=1000.0,
-        poisson=material.poisson,
-        specimen=specimen,
-    )
-
-
-def recorded(mode: str, imposed: list[float] | np.ndarray, response: list[float] | None = None) -> TestRecording:
-    """A test; the mode "stretch" is an axial one in stretch and stress."""
-    values = np.asarray(imposed, dtype=float)
-    answer = np.zeros(len(values)) if response is None else np.array(response, dtype=float)
-    return TestRecording(
-        name="cycle 1",
-        file="cycle1.csv",
-        mode="axial" if mode == "stretch" else mode,
-        quantities=QUANTITIES[mode],
-        imposed=values,
-        response=answer,
-    )
 
 
 def at_end(specimen: Specimen, mode: str, value: float, device: str, material: Material = BRAIN) -> float:
@@ -334,7 +296,7 @@ def test_lubricated_grips_transmit_no_shear(mode: str) -> None:
         ({"boundaries": (Fixed(name="jaw", nodes="top"),)}, "[[boundary]] 'jaw': means nothing with [specimen]"),
         (
             {"mechanisms": (Gravity(direction=(0.0, 0.0, -1.0), density=1000.0),)},
-            "[[mechanism]]: nothing but the grips can act on a [specimen] yet",
+            "[[mechanism]] kind = 'gravity': means nothing in a [specimen] between its grips; what can act",
         ),
         ({"tissues": {1: Tissue("gel", None, prior="hyperelastic")}}, "[tissue.1] gel: mu ="),
     ],

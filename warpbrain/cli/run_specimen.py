@@ -51,11 +51,13 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior
     from warpbrain.simulation.observation import Observed
     from warpbrain.simulation.specimen import Rig
 
-    rig = Rig(case, options.device, options.precision, EquilibriumOptions(tolerance=options.tolerance))
+    solving = EquilibriumOptions(tolerance=options.tolerance)
+    rig = Rig(case, options.device, options.precision, solving, options.elements)
     for recording in tests:
         rig.check(recording)
     system = rig.system
-    described = text.describe_specimen(case, rig.specimen, system.model)
+    in_time = any(rig.follows_time(recording) for recording in tests)
+    described = text.describe_specimen(case, rig.specimen, system.model, in_time)
     say(*text.specimen_lines(described), *prior_lines(prior), sep="\n")
     out = output_folder(options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}"))
     say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
@@ -66,8 +68,12 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior
     say("", *text.tested_lines(done), sep="\n")
     say("", *timing_lines(seconds, rig.solver.clock.counts), sep="\n")
 
-    law = next(iter(case.tissues.values())).known_law
-    subtitle = f"{rig.specimen.grips} ends, {law.name}, mu = {law.shear_modulus:g} Pa, nu = {case.poisson:g}; elastic"
+    [material] = system.model.materials.values()
+    acting = ", ".join(mechanism.kind for mechanism in system.model.mechanisms) or "elastic"
+    subtitle = (
+        f"{rig.specimen.grips} ends, {material.law.name}, mu = {material.law.shear_modulus:g} Pa, "
+        f"nu = {material.poisson:g}; {acting}"
+    )
     write_tests_picture(out / "tests.png", done, case.title, subtitle)
     text.write_tests(out / "comparison.csv", done)
     summary = {

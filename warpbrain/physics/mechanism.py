@@ -146,6 +146,8 @@ class Mechanism(Ramped, abc.ABC):
     needs: ClassVar[tuple[str, ...]] = ()
     #: Whether a case can have several.
     several: ClassVar[bool] = False
+    #: Whether it means something in a laboratory specimen between its grips.
+    of_specimens: ClassVar[bool] = False
 
     @classmethod
     def parameters(cls) -> dict[str, Says]:
@@ -191,6 +193,12 @@ class Mechanism(Ramped, abc.ABC):
         made = cls(**values)
         made.check(facts.mesh)
         return made
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether it acts in the same way in all of a body, and not in some place of it."""
+        places = ("node set", "element set", "position")
+        return not any(getattr(self, name) for name, says in self.parameters().items() if says.kind in places)
 
     def check(self, mesh: TetMesh) -> None:
         """Raise `ParameterError` if a parameter makes no sense with a mesh: a set that is not there, or is empty."""

@@ -85,6 +85,8 @@ class Term(abc.ABC):
 
     #: Whether `energy` is the potential of the forces. If not, the work along a step stands for its change.
     conservative: bool = True
+    #: Shortest time [s] in which it forgets what was; None if it has no memory.
+    forgets_in: float | None = None
 
     def __init__(self, body: Body, stencils: NDArray[np.integer], ramp: Callable[[float], float] | None = None) -> None:
         self.body = body

@@ -1,4 +1,7 @@
-"""The picture of a specimen's tests: what was recorded and what was simulated, one panel a test."""
+"""The picture of a specimen's tests: what was recorded and what was simulated, one panel a test.
+
+Over what was imposed; over time, if the states of a test depend on its history.
+"""
 
 from __future__ import annotations
 
@@ -52,14 +55,19 @@ def _draw(axes: Any, test: Tested) -> None:
     (what, answer), (factor, unit) = recording.quantities, SHOWN[recording.quantities[0]]
     scale, answer_unit = _readable(recording.response, SHOWN[answer][1])
     colour, shape = _STYLES[recording.role]
-    axes.plot(factor * recording.imposed, scale * recording.response, shape, color=colour, markersize=3.0, alpha=0.6)
-    line = np.linspace(result.imposed[0], result.imposed[-1], 200)
-    curve = interpolated(result.imposed, result.response, line)
-    axes.plot(factor * line, scale * curve, "-", color=_SIMULATED, linewidth=1.5)
-    axes.plot(factor * result.imposed, scale * result.response, ".", color=_SIMULATED, markersize=6.0)
+    through_time = result.time is not None and recording.time is not None
+    recorded_at = recording.time if through_time else factor * recording.imposed
+    axes.plot(recorded_at, scale * recording.response, shape, color=colour, markersize=3.0, alpha=0.6)
+    if result.time is not None:
+        axes.plot(result.time, scale * result.response, ".-", color=_SIMULATED, linewidth=1.5, markersize=6.0)
+    else:
+        line = np.linspace(result.imposed[0], result.imposed[-1], 200)
+        curve = interpolated(result.imposed, result.response, line)
+        axes.plot(factor * line, scale * curve, "-", color=_SIMULATED, linewidth=1.5)
+        axes.plot(factor * result.imposed, scale * result.response, ".", color=_SIMULATED, markersize=6.0)
     axes.axhline(0.0, color="#bbbbbb", linewidth=0.7, zorder=0)
     axes.locator_params(axis="x", nbins=6)
-    axes.set_xlabel(f"{what} [{unit}]" if unit else what)
+    axes.set_xlabel("time [s]" if through_time else f"{what} [{unit}]" if unit else what)
     axes.set_ylabel(f"{'nominal ' if answer == 'stress' else ''}{answer} [{answer_unit}]")
     error = scale * test.comparison.after.root_mean_square
     heading = f"{recording.name}: {recording.mode}, {recording.role}; RMSE {error:.3g} {answer_unit}"

@@ -32,9 +32,15 @@ _ELASTIC = (
     "the tissue is elastic and the test quasi-static: loading, unloading and every cycle run on one curve, and the "
     "specimen is free of stress at rest, where nothing is imposed"
 )
+_IN_TIME = (
+    "the test is quasi-static and follows its recorded times, straight between the corners of its record; each begins "
+    "with a rested specimen"
+)
+_RATE = "rate and history: relaxation, hysteresis, conditioning by earlier cycles"
+_EARLIER = "conditioning by earlier cycles and tests"
 _LEFT_OUT = (
-    "rate and history: relaxation, hysteresis, conditioning by earlier cycles; flow of fluid through the tissue; "
-    "weight and inertia of the specimen; prestrain from mounting it; slip and peeling at the grips"
+    "flow of fluid through the tissue; weight and inertia of the specimen; prestrain from mounting it; slip and "
+    "peeling at the grips"
 )
 #: Against meshes twice as fine and their extrapolation: neo-Hookean, 8 mm by 4.5 mm, and a cube.
 _LOCKING = (
@@ -57,9 +63,13 @@ class Tested:
     comparison: Comparison
 
 
-def describe_specimen(case: Case, specimen: Specimen, model: Model) -> dict[str, Any]:
-    """Specimen and assumptions, with units; the keys of `describe_case` and those of the specimen."""
-    glued = specimen.grips == "glued"
+def describe_specimen(case: Case, specimen: Specimen, model: Model, in_time: bool = False) -> dict[str, Any]:
+    """Specimen and assumptions, with units; the keys of `describe_case` and those of the specimen.
+
+    `in_time`: tests are followed through their times, since what acts has a memory or a ramp.
+    """
+    locks = specimen.grips == "glued" and model.elements == "tet4"
+    left_out = f"{_EARLIER if in_time else _RATE}; {_LEFT_OUT}"
     return {
         **describe_case(case, model),
         "specimen": {
@@ -67,8 +77,8 @@ def describe_specimen(case: Case, specimen: Specimen, model: Model) -> dict[str,
             "size_mm": [MILLIMETRES * length for length in specimen.size],
             "grips": specimen.grips,
         },
-        "assumptions": [_GRIPS[specimen.grips], _ELASTIC],
-        "left_out": [_LEFT_OUT, _LOCKING] if glued else [_LEFT_OUT],
+        "assumptions": [_GRIPS[specimen.grips], _IN_TIME if in_time else _ELASTIC, *case.assumptions],
+        "left_out": [left_out, _LOCKING] if locks else [left_out],
     }
 
 
@@ -112,6 +122,7 @@ def _describe(recording: TestRecording, result: TestResult) -> dict[str, Any]:
         "mode": recording.mode,
         "role": recording.role,
         "rows": len(recording.imposed),
+        **({} if result.time is None else {"time_s": result.time}),
         "imposed": {"quantity": what, "unit": unit, "values": factor * result.imposed},
         "response": {"quantity": answer, "unit": answer_unit, "values": scale * result.response},
         "newton_iterations": result.newton,

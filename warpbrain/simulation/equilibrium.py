@@ -204,18 +204,54 @@ class EquilibriumSolver:
         require_held(model)
         full = model.external_forces() if external is None else external
         u = np.zeros_like(full) if start is None else np.array(start, dtype=np.float64)
-        origin = np.where(model.constrained, u, 0.0)
-        self._history = []
         for term in self.system.terms:
             term.set_time_step(math.inf)
             term.forget()
+        return self._follow(u, full)
+
+    def step(self, start: Floats, time_step: float, time: float = math.inf) -> Equilibrium:
+        """Go on from a state to the equilibrium a time step later, slowly: without inertia, but with memory.
+
+        Terms with a memory keep it and take the step into it. To begin at rest, let them forget first (`Term.forget`).
+
+        Parameters
+        ----------
+        start : (n, 3) array
+            Displacement [m] before the step.
+        time_step : float
+            [s]; 0 for a change that is over at once.
+        time : float
+            At the end of the step [s], for what has a ramp; by default long after every one.
+
+        Raises
+        ------
+        InputError, SolveError
+            As `solve`.
+        """
+        require_held(self.system.model)
+        for term in self.system.terms:
+            term.set_time_step(time_step)
+        found = self._follow(np.array(start, dtype=np.float64), self.system.model.external_forces(time), time)
+        self.system.u.assign(found.u)
+        for term in self.system.terms:
+            term.advance(self.system.u)
+        return found
+
+    def _follow(self, u: Floats, full: Floats, time: float | None = None) -> Equilibrium:
+        """Go from a state to full load; at a time, what acts is all there and only what is prescribed moves."""
+        model = self.system.model
+        origin = np.where(model.constrained, u, 0.0)
+        self._history = []
         done, step = 0.0, self.options.max_load_step
         while done < 1.0:
             load = min(1.0, done + step)
             target = origin + load * (model.prescribed - origin * model.constrained)
-            self.system.set_load(load)
+            if time is None:
+                self.system.set_load(load)
+            else:
+                self.system.set_load(time=time)
             try:
-                reached, energy, residual = self._newton(u, load, load * full, target)
+                reached, energy, residual = self._newton(u, load, full if time is not None else load * full, target)
             except _StepFailed as failure:
                 tried, step = step, 0.5 * step
                 exhausted = len(self._history) >= self.options.max_total_newton

@@ -65,13 +65,13 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
                 )
             )
     try:
-        materials = {label: _material(case, label, tissue) for label, tissue in case.tissues.items()}
+        materials = {label: material_of(case, label, tissue) for label, tissue in case.tissues.items()}
     except InputError as error:
         raise InputError(f"{case.path}: [tissue] {error}") from None
     return Model(mesh, materials, case.density, constrained, prescribed, loads, mechanisms, motions), nodes
 
 
-def _material(case: Case, label: int, tissue: Tissue) -> Material:
+def material_of(case: Case, label: int, tissue: Tissue) -> Material:
     """The material of a tissue, as mechanisms that say something of it have it."""
     law, poisson, formulation = tissue.known_law, case.poisson, tissue.formulation
     for mechanism in case.mechanisms:

@@ -7,6 +7,7 @@ from warpbrain.errors import InputError
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.held import require_held
 from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.specimen import specimen_of
 
 
 def why_not(case: Case) -> str:
@@ -15,6 +16,7 @@ def why_not(case: Case) -> str:
         if case.specimen is None:
             require_held(model_of(case)[0])
             return ""
+        specimen_of(case)
         for tissue in case.tissues.values():
             _ = tissue.known_law
     except InputError as error:

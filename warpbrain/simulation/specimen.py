@@ -1,13 +1,17 @@
 """A laboratory specimen between the platens of a testing machine: what it answers to what is imposed on it.
 
-Quasi-static and elastic: a state depends on the imposed value alone, so a test is one curve of the response. It is
-computed at a few imposed values, from rest outwards, each state started from the one before, and interpolated at the
-rows of the test by monotone piecewise cubics (Fritsch and Butland 1984, as SciPy has them). At stretches of 0.7 to 1.3
-that errs by 0.02 % of the largest stress for a neo-Hookean law, by 0.2 % and 1 % for Ogden's at exponents -4.7 and -12.
+Tests are quasi-static. Of an elastic specimen a state depends on the imposed value alone, so a test is one curve of the
+response. It is computed at a few imposed values, from rest outwards, each state started from the one before, and
+interpolated at the rows of the test by monotone piecewise cubics (Fritsch and Butland 1984, as SciPy has them). At
+stretches of 0.7 to 1.3 that errs by 0.02 % of the largest stress for a neo-Hookean law, by 0.2 % and 1 % for Ogden's at
+exponents -4.7 and -12.
+
+What has a memory (viscoelasticity) or a ramp follows the times of the test instead (`warpbrain.simulation.history`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,10 +22,14 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanism import Mechanism, Substituting
+from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.recordings.comparison import Comparison, Error
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.history import History, history_of
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.of_case import material_of
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
@@ -48,8 +56,8 @@ class TestResult:
     Attributes
     ----------
     imposed, response : (k,) array
-        The computed curve, `imposed` increasing and with the value at rest among it, in the units of the recording's
-        quantities.
+        The computed curve, `imposed` increasing and with the value at rest among it, or in the order of `time`, in the
+        units of the recording's quantities.
     predicted : (n,) array
         The response at the rows of the recording.
     residuals : (n,) array
@@ -60,6 +68,8 @@ class TestResult:
         Smallest volume ratio of an element in each state.
     unstable_iterations : int
         Newton iterations with an indefinite tangent, see `Equilibrium`: the specimen buckled, or its law softens.
+    time : (k,) array or None
+        Of each state [s]; None if a state depends on the imposed value alone.
     """
 
     # not a test of pytest's
@@ -71,6 +81,7 @@ class TestResult:
     newton: Integers
     min_J: Floats
     unstable_iterations: int
+    time: Floats | None = None
 
     @property
     def r_squared(self) -> float:
@@ -82,7 +93,7 @@ class TestResult:
 
 @dataclass(frozen=True)
 class _State:
-    """A computed point of a test's curve, see `TestResult`; by default at rest."""
+    """A computed point of a test's curve, see `TestResult`; by default at rest and free of stress."""
 
     imposed: float
     response: float = 0.0
@@ -95,8 +106,11 @@ class Rig:
     """The specimen of a case in the testing machine, pre-processed for a device: any number of tests run on it.
 
     Glued ends follow the platens in all components. Lubricated ends slide freely on them, so the state is homogeneous
-    and one element is exact: a tetrahedron between three planes of symmetry, with the specimen's height and volume. (A
-    whole mesh would give the same stress, or buckle.)
+    and one element is exact: a tetrahedron with the specimen's height and volume that stands on the lower platen, held
+    against rigid motion and nothing else. (A whole mesh would give the same stress, or buckle.)
+
+    Mechanisms act in full before anything is imposed, between platens that stand as far apart as the specimen was
+    high: what swells then presses on them.
 
     Parameters
     ----------
@@ -105,6 +119,8 @@ class Rig:
     device, precision
         As of `System`.
     options : EquilibriumOptions, optional
+    elements : str
+        As of `Model`, of glued specimens.
 
     Attributes
     ----------
@@ -116,7 +132,7 @@ class Rig:
     Raises
     ------
     InputError
-        If the case has no specimen, assumes more than its grips, or leaves its law to the generative model.
+        If the case has no specimen, assumes what means nothing in one, or leaves its law to the generative model.
     """
 
     def __init__(
@@ -125,20 +141,34 @@ class Rig:
         device: str | None = None,
         precision: str = "double",
         options: EquilibriumOptions | None = None,
+        elements: str = "tet4",
     ) -> None:
         self.case = case
-        self.specimen = _specimen_of(case)
-        mesh = case.mesh if self.specimen.grips == "glued" else _homogeneous(case.mesh.volume, self.specimen.size[2])
-        self.system = System(_model(case, self.specimen, mesh), device, precision)
+        self.specimen = specimen_of(case)
+        glued = self.specimen.grips == "glued"
+        mesh = case.mesh if glued else _homogeneous(case.mesh.volume, self.specimen.size[2])
+        model = _model(case, self.specimen, mesh)
+        self.system = System(replace(model, elements=elements) if glued else model, device, precision)
         self.solver = EquilibriumSolver(self.system, options)
         self._top = mesh.node_sets["top"]
         self._area = mesh.volume / self.specimen.size[2]
+        self._shortest = min((t.forgets_in for t in self.system.terms if t.forgets_in is not None), default=None)
+
+    def follows_time(self, recording: TestRecording) -> bool:
+        """Whether the states of a test depend on its history."""
+        ramped = any(mechanism.ramp for mechanism in self.system.model.mechanisms)
+        return recording.time is not None and (self._shortest is not None or ramped)
 
     def check(self, recording: TestRecording) -> None:
-        """`InputError` if the grips cannot transmit a test, or it presses the specimen to nothing."""
+        """`InputError` if the grips cannot transmit a test, it presses the specimen to nothing, or it has no times."""
         who = f"{self.case.path}: [[recording]] '{recording.name}'"
         if self.specimen.grips == "lubricated" and recording.mode != "axial":
             raise InputError(f"{who} mode '{recording.mode}': lubricated grips slide, nothing transmits it")
+        if self._shortest is not None and recording.time is None:
+            raise InputError(
+                f"{who} file '{recording.file}': no column t, and what has a memory ([[mechanism]] viscoelasticity) "
+                "cannot do without times"
+            )
         lowest, height = float(recording.imposed.min()), self.specimen.size[2]
         if recording.mode == "axial" and recording.quantities[0] == "displacement" and lowest <= -height:
             raise InputError(
@@ -155,7 +185,8 @@ class Rig:
         ----------
         recording : TestRecording
         steps : int
-            Imposed values from rest to the extreme that is farther from it; see `imposed_values`.
+            Imposed values from rest to the extreme that is farther from it; see `imposed_values` and, of a test that
+            depends on its history, `history_of`.
         on_state : callable, optional
             Called with the share of the states that are done, in (0, 1].
 
@@ -168,28 +199,74 @@ class Rig:
         """
         self.check(recording)
         rest = 1.0 if recording.quantities[0] == "stretch" else 0.0
+        if self.follows_time(recording):
+            return self._through_time(recording, rest, steps, on_state)
         sides = imposed_values(recording.imposed, rest, steps)
-        states = [_State(rest)]
+        states, at_rest = [_State(rest)], None
+        if self.system.model.mechanisms:
+            found = self._equilibrium(recording, rest, rest, None)
+            states, at_rest = [self._state(recording, rest, found)], found.u
         for side in sides:
-            u, previous = None, rest
+            u, previous = at_rest, rest
             for value in side.tolist():
                 found = self._equilibrium(recording, value, previous, u)
                 u, previous = found.u, value
-                response = self._response(recording, u, found.internal)
-                min_J = found.history[-1].min_J
-                states.append(_State(value, response, len(found.history), min_J, found.unstable_iterations))
+                states.append(self._state(recording, value, found))
                 if on_state is not None:
                     on_state((len(states) - 1) / sum(map(len, sides)))
         return _result(recording, sorted(states, key=lambda state: state.imposed))
+
+    def _through_time(
+        self, recording: TestRecording, rest: float, steps: int, on_state: Callable[[float], None] | None
+    ) -> TestResult:
+        """A test whose states depend on its history: at rest long before the first row, whose value comes at once."""
+        assert recording.time is not None
+        reach = max(float(np.abs(recording.imposed - rest).max()), np.finfo(float).tiny)
+        ramps = [[time for time, _ in m.ramp] for m in self.system.model.mechanisms if m.ramp]
+        history = history_of(recording.time, recording.imposed, reach, steps, self._shortest, ramps)
+        start = float(history.time[0])
+        for term in self.system.terms:
+            term.forget()
+        found = self._step(recording, rest, np.zeros((len(self._top), 3)), math.inf, start)
+        if history.imposed[0] != rest:
+            found = self._step(recording, float(history.imposed[0]), found.u, 0.0, start)
+        states = [self._state(recording, float(history.imposed[0]), found)]
+        for k in range(1, len(history.time)):
+            before, time, value = (float(x) for x in (history.time[k - 1], history.time[k], history.imposed[k]))
+            found = self._step(recording, value, found.u, time - before, time)
+            states.append(self._state(recording, value, found))
+            if on_state is not None:
+                on_state(len(states) / len(history.time))
+        return _result(recording, states, history)
+
+    def _state(self, recording: TestRecording, value: float, found: Equilibrium) -> _State:
+        response = self._response(recording, found.u, found.internal)
+        min_J = found.history[-1].min_J if found.history else 1.0
+        return _State(value, response, len(found.history), min_J, found.unstable_iterations)
+
+    def _impose(self, recording: TestRecording, value: float) -> None:
+        prescribed = np.where(self._top[:, None], self._platen(recording, value), 0.0)
+        model = self.system.model
+        # what a system is made from does not hold the prescribed values: only its solver asks the model for them
+        self.system.model = replace(model, prescribed=prescribed * model.constrained)
+
+    def _step(self, recording: TestRecording, value: float, start: Floats, h: float, time: float) -> Equilibrium:
+        """The state a time step `h` after another, at a time."""
+        self._impose(recording, value)
+        try:
+            return self.solver.step(start, h, time)
+        except SolveError as error:
+            factor, unit = SHOWN[recording.quantities[0]]
+            raise SolveError(
+                f"test '{recording.name}' ({recording.mode}) at {time:.4g} s: {recording.quantities[0]} "
+                f"{factor * value:.4g} {unit}: {error}"
+            ) from None
 
     def _equilibrium(
         self, recording: TestRecording, value: float, previous: float, start: Floats | None
     ) -> Equilibrium:
         """Equilibrium at an imposed value, from the state `start` at the value before it."""
-        prescribed = np.where(self._top[:, None], self._platen(recording, value), 0.0)
-        model = self.system.model
-        # what a system is made from does not hold the prescribed values: only its solver asks the model for them
-        self.system.model = replace(model, prescribed=prescribed * model.constrained)
+        self._impose(recording, value)
         try:
             return self.solver.solve(start=start)
         except SolveError as error:
@@ -277,11 +354,14 @@ def interpolated(imposed: Floats, response: Floats, rows: Floats) -> Floats:
     return np.asarray(PchipInterpolator(imposed, response)(rows), dtype=np.float64)
 
 
-def _result(recording: TestRecording, states: Sequence[_State]) -> TestResult:
-    """States in the order of their imposed values, at the rows of the recording."""
+def _result(recording: TestRecording, states: Sequence[_State], history: History | None = None) -> TestResult:
+    """States in the order of their imposed values, or of their times, at the rows of the recording."""
     imposed = np.array([state.imposed for state in states])
     response = np.array([state.response for state in states])
-    predicted = interpolated(imposed, response, recording.imposed)
+    if history is None or recording.time is None:
+        predicted = interpolated(imposed, response, recording.imposed)
+    else:
+        predicted = history.interpolated(response, recording.time)
     return TestResult(
         imposed=imposed,
         response=response,
@@ -290,24 +370,33 @@ def _result(recording: TestRecording, states: Sequence[_State]) -> TestResult:
         newton=np.array([state.newton for state in states]),
         min_J=np.array([state.min_J for state in states]),
         unstable_iterations=sum(state.unstable_iterations for state in states),
+        time=None if history is None else history.time,
     )
 
 
-def _specimen_of(case: Case) -> Specimen:
-    """The specimen of a case that assumes nothing beside it."""
+def specimen_of(case: Case) -> Specimen:
+    """The specimen of a case, if what the case assumes means something in it; `InputError` otherwise."""
     if case.specimen is None:
         raise InputError(f"{case.path}: no [specimen]: a test needs one")
     if case.boundaries:
         raise InputError(
             f"{case.path}: [[boundary]] '{case.boundaries[0].name}': means nothing with [specimen], whose grips hold it"
         )
-    if case.mechanisms:
-        raise InputError(f"{case.path}: [[mechanism]]: nothing but the grips can act on a [specimen] yet")
+    for mechanism in case.mechanisms:
+        who = f"{case.path}: [[mechanism]] kind = '{mechanism.kind}'"
+        if not mechanism.of_specimens:
+            can = ", ".join(kind for kind, known in mechanisms().items() if known.of_specimens)
+            raise InputError(f"{who}: means nothing in a [specimen] between its grips; what can act there: {can}")
+        if case.specimen.grips == "lubricated" and not mechanism.everywhere:
+            raise InputError(
+                f"{who}: acts in a part of the specimen, but one between lubricated grips is simulated as homogeneous: "
+                'grips = "glued", or let it act everywhere'
+            )
     return case.specimen
 
 
 def _homogeneous(volume: float, height: float) -> TetMesh:
-    """One tetrahedron between three planes of symmetry, of a volume [m3] and height [m]."""
+    """One tetrahedron with three edges along the axes, of a volume [m3] and height [m]."""
     legs = np.sqrt(6.0 * volume / height)
     points = np.vstack([np.zeros(3), np.diag([legs, legs, height])])
     bottom = np.array([True, True, True, False])
@@ -320,12 +409,16 @@ def _model(case: Case, specimen: Specimen, mesh: TetMesh) -> Model:
     if specimen.grips == "glued":
         constrained = np.repeat((top | bottom)[:, None], 3, axis=1)
     else:
-        # the planes of symmetry, which the element's faces lie in, and the upper platen
-        constrained = mesh.points == 0.0
-        constrained[top, 2] = True
+        # the platens, and what keeps the lower face from moving and turning on its own; the upper one slides sideways,
+        # as it does where fibres are oblique
+        constrained = np.zeros(mesh.points.shape, dtype=bool)
+        constrained[:, 2] = True
+        constrained[0, :2] = True
+        constrained[1, 1] = True
     [(label, tissue)] = case.tissues.items()
     try:
-        material = Material(tissue.known_law, case.poisson, tissue.formulation)
+        material = material_of(case, label, tissue)
     except InputError as error:
         raise InputError(f"{case.path}: [tissue.{label}] {error}") from None
-    return Model(mesh, {label: material}, case.density, constrained)
+    acting: list[Mechanism] = [m for m in case.mechanisms if not isinstance(m, Substituting)]
+    return Model(mesh, {label: material}, case.density, constrained, mechanisms=acting)

@@ -33,6 +33,7 @@ class Asymmetry(Mechanism):
         source="Budday et al. 2017; Bennion et al. 2022; Miller and Chinzei 2002 (diagnosis design, M12)",
     )
     kind: ClassVar[str] = "asymmetry"
+    of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue resists compression more than tension."
     confused_with: ClassVar[tuple[str, ...]] = ("fibres",)
     needs: ClassVar[tuple[str, ...]] = ("regions or tests both in compression and in tension",)

@@ -29,6 +29,7 @@ class Compressibility(Mechanism):
         source="diagnosis design, M9 and M14",
     )
     kind: ClassVar[str] = "compressibility"
+    of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue gives way under pressure more, or less, than was assumed."
     confused_with: ClassVar[tuple[str, ...]] = ("drainage", "swelling")
 

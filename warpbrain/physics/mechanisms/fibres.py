@@ -120,6 +120,7 @@ class Fibres(Mechanism):
     )
     elements: str = parameter("Element set that has them.", default="", kind="element set")
     kind: ClassVar[str] = "fibres"
+    of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Nerve fibres make the tissue stiffer along their direction."
     confused_with: ClassVar[tuple[str, ...]] = ("asymmetry", "inclusion")
     needs: ClassVar[tuple[str, ...]] = ("loads along and across the fibres",)

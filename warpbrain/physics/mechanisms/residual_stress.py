@@ -70,6 +70,7 @@ class ResidualStress(Mechanism):
     direction: tuple[float, float, float] = parameter("Direction of the tension.", kind="vector")
     elements: str = parameter("Element set that is under it.", default="", kind="element set")
     kind: ClassVar[str] = "residual-stress"
+    of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue is under tension before anything is done to it."
     confused_with: ClassVar[tuple[str, ...]] = ("swelling",)
     several: ClassVar[bool] = True

@@ -46,6 +46,7 @@ class Swelling(Mechanism):
     centre: tuple[float, float, float] | None = parameter("Centre of a ball.", default=None, kind="position")
     radius: float | None = parameter("Its radius.", default=None, unit="mm", si=1e-3, above=0.0)
     kind: ClassVar[str] = "swelling"
+    of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue takes up or loses water, and swells or shrinks."
     confused_with: ClassVar[tuple[str, ...]] = ("pressure", "gravity")
     several: ClassVar[bool] = True

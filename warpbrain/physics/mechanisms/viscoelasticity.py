@@ -7,7 +7,10 @@ the isochoric neo-Hookean stress of the tissue's shear modulus at rest, `S = mu0
     q_i(t + h) = exp(-h/tau_i) q_i(t) + beta_i exp(-h/(2 tau_i)) (S(t + h) - S(t))
 
 (Simo and Hughes, Computational Inelasticity, section 10.3), `P = F sum_i q_i`. Second order in `h`. In an equilibrium
-everything has relaxed.
+everything has relaxed. Within a step the stress has a potential, which a line search needs: with `r_i = beta_i
+exp(-h/(2 tau_i))` and `S = 2 dPsi/dC`, `Psi = mu0/2 (J^(-2/3) I1 - 3)`,
+
+    sum_i [ r_i Psi(F) + 1/2 (exp(-h/tau_i) q_i(t) - r_i S(t)) : (C - I) ]
 """
 
 import math
@@ -50,6 +53,7 @@ class Viscoelasticity(Mechanism):
         "Relaxation time of each branch.", kind="numbers", unit="s", expectation=LogUniform(1.0, 3000.0)
     )
     kind: ClassVar[str] = "viscoelasticity"
+    of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue resists fast deformation more than slow, and its stress relaxes."
     confused_with: ClassVar[tuple[str, ...]] = ("drainage",)
     needs: ClassVar[tuple[str, ...]] = ("two times or more, or two rates",)
@@ -82,7 +86,9 @@ class ViscoelasticTerm(Term):
         self._response = wp.zeros(branches, dtype=scalar, device=body.device)
         self._q = wp.zeros((count, branches), dtype=mat33, device=body.device)
         self._S = wp.zeros(count, dtype=mat33, device=body.device)
+        self._energy = wp.zeros(count, dtype=scalar, device=body.device)
         self._kernels = _kernels(body.precision)
+        self.forgets_in = min(mechanism.times)
 
     def set_time_step(self, h: float) -> None:
         times = np.array(self.mechanism.times)
@@ -108,13 +114,14 @@ class ViscoelasticTerm(Term):
         self._launch(self._kernels[2], u)
 
     def energy(self, u: wp.array) -> float:
-        # only an equilibrium asks, where everything has relaxed
-        return 0.0
+        """Potential of the step [J]; 0 in an equilibrium, where everything has relaxed."""
+        self._launch(self._kernels[3], u, self._energy)
+        return float(np.sum(self._energy.numpy(), dtype=np.float64))
 
 
 @cache
-def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
-    """Kernels for forces, forces with tangent blocks, and the end of a step; one thread for an element."""
+def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
+    """Kernels for forces, forces with tangent blocks, the end of a step and energies; one thread for an element."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     module = compiled_module(f"viscoelasticity_{precision.name}")
 
@@ -225,4 +232,28 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
             q[e, k] = decay[k] * q[e, k] + response[k] * (S - S_before[e])
         S_before[e] = S
 
-    return forces, tangents, advance
+    @wp.kernel(module=module)
+    def energies(
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        weights: wp.array2d[scalar],
+        decay: wp.array[scalar],
+        response: wp.array[scalar],
+        q: wp.array2d[mat33],
+        S_before: wp.array[mat33],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        energy: wp.array[scalar],
+    ):
+        e = wp.tid()
+        F = deformation_gradient(u, nodes[e], inverse_edges[e])
+        root = wp.cbrt(wp.determinant(F))
+        psi = scalar(0.5) * weights[e, 1] * (wp.ddot(F, F) / (root * root) - scalar(3.0))
+        strain = wp.transpose(F) * F - wp.identity(n=3, dtype=scalar)
+        total = scalar(0.0)
+        for k in range(decay.shape[0]):
+            kept = decay[k] * q[e, k] - response[k] * S_before[e]
+            total += response[k] * psi + scalar(0.5) * wp.ddot(kept, strain)
+        energy[e] = scale[0] * weights[e, 0] * total
+
+    return forces, tangents, advance, energies
