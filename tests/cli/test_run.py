@@ -352,3 +352,36 @@ def test_every_stand_in_runs_and_is_compared(tmp_path, name, tissue):
         assert entry["before"]["root_mean_square"] > 2.0 * entry["noise_root_mean_square"] / 3.0**0.5
         # what is declared is not all that acted: no simulation of it comes down to the noise
         assert entry["after"]["root_mean_square"] > entry["noise_root_mean_square"]
+
+
+# -- the error of the mesh ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("arguments", [(), ("--steps", "3"), ("--elements", "tet4-averaged")])
+def test_error_of_the_mesh(folder, tmp_path, arguments):
+    """Printed, in the summary and in the mesh's file; the rest of the run is as it is without it."""
+    ran = run(folder, "--mesh-error", *arguments, "--out", tmp_path)
+    assert (ran.status, ran.err) == (0, "")
+    said = summary(tmp_path)["mesh_error"]
+    file = meshio.read(tmp_path / "result.vtu")
+    sizes = np.linalg.norm(file.point_data["mesh_error"], axis=1)
+    for key, expected in (("median", np.median(sizes)), ("largest", sizes.max())):
+        assert said["displacement_mm"][key] == pytest.approx(expected, rel=1e-6)
+    assert sizes.max() > 0.0
+    assert f"  all nodes                {np.median(sizes):>8.3f}" in ran.out
+    averaged = "tet4-averaged" in arguments
+    assert (said["locking_mm"] is None) == averaged and said["element_size_mm"]["largest"] > 0.0
+    # nothing is said of what does not lock
+    assert ("linear tetrahedra" in ran.out) != averaged
+    assert "compared with" in said["how"]
+
+
+def test_error_of_elements_alone(block_run, folder, tmp_path):
+    """What `--elements tet4-averaged` changes."""
+    plain, averaged = (displacement(block_run(*extra)[1]) for extra in ((), ("--elements", "tet4-averaged")))
+    assert run(folder, "--mesh-error", "elements", "--out", tmp_path, "--quiet") == Ran(0, "", "")
+    found = meshio.read(tmp_path / "result.vtu").point_data["mesh_error"]
+    np.testing.assert_allclose(found, averaged - plain, atol=1e-4 * np.abs(plain).max())
+    wrong = run(folder, "--mesh-error", "elements", "--elements", "tet4-averaged", "--out", tmp_path / "none")
+    assert wrong.status == 2 and "--mesh-error elements: tet4-averaged do not lock" in wrong.err
+    assert not (tmp_path / "none").exists()

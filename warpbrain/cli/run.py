@@ -10,12 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
     from warpbrain.cases.drawn import FromPrior
+    from warpbrain.simulation.mesh_error import MeshError
+    from warpbrain.simulation.observation import Observed
+    from warpbrain.simulation.result import Result
     from warpbrain.simulation.system import System
 
 
@@ -68,6 +71,14 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         default="tet4",
         help="plain tetrahedra (default), or averaged gradients, which do not lock in nearly incompressible tissue",
     )
+    add(
+        "--mesh-error",
+        nargs="?",
+        choices=("elements", "size"),
+        const="size",
+        help="estimate the error of the mesh: 'elements', what locks, at about twice the cost of the run, or 'size' "
+        "(if nothing is said), with elements of half the size too, at ten times or more",
+    )
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
     add("--precision", choices=("double", "single"), default="double", help="default: double")
     motion = parser.add_mutually_exclusive_group()
@@ -100,6 +111,7 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.report import summary as tables
     from warpbrain.report.comparison import comparison_lines, describe_comparisons, write_comparisons
     from warpbrain.report.files import write_result, write_summary
+    from warpbrain.report.mesh_error import mesh_error_lines
     from warpbrain.report.prior_text import describe_prior, prior_lines
     from warpbrain.simulation.of_case import model_of
     from warpbrain.simulation.system import System, find_device
@@ -139,11 +151,14 @@ def _run(options: argparse.Namespace) -> None:
     say("", *tables.displacement_lines(said), sep="\n")
     if case.recordings:
         say("", *comparison_lines(compared, options.legacy_rmse), sep="\n")
+    estimated, doubt = _mesh_error(options, case, system, result, observed, outcome)
+    if doubt is not None:
+        say("", *mesh_error_lines(doubt), sep="\n")
     say("", *tables.timing_lines(seconds, counts), sep="\n")
 
     from warpbrain.report.picture import write_picture
 
-    write_result(out / "result.vtu", result)
+    write_result(out / "result.vtu", result, None if estimated is None else estimated.u)
     names = {label: tissue.name for label, tissue in case.tissues.items()}
     write_picture(out / "deformation.png", result, case.mesh, names, case.title, _subtitle(case, outcome))
     summary = {
@@ -153,6 +168,7 @@ def _run(options: argparse.Namespace) -> None:
         "solution": outcome,
         "result": said,
         "recordings": compared,
+        **({} if doubt is None else {"mesh_error": doubt}),
         "seconds_by_phase": seconds,
         "calls_by_phase": counts,
         "seconds_to_first_step": first_step,
@@ -178,6 +194,8 @@ def _check(options: argparse.Namespace) -> None:
         raise InputError(f"--poisson {options.poisson:g}: expected a number in the open interval (-1, 0.5)")
     if not 0.0 < options.tolerance < 1.0:
         raise InputError(f"--tolerance {options.tolerance:g}: expected a number between 0 and 1")
+    if options.mesh_error == "elements" and options.elements != "tet4":
+        raise InputError(f"--mesh-error elements: {options.elements} do not lock: --mesh-error size says what is left")
     options.moduli = parse_moduli(options.mu)
     for name, value in (("--sample", options.sample), ("--seed", options.seed)):
         if value is not None and value < 0:
@@ -410,6 +428,41 @@ def _follow(
         "history": history,
     }
     return outcome, clock.seconds, clock.counts
+
+
+def _mesh_error(
+    options: argparse.Namespace,
+    case: Case,
+    system: System,
+    result: Result,
+    observed: Observed,
+    outcome: Mapping[str, Any],
+) -> tuple[MeshError | None, dict[str, Any] | None]:
+    """The error of the mesh and what is to be said of it; nothing, if it was not asked for, no error if not found."""
+    if options.mesh_error is None:
+        return None, None
+    from warpbrain.report.mesh_error import describe_mesh_error
+    from warpbrain.simulation.mesh_error import mesh_error, observe_without
+
+    progress = Progress("mesh error", options.quiet)
+    elements = system.model.elements
+    try:
+        found = mesh_error(
+            case,
+            system.model,
+            result,
+            smaller=options.mesh_error == "size",
+            steps=options.steps,
+            device=options.device,
+            on_share=progress.show,
+        )
+    except SolveError as error:
+        # the run itself is sound
+        return None, {"unknown": str(error)}
+    finally:
+        progress.clear()
+    without = observe_without(case, result, found, outcome.get("time_s"))
+    return found, describe_mesh_error(found, elements, observed, without)
 
 
 def _subtitle(case: Case, outcome: Mapping[str, Any]) -> str:

@@ -94,6 +94,10 @@ def _tests(options: argparse.Namespace, case: Case) -> list[TestRecording]:
     """What is to be simulated, if that is what the options ask for."""
     from warpbrain.recordings.recording import TestRecording
 
+    if options.mesh_error is not None:
+        raise InputError(
+            f"--mesh-error: {case.path} has a [specimen], which has no one state: compare --elements tet4-averaged"
+        )
     for option, given in (("--steps", options.steps is not None), ("--to-rest", options.to_rest)):
         if given:
             raise InputError(

@@ -15,21 +15,17 @@ kept, since it changes little as the parameters do.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import ROUGH, Forward, State
 from warpbrain.estimation.parameters import Parameters
-from warpbrain.mesh import TetMesh, boundary_faces, node_areas, nodes_of
-from warpbrain.mesh.refinement import refined
 from warpbrain.physics.force import NodalForce
-from warpbrain.physics.mechanisms.resection import Resection
+from warpbrain.simulation.finer import FinerCase
 from warpbrain.simulation.of_case import model_of
 
 Floats = NDArray[np.float64]
@@ -88,37 +84,12 @@ class FinerMesh:
     """
 
     def __init__(self, case: Case, theta: Floats, device: str | None = None) -> None:
-        from scipy.sparse import csr_matrix
-
-        coarse, _ = case.remaining
-        mesh, ends = refined(coarse)
-        rows = np.repeat(np.arange(len(ends)), 2)
-        shape = (len(ends), len(coarse.points))
-        self._prolong: Any = csr_matrix((np.full(2 * len(ends), 0.5), (rows, ends.ravel())), shape=shape)
-        # the tissue is out already, and forces shared by nodes are those of the nodes that there were
-        mechanisms = tuple(m for m in case.mechanisms if not isinstance(m, Resection))
-        boundaries = tuple(b for b in case.boundaries if not isinstance(b, Forced))
-        added = self._spread(coarse, mesh, _shared_forces(Parameters.of(case).applied(case, theta)))
-        finer = replace(case, mesh=mesh, mechanisms=mechanisms, boundaries=boundaries)
-        self._forward = Forward(finer, theta, device, added)
+        finer = FinerCase(case)
+        self._prolong = finer.prolongation
+        added = finer.spread(_shared_forces(Parameters.of(case).applied(case, theta)))
+        self._forward = Forward(finer.case, theta, device, added)
         #: The last error on the finer mesh, with which the next state there is predicted.
         self._last: Floats | float = 0.0
-
-    def _spread(self, coarse: TetMesh, finer: TetMesh, forces: Floats) -> Floats:
-        """Nodal forces on the finer mesh that act as those on the coarse one do.
-
-        A force on a node is taken for a load on the surface around it (in the volume, if a loaded node is inside),
-        linear between nodes: the force over the node's share. On the finer mesh it is the same load, so that meshes of
-        any size have one limit. Resultants stay: sums over shares are exact for functions linear in an element.
-        """
-        if not forces.any():
-            return np.zeros(finer.points.shape)
-        loaded = forces.any(axis=1)
-        surface = nodes_of(boundary_faces(coarse.tetrahedra), len(coarse.points))
-        share = _surface_of_nodes if surface[loaded].all() else _volume_of_nodes
-        density = np.zeros_like(forces)
-        density[loaded] = forces[loaded] / share(coarse)[loaded, None]
-        return share(finer)[:, None] * (self._prolong @ density)
 
     @property
     def solves(self) -> int:
@@ -156,11 +127,3 @@ def _shared_forces(case: Case) -> Floats:
     for load in shared:
         total += load.factor(math.inf) * load.nodal_forces(model.mesh)
     return total
-
-
-def _surface_of_nodes(mesh: TetMesh) -> Floats:
-    return node_areas(mesh.points, boundary_faces(mesh.tetrahedra))
-
-
-def _volume_of_nodes(mesh: TetMesh) -> Floats:
-    return mesh.node_volumes

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpbrain.atomic import whole_file
 from warpbrain.simulation.result import Result
@@ -15,10 +16,11 @@ from warpbrain.simulation.result import Result
 MILLIMETRES = 1000.0
 
 
-def write_result(path: Path, result: Result) -> None:
+def write_result(path: Path, result: Result, mesh_error: NDArray[np.float64] | None = None) -> None:
     """Write a result as compressed VTU, coordinates and displacement in mm.
 
-    Point arrays: ``displacement`` [mm], ``reaction`` [N] and the node sets. Cell arrays: ``tissue``, ``J``,
+    Point arrays: ``displacement`` [mm], ``reaction`` [N], the node sets and, if it was estimated, ``mesh_error`` [mm]:
+    what is to be added to the displacement. Cell arrays: ``tissue``, ``J``,
     ``principal_stretches`` (descending), ``von_mises`` and ``pressure`` [Pa] of the Cauchy stress.
     """
     import meshio
@@ -32,6 +34,7 @@ def write_result(path: Path, result: Result) -> None:
             **{name: members.astype(np.uint8) for name, members in mesh.node_sets.items()},
             "displacement": result.u * MILLIMETRES,
             "reaction": result.reactions,
+            **({} if mesh_error is None else {"mesh_error": mesh_error * MILLIMETRES}),
         },
         cell_data={
             "tissue": [mesh.tissue],

@@ -1,0 +1,104 @@
+"""A case on elements of half the size: the same body, the same assumptions, the same loads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.boundary import Forced
+from warpbrain.cases.case import Case
+from warpbrain.mesh import TetMesh, boundary_faces, node_areas, nodes_of
+from warpbrain.mesh.refinement import refined
+from warpbrain.physics.force import NodalForce
+from warpbrain.physics.load import Load
+from warpbrain.physics.mechanisms.resection import Resection
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.of_case import model_of
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GivenForces(Load):
+    """Forces on the nodes of one mesh.
+
+    Parameters
+    ----------
+    forces : (n, 3) array
+        [N]
+    """
+
+    forces: Floats
+
+    def nodal_forces(self, mesh: TetMesh) -> Floats:
+        return self.forces
+
+
+class FinerCase:
+    """A case with every element cut into eight.
+
+    Parameters
+    ----------
+    case : Case
+
+    Attributes
+    ----------
+    case : Case
+        Without its resection, which is done already, and without forces that are shared by nodes: see `spread`.
+    prolongation : scipy.sparse matrix, shape (n', n)
+        From nodal values of the mesh that there was to those on the finer one; linear in every old element.
+    """
+
+    def __init__(self, case: Case) -> None:
+        self._coarse, _ = case.remaining
+        mesh, ends = refined(self._coarse)
+        self.prolongation = prolongation(ends, len(self._coarse.points))
+        mechanisms = tuple(m for m in case.mechanisms if not isinstance(m, Resection))
+        boundaries = tuple(b for b in case.boundaries if not isinstance(b, Forced))
+        self.case = replace(case, mesh=mesh, mechanisms=mechanisms, boundaries=boundaries)
+
+    def spread(self, forces: Floats) -> Floats:
+        """Nodal forces (n', 3) that act as those (n, 3) on the mesh that there was do.
+
+        A force on a node is taken for a load on the surface around it (in the volume, if a loaded node is inside),
+        linear between nodes: the force over the node's share. On the finer mesh it is the same load, so that meshes of
+        any size have one limit. Resultants stay: sums over shares are exact for functions linear in an element.
+        """
+        mesh = self.case.mesh
+        if not forces.any():
+            return np.zeros(mesh.points.shape)
+        loaded = forces.any(axis=1)
+        surface = nodes_of(boundary_faces(self._coarse.tetrahedra), len(self._coarse.points))
+        share = _surface_of_nodes if surface[loaded].all() else _volume_of_nodes
+        density = np.zeros_like(forces)
+        density[loaded] = forces[loaded] / share(self._coarse)[loaded, None]
+        return np.asarray(share(mesh)[:, None] * (self.prolongation @ density))
+
+    def model(self, model: Model) -> Model:
+        """The finer model of what `model_of` makes of the case, with the same elements."""
+        finer, _ = model_of(self.case)
+        shared = [
+            GivenForces(forces=self.spread(load.nodal_forces(model.mesh)), ramp=load.ramp)
+            for load in model.loads
+            if isinstance(load, NodalForce)
+        ]
+        return replace(finer, loads=[*finer.loads, *shared], elements=model.elements)
+
+
+def prolongation(ends: NDArray[np.integer], count: int) -> Any:
+    """Sparse matrix (n', n) of the means of the two `count` old nodes that each new one lies between; see `refined`."""
+    from scipy.sparse import csr_matrix
+
+    rows = np.repeat(np.arange(len(ends)), 2)
+    return csr_matrix((np.full(2 * len(ends), 0.5), (rows, ends.ravel())), shape=(len(ends), count))
+
+
+def _surface_of_nodes(mesh: TetMesh) -> Floats:
+    return node_areas(mesh.points, boundary_faces(mesh.tetrahedra))
+
+
+def _volume_of_nodes(mesh: TetMesh) -> Floats:
+    return mesh.node_volumes

@@ -1,0 +1,192 @@
+"""What the mesh gets wrong of a displacement: a comparison with elements that do not lock, and with smaller ones.
+
+    E = L + M,   L = u'_h - u_h,   M = 4/3 (u'_(h/2) - u'_h)
+
+`u_h` is the state, `u'_h` the same state of averaged gradients (`warpbrain.simulation.averaged`), which do not lock, on
+the same mesh, `u'_(h/2)` on elements of half the size. `L` is what locks; also what plain elements bend less well than
+averaged ones. `M` is what is left of the error of averaged elements if it falls with the square of the size
+(Richardson's extrapolation, with 2^2 / (2^2 - 1)). Of a state that is of averaged elements already `L` is zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.case import Case
+from warpbrain.errors import SolveError
+from warpbrain.mesh import TetMesh
+from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
+from warpbrain.simulation.finer import FinerCase
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.observation import Observed, State, observe
+from warpbrain.simulation.result import Result
+from warpbrain.simulation.system import System
+
+Floats = NDArray[np.float64]
+
+#: Out-of-balance force, relative: far below what meshes differ by.
+TOLERANCE = 1e-5
+#: Of an error that falls with the square of the size of elements, what halving them leaves to be added.
+_RICHARDSON = 4.0 / 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A `State` and nothing else."""
+
+    mesh: TetMesh
+    u: Floats
+    reactions: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class MeshError:
+    """An estimate of the error of a displacement: what is to be added to it.
+
+    Attributes
+    ----------
+    locking : (n, 3) array
+        `L` [m].
+    size : (n, 3) array or None
+        `M` [m]; None if no smaller elements were tried.
+    reactions : (n, 3) array
+        The same of the reactions, both parts together [N].
+    """
+
+    locking: Floats
+    size: Floats | None
+    reactions: Floats
+
+    @property
+    def u(self) -> Floats:
+        """`E` [m], shape (n, 3)."""
+        return self.locking if self.size is None else self.locking + self.size
+
+    @property
+    def locking_share(self) -> float:
+        """How much of `E` is `L`: its projection, 0 to 1 if both point the same way; NaN without any error."""
+        square = float(np.vdot(self.u, self.u))
+        return float(np.vdot(self.locking, self.u)) / square if square > 0.0 else float("nan")
+
+
+#: Finds the state again on other elements: their name, whether they are smaller, and where to start [m].
+Solve = Callable[[str, bool, Floats], State]
+
+
+def unlocked(elements: str) -> str:
+    """The kind of elements that stands for one that locks; itself, if it does not."""
+    return "tet4-averaged" if elements == "tet4" else elements
+
+
+def estimate(state: State, elements: str, solve: Solve, prolongation: Any = None) -> MeshError:
+    """Estimate the error of a state.
+
+    Parameters
+    ----------
+    state : State
+    elements : str
+        Its kind of elements.
+    solve : callable
+    prolongation : sparse matrix (n', n), optional
+        To the finer mesh, see `FinerCase`; without it no smaller elements are tried.
+
+    Raises
+    ------
+    SolveError
+        If a state is not found on other elements.
+    """
+    other = unlocked(elements)
+    free = state if other == elements else solve(other, False, state.u)
+    locking, reactions = free.u - state.u, free.reactions - state.reactions
+    if prolongation is None:
+        return MeshError(locking, None, reactions)
+    finer = solve(other, True, prolongation @ free.u)
+    size = _RICHARDSON * (finer.u[: len(state.u)] - free.u)
+    # a reaction between two nodes goes to both of them, so that resultants stay
+    reactions = reactions + _RICHARDSON * (prolongation.T @ finer.reactions - free.reactions)
+    return MeshError(locking, size, reactions)
+
+
+def mesh_error(
+    case: Case,
+    model: Model,
+    result: Result,
+    *,
+    smaller: bool = True,
+    steps: int | None = None,
+    device: str | None = None,
+    on_share: Callable[[float, str], None] | None = None,
+) -> MeshError:
+    """Estimate the error of what was simulated of a case.
+
+    Parameters
+    ----------
+    case : Case
+    model : Model
+        Of the case.
+    result : Result
+        An equilibrium or the end of a motion to rest; the end of a motion if `steps` says so.
+    smaller : bool
+        Whether elements of half the size are tried, at about ten times the cost.
+    steps : int, optional
+        Time steps of the motion, of 1 ms.
+    device : str, optional
+    on_share : callable, optional
+        Called with the share of the present solve that is done, and what it is.
+
+    Raises
+    ------
+    SolveError
+        If the state is not found on other elements.
+    """
+    finer = FinerCase(case) if smaller else None
+
+    def solve(elements: str, small: bool, start: Floats) -> State:
+        solved = replace(finer.model(model) if small and finer is not None else model, elements=elements)
+        what = "half the size" if small else elements
+        say = (lambda share: None) if on_share is None else (lambda share: on_share(share, what))
+        try:
+            if steps is None:
+                return _equilibrium(System(solved, device), start, say)
+            return _motion(System(solved, device), steps, say)
+        except SolveError as error:
+            raise SolveError(f"on elements {'of half the size' if small else elements}: {error}") from None
+
+    return estimate(result, model.elements, solve, None if finer is None else finer.prolongation)
+
+
+def observe_without(case: Case, result: Result, error: MeshError, time: float | None = None) -> Observed:
+    """Recordings beside a state with the estimated error taken off; see `observe`."""
+    return observe(case, Found(result.mesh, result.u + error.u, result.reactions + error.reactions), time)
+
+
+def _equilibrium(system: System, start: Floats, say: Callable[[float], None]) -> Found:
+    say(0.0)
+    options = EquilibriumOptions(tolerance=TOLERANCE)
+    found = EquilibriumSolver(system, options, lambda step: say(step.load)).solve(start=start)
+    return Found(system.mesh, found.u, _reactions(system, found.internal, system.model.external_forces()))
+
+
+def _motion(system: System, steps: int, say: Callable[[float], None]) -> Found:
+    simulator = Simulator(system)
+    for step in range(1, steps + 1):
+        due = simulator.time + simulator.time_step
+        simulator.prescribe(system.model.prescribed_at(due, step / steps))
+        simulator.step()
+        simulator.check()
+        say(step / steps)
+    system.evaluate_forces()
+    system.gather_forces()
+    internal = system.internal.numpy().astype(np.float64)
+    u = system.u.numpy().astype(np.float64)
+    return Found(system.mesh, u, _reactions(system, internal, system.model.external_forces(simulator.time)))
+
+
+def _reactions(system: System, internal: Floats, external: Floats) -> Floats:
+    return np.where(system.model.constrained, internal - external, 0.0)
