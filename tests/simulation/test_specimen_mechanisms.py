@@ -22,6 +22,7 @@ from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.history import corners_of, history_of
 from warpbrain.simulation.model import Material
+from warpbrain.simulation.readiness import why_not
 from warpbrain.simulation.specimen import Rig, TestResult, simulate_test
 
 MU, LAM = 1000.0, 9000.0
@@ -140,6 +141,9 @@ def test_a_ball_that_swells_needs_a_mesh() -> None:
 def test_what_means_nothing_in_a_specimen_is_refused(acting: Mechanism) -> None:
     with pytest.raises(InputError, match=re.escape("means nothing in a [specimen]")):
         answered("stretch", np.array([1.0]), acting)
+    # and told before, by `cases check`
+    assert "means nothing in a [specimen]" in why_not(replace(case_of(PLATE), mechanisms=(acting,)))
+    assert why_not(replace(case_of(PLATE), mechanisms=(VISCOUS,))) == ""
 
 
 # -- through time ---------------------------------------------------------------------------------------------------

@@ -46,6 +46,8 @@ def _section(mechanism: type[Mechanism]) -> str:
     lines.append("")
     if mechanism.confused_with:
         lines.append(f"Taken for: {', '.join(mechanism.confused_with)}.")
+    if mechanism.of_specimens:
+        lines.append("In specimens too.")
     if mechanism.needs:
         lines.append(f"Told apart by {', '.join(mechanism.needs)}.")
     lines += [f"[{source.rsplit('/', 1)[1]}]({source})", ""]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import forces_at, model_of
+from bodies import energy_at, forces_at, model_of
 from scipy.integrate import quad
 from shapes import cube
 
@@ -101,6 +101,23 @@ def test_the_tangent_of_a_step_is_the_slope_of_its_forces():
     system.u.assign(u)
     system.evaluate_tangents()
     assert np.abs(system.stiffness_times(d) - change).max() <= 1e-7 * np.abs(change).max()
+
+
+def test_forces_of_a_step_are_the_slope_of_its_potential():
+    """With a memory; in an equilibrium, where everything has relaxed, there is none."""
+    plain, system = system_of(), system_of(Viscoelasticity(moduli=MODULI, times=TIMES))
+    random = np.random.default_rng(0)
+    u, d = (0.1 * random.uniform(-1.0, 1.0, (system.size, 3)) for _ in range(2))
+    [term] = system.terms
+    term.set_time_step(np.inf)
+    assert energy_at(system, u) == energy_at(plain, u)
+    term.set_time_step(0.1)
+    for before in (0.5 * u, 0.8 * u):
+        system.u.assign(before)
+        term.advance(system.u)
+    h = 1e-5
+    slope = (energy_at(system, u + h * d) - energy_at(system, u - h * d)) / (2.0 * h)
+    assert np.vdot(forces_at(system, u), d) == pytest.approx(slope, rel=1e-8)
 
 
 def held() -> Model:
