@@ -13,6 +13,7 @@ from command import Ran, run
 from folders import SIDE, block, write_folder
 
 from warpbrain.cases.shipped import SHIPPED
+from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh, write_mesh
 
 FILES = ["deformation.png", "result.vtu", "summary.json"]
@@ -385,3 +386,15 @@ def test_error_of_elements_alone(block_run, folder, tmp_path):
     wrong = run(folder, "--mesh-error", "elements", "--elements", "tet4-averaged", "--out", tmp_path / "none")
     assert wrong.status == 2 and "--mesh-error elements: tet4-averaged do not lock" in wrong.err
     assert not (tmp_path / "none").exists()
+
+
+def test_a_run_stands_where_the_error_of_its_mesh_is_not_found(folder, tmp_path, monkeypatch):
+    def fail(*_arguments: object, **_options: object) -> None:
+        raise SolveError("on elements tet4-averaged: no equilibrium")
+
+    monkeypatch.setattr("warpbrain.simulation.mesh_error.mesh_error", fail)
+    ran = run(folder, "--mesh-error", "--out", tmp_path)
+    assert (ran.status, ran.err) == (0, "")
+    assert "error of the mesh: not known: on elements tet4-averaged: no equilibrium" in ran.out
+    assert summary(tmp_path)["mesh_error"] == {"unknown": "on elements tet4-averaged: no equilibrium"}
+    assert "mesh_error" not in meshio.read(tmp_path / "result.vtu").point_data
