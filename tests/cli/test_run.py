@@ -358,7 +358,7 @@ def test_every_stand_in_runs_and_is_compared(tmp_path, name, tissue):
 # -- the error of the mesh ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("arguments", [(), ("--steps", "3"), ("--elements", "tet4-averaged")])
+@pytest.mark.parametrize("arguments", [(), ("--steps", "3"), ("--to-rest",), ("--elements", "tet4-averaged")])
 def test_error_of_the_mesh(folder, tmp_path, arguments):
     """Printed, in the summary and in the mesh's file; the rest of the run is as it is without it."""
     ran = run(folder, "--mesh-error", *arguments, "--out", tmp_path)
