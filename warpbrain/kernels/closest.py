@@ -10,11 +10,7 @@ import warp as wp
 
 @wp.func
 def closest_on_triangle(x: Any, a: Any, b: Any, c: Any):
-    """Closest point `p`, its feature, and the matrix `H = d2(|x - p|^2 / 2)/dx2`: what of a motion of `x` is resisted.
-
-    Features are 0 (inside), 1 to 3 (edges ab, bc, ca) and 4 to 6 (corners). `H` is `n n^T` inside the triangle of
-    normal `n`, `I - t t^T` on an edge along `t`, and `I` at a corner.
-    """
+    """Closest point and its feature: 0 (inside), 1 to 3 (edges ab, bc, ca) and 4 to 6 (corners)."""
     feature = 0
     zero = a.dtype(0.0)
     one = a.dtype(1.0)
@@ -32,9 +28,7 @@ def closest_on_triangle(x: Any, a: Any, b: Any, c: Any):
     va = d3 * d6 - d5 * d4
     vb = d5 * d2 - d1 * d6
     vc = d1 * d4 - d3 * d2
-    H = wp.identity(n=3, dtype=a.dtype)
     p = a
-    t = type(a)(zero, zero, zero)
     if d1 <= zero and d2 <= zero:
         feature = 4
     elif d3 >= zero and d4 <= d3:
@@ -46,21 +40,13 @@ def closest_on_triangle(x: Any, a: Any, b: Any, c: Any):
     elif vc <= zero and d1 >= zero and d3 <= zero:
         p = a + d1 / (d1 - d3) * ab
         feature = 1
-        t = wp.normalize(ab)
-        H = H - wp.outer(t, t)
     elif vb <= zero and d2 >= zero and d6 <= zero:
         p = a + d2 / (d2 - d6) * ac
         feature = 3
-        t = wp.normalize(ac)
-        H = H - wp.outer(t, t)
     elif va <= zero and (d4 - d3) >= zero and (d5 - d6) >= zero:
         p = b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b)
         feature = 2
-        t = wp.normalize(c - b)
-        H = H - wp.outer(t, t)
     else:
         share = one / (va + vb + vc)
         p = a + vb * share * ab + vc * share * ac
-        t = wp.normalize(wp.cross(ab, ac))
-        H = wp.outer(t, t)
-    return p, feature, H
+    return p, feature

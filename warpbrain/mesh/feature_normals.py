@@ -10,14 +10,8 @@ from warpbrain.mesh.surface import face_vectors
 Floats = NDArray[np.float64]
 
 
-#: What a feature can be, as bits: it sticks out, it is hollow (a corner can be both), it is on a rim.
-SHARP, HOLLOW, RIM = 1, 2, 4
-#: Sine of the angle below which an edge is flat.
-_FLAT = 1e-6
-
-
-def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.int32]]:
-    """Angle-weighted normals (Baerentzen and Aanaes 2005) of each triangle's features, and what these are.
+def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.bool_]]:
+    """Angle-weighted normals (Baerentzen and Aanaes 2005) of each triangle's features, and which are on a rim.
 
     Parameters
     ----------
@@ -30,9 +24,8 @@ def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats,
     normals : (k, 7, 3) array
         Unit normals of the face, of its edges ab, bc, ca and of its corners. The closest point `p` of a closed surface
         to `x` has `x` outside if `(x - p) . n > 0` with the normal of the feature that `p` is on.
-    features : (k, 7) int array
-        `SHARP`, `HOLLOW`, both or neither, or `RIM`: an edge of one triangle only, or its corner, whose normal is that
-        of the face. A region outside has what is sharp as its closest point, a region inside what is hollow.
+    on_rim : (k, 7) bool array
+        True for an edge of one triangle only and its corners, whose normal is that of the face.
     """
     normals = np.empty((len(faces), 7, 3))
     normals[:, 0] = _unit(face_vectors(points, faces))
@@ -56,26 +49,7 @@ def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats,
     rim[edges[(count == 1)[edge.ravel()]].ravel()] = True
     on_rim[:, 4:] = rim[faces]
 
-    # an edge sticks out if the next triangle's far corner lies below the plane of this one
-    depth = np.zeros(len(count))
-    far = np.stack([points[faces[:, 2]], points[faces[:, 0]], points[faces[:, 1]]], axis=1)
-    owners = np.repeat(np.arange(len(faces)), 3)
-    order = np.argsort(edge.ravel(), kind="stable")
-    firsts = np.searchsorted(edge.ravel()[order], np.arange(len(count)))
-    paired = count == 2
-    one, other = order[firsts[paired]], order[firsts[paired] + 1]
-    reach = far.reshape(-1, 3)[other] - points[faces[owners[one], one % 3]]
-    depth[paired] = np.einsum("kj,kj->k", reach, normals[owners[one], 0]) / np.linalg.norm(reach, axis=1)
-    kinds = np.zeros(len(count), dtype=np.int32)
-    kinds[paired & (depth < -_FLAT)] = SHARP
-    kinds[paired & (depth > _FLAT)] = HOLLOW
-    of_corners = np.zeros(len(points), dtype=np.int32)
-    np.bitwise_or.at(of_corners, edges.ravel(), np.repeat(kinds[edge.ravel()], 2))
-    features = np.zeros((len(faces), 7), dtype=np.int32)
-    features[:, 1:4] = kinds[edge]
-    features[:, 4:] = of_corners[faces]
-    features[on_rim] = RIM
-    return np.where(on_rim[:, :, None], normals[:, :1], normals), features
+    return np.where(on_rim[:, :, None], normals[:, :1], normals), on_rim
 
 
 def _unit(vectors: Floats) -> Floats:

@@ -1,19 +1,20 @@
 """Contact with the skull: the surface is stuck to it, slides along it, or can lift off it.
 
-The skull is a rigid surface: the reference surface of the body itself, or a given closed one. A node of lumped area `A`
-at the signed distance `g` from the closest point of it (positive beyond it) has the energy
+The skull is a rigid surface: the reference surface of the body itself, or a given closed one. What touches it is told
+by its signed distance `g` (positive beyond it), smoothed by a spline of the spacing of the surface's edges
+(`warpbrain.kernels.distance_field`): its level sets have no corners, so nodes slide along curved walls of triangles
+without jumps. Of a body's own surface `g` counts from where each node was imaged. A node of lumped area `A` has the
+energy, and from it the force and tangent
 
-    A/(2 k) <k g + q>^2,    <p> = max(0, p) where it can lift off, p where it only slides
+    A/(2 k) <k g + q>^2,   A p dg/dx,   A (k dg/dx (x) dg/dx + p d2g/dx2),   p = <k g + q>
 
-`k` a penalty [Pa/m] and `q` the pressure that augmentation has found so far (Wriggers, Computational Contact Mechanics,
-2nd ed., sections 6.3 and 6.7): in an equilibrium `q` becomes `<k g + q>` until what is left of `g` is small. Where the
-surface is stuck the distance is that from where the node was, in all directions. With friction `f`, a force of at most
-`f A <k g + q>` against the tangential displacement since the reference: right while a load grows, without memory of a
-path. `<k g + q>` is there that of the last augmentation, or of the last time step: so the friction has an energy,
-`f A p (sqrt(s^2 + d^2) - d)` with the slip `s` and `d` = 0.1 mm, over which it builds up.
-
-A limit: nodes that slide along a curved surface of their own begin at its corners, where its direction jumps from face
-to face, and Newton's method may not converge: for the whole surface of case 0529 it does not, for flat walls it does.
+`<p> = max(0, p)` where it can lift off, `p` where it only slides, `k` a penalty [Pa/m] and `q` the pressure that
+augmentation has found so far (Wriggers, Computational Contact Mechanics, 2nd ed., sections 6.3 and 6.7): in an
+equilibrium `q` becomes `<k g + q>` until what is left of `g` is small. Where the surface is stuck the distance is that
+from where the node was, in all directions. With friction `f`, a force of at most `f A p` against the tangential
+displacement `s` since the reference: right while a load grows, without memory of a path. Pressure and direction are
+there those of the last augmentation, or of the last time step: so the friction has an energy,
+`f A p (sqrt(s^2 + d^2) - d)`, with `d` = 0.1 mm, over which it builds up.
 """
 
 from dataclasses import dataclass, field
@@ -24,11 +25,11 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.kernels.closest import closest_on_triangle
+from warpbrain.kernels.distance_field import smooth_distance
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, boundary_faces, face_vectors, node_areas
-from warpbrain.mesh.feature_normals import HOLLOW, RIM, SHARP, feature_normals
+from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.term import Body, Term
@@ -119,28 +120,28 @@ class ContactTerm(Term):
         self.mechanism = contact
         precision, device = body.precision, body.device
         points, faces = contact.skull(body.mesh)
-        used, corners = np.unique(faces, return_inverse=True)
-        self._skull = wp.Mesh(
-            points=wp.array(points[used], dtype=wp.vec3f, device=device),
-            indices=wp.array(corners.ravel(), dtype=int, device=device),
-        )
-        self._corners = self.array(corners.reshape(-1, 3), wp.vec3i)
-        self._skull_points = self.array(points[used], precision.vec3)
-        normals, features = feature_normals(points[used], corners.reshape(-1, 3))
-        self._normals = self.array(normals, precision.vec3)
-        self._features = self.array(features, int)
+        own = boundary_faces(body.mesh.tetrahedra)
+        touching = own[np.isin(own, members).any(axis=1)]
+        # what the body's own triangles cannot follow need not be resolved
+        spacing = min(_edge(points, faces), _edge(body.mesh.points, touching))
+        self._field = DistanceField(points, faces, spacing, body.mesh.points[members], device, precision)
         area = node_areas(body.mesh.points, boundary_faces(body.mesh.tetrahedra))[members]
         modulus = body.shear_moduli.max() + body.volumetric_moduli.max()
         self.stiffness = contact.penalty * modulus / float(np.sqrt(np.median(area)))
         self._area = self.array(area, precision.scalar)
         self._nodes = self.array(members, int)
         self._points = self.array(body.mesh.points, precision.vec3)
-        self._found = wp.zeros(len(members), dtype=precision.scalar, device=device)
-        self._pressing = wp.zeros(len(members), dtype=precision.scalar, device=device)
-        self._gaps = wp.zeros(len(members), dtype=precision.scalar, device=device)
-        self._energies = wp.zeros(len(members), dtype=precision.scalar, device=device)
+        count = len(members)
+        self._start = wp.zeros(count, dtype=precision.scalar, device=device)
+        if contact.points is None:
+            reached = self.array(body.mesh.points[members], precision.vec3)
+            self._field.at(reached, self._start, wp.zeros_like(reached))
+        self._found = wp.zeros(count, dtype=precision.scalar, device=device)
+        self._pressing = wp.zeros(count, dtype=precision.scalar, device=device)
+        self._directions = wp.zeros(count, dtype=precision.vec3, device=device)
+        self._gaps = wp.zeros(count, dtype=precision.scalar, device=device)
+        self._energies = wp.zeros(count, dtype=precision.scalar, device=device)
         self._kernels = _kernels(precision)
-        self._reach = float(np.linalg.norm(np.ptp(body.mesh.points, axis=0)))
 
     def set_scale(self, scale: float) -> None:
         # a wall is there, however little of the load is
@@ -149,9 +150,9 @@ class ContactTerm(Term):
     def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
         scalar = self.body.precision.scalar
         inputs = [
-            self._nodes, self._points, self._area, self._skull.id, self._skull_points, self._corners,
-            self._normals, self._features, STATES.index(self.mechanism.state), scalar(self.stiffness),
-            scalar(self.mechanism.friction), scalar(self._reach), self._found, self._pressing, u, *outputs,
+            self._nodes, self._points, self._area, self._start, self._field.coefficients, self._field.origin,
+            scalar(self._field.spacing), STATES.index(self.mechanism.state), scalar(self.stiffness),
+            scalar(self.mechanism.friction), self._found, self._pressing, self._directions, u, *outputs,
         ]  # fmt: skip
         wp.launch(kernel, dim=len(self.stencils), inputs=inputs, device=self.body.device)
 
@@ -179,17 +180,28 @@ class ContactTerm(Term):
         if self.mechanism.state == "lifting":
             pressure = np.maximum(pressure, 0.0)
         self._found.assign(pressure)
-        self._pressing.assign(np.maximum(pressure, 0.0))
+        self._press(u, pressure)
         # what is left of the distance where the surface is touched
         return bool(np.abs(pressure - found).max() > _NEAR * self.stiffness)
 
     def advance(self, u: wp.array) -> None:
         if self.mechanism.friction > 0.0:
-            self._pressing.assign(np.maximum(self.stiffness * self.gaps(u) + self._found.numpy(), 0.0))
+            self._press(u, self.stiffness * self.gaps(u) + self._found.numpy())
+
+    def _press(self, u: wp.array, pressure: NDArray[np.float64]) -> None:
+        """Take a pressure (k,) [Pa] and the directions at a displacement [m] as those of friction."""
+        self._pressing.assign(np.maximum(pressure, 0.0))
+        reached = self.body.mesh.points[self.stencils[:, 0]] + u.numpy()[self.stencils[:, 0]]
+        self._field.at(self.array(reached, self.body.precision.vec3), self._gaps, self._directions)
 
     def forget(self) -> None:
         self._found.zero_()
         self._pressing.zero_()
+
+
+def _edge(points: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
+    """Median length [m] of the edges of triangles."""
+    return float(np.median(np.linalg.norm(points[faces] - points[np.roll(faces, 1, axis=1)], axis=2)))
 
 
 def _vertex_normals(mesh: TetMesh) -> NDArray[np.float64]:
@@ -206,55 +218,23 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     module = compiled_module(f"contact_{precision.name}")
     slip = wp.constant(scalar(_SLIP))
-    sharp, hollow, rim = wp.constant(SHARP), wp.constant(HOLLOW), wp.constant(RIM)
-
-    @wp.func
-    def nearest(
-        skull: wp.uint64,
-        points: wp.array[vec3],
-        corners: wp.array[wp.vec3i],
-        normals: wp.array2d[vec3],
-        features: wp.array2d[int],
-        x: vec3,
-        reach: scalar,
-    ):
-        """Signed distance beyond the surface, direction out of it, and `H` of `closest_on_triangle`."""
-        # which triangle is found in single precision; where on it, in the precision of everything else
-        query = wp.mesh_query_point_no_sign(skull, wp.vec3f(x), wp.float32(reach))
-        i = corners[query.face]
-        p, feature, H = closest_on_triangle(x, points[i[0]], points[i[1]], points[i[2]])
-        away = x - p
-        n = normals[query.face, feature]
-        along = wp.dot(away, n)
-        gap = along
-        # beyond a rim the wall goes on as the plane of its last triangle
-        kind = features[query.face, feature]
-        if kind != rim and wp.length(away) > scalar(1e-12) * reach:
-            gap = wp.length(away)
-            if along < scalar(0.0):
-                gap = -gap
-            n = away / gap
-        region = (gap > scalar(0.0) and (kind & sharp) != 0) or (gap < scalar(0.0) and (kind & hollow) != 0)
-        if not region:
-            H = wp.outer(n, n)
-        return gap, n, H
+    distance = smooth_distance(precision)
 
     @wp.kernel(module=module)
     def forces(
         nodes: wp.array[int],
         points: wp.array[vec3],
         area: wp.array[scalar],
-        skull: wp.uint64,
-        skull_points: wp.array[vec3],
-        corners: wp.array[wp.vec3i],
-        normals: wp.array2d[vec3],
-        features: wp.array2d[int],
+        start: wp.array[scalar],
+        coefficients: wp.array3d[scalar],
+        origin: vec3,
+        spacing: scalar,
         state: int,
         k: scalar,
         friction: scalar,
-        reach: scalar,
         found: wp.array[scalar],
         pressing: wp.array[scalar],
+        directions: wp.array[vec3],
         u: wp.array[vec3],
         out: wp.array2d[vec3],
     ):
@@ -263,32 +243,29 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         if state == 0:
             out[t, 0] = area[t] * k * d
             return
-        gap, n, _H = nearest(skull, skull_points, corners, normals, features, points[nodes[t]] + d, reach)
-        pressure = k * gap + found[t]
+        g, slope, _H = distance(points[nodes[t]] + d, coefficients, origin, spacing)
+        pressure = k * (g - start[t]) + found[t]
         if state == 2:
             pressure = wp.max(pressure, scalar(0.0))
-        f = pressure * n
-        if friction > scalar(0.0):
-            s = d - wp.dot(d, n) * n
-            f += friction * pressing[t] / wp.sqrt(wp.dot(s, s) + slip * slip) * s
-        out[t, 0] = area[t] * f
+        s = d - wp.dot(d, directions[t]) * directions[t]
+        rubbing = friction * pressing[t] / wp.sqrt(wp.dot(s, s) + slip * slip)
+        out[t, 0] = area[t] * (pressure * slope + rubbing * s)
 
     @wp.kernel(module=module)
     def tangents(
         nodes: wp.array[int],
         points: wp.array[vec3],
         area: wp.array[scalar],
-        skull: wp.uint64,
-        skull_points: wp.array[vec3],
-        corners: wp.array[wp.vec3i],
-        normals: wp.array2d[vec3],
-        features: wp.array2d[int],
+        start: wp.array[scalar],
+        coefficients: wp.array3d[scalar],
+        origin: vec3,
+        spacing: scalar,
         state: int,
         k: scalar,
         friction: scalar,
-        reach: scalar,
         found: wp.array[scalar],
         pressing: wp.array[scalar],
+        directions: wp.array[vec3],
         u: wp.array[vec3],
         out: wp.array2d[mat33],
     ):
@@ -298,16 +275,13 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
             out[t, 0] = area[t] * k * one
             return
         d = u[nodes[t]]
-        gap, n, H = nearest(skull, skull_points, corners, normals, features, points[nodes[t]] + d, reach)
-        pressure = k * gap + found[t]
+        g, slope, H = distance(points[nodes[t]] + d, coefficients, origin, spacing)
+        pressure = k * (g - start[t]) + found[t]
         K = mat33()
         if state == 1 or pressure > scalar(0.0):
-            # d(pressure n)/dx = k n n^T + pressure dn/dx, and gap dn/dx = H - n n^T
-            K = k * wp.outer(n, n)
-            if wp.abs(gap) > scalar(1e-12) * reach:
-                # a pressure that would push around the corner makes the tangent indefinite: left to Newton's method
-                K += wp.max(pressure / gap, scalar(0.0)) * (H - wp.outer(n, n))
+            K = k * wp.outer(slope, slope) + pressure * H
         if friction > scalar(0.0):
+            n = directions[t]
             s = d - wp.dot(d, n) * n
             size = wp.sqrt(wp.dot(s, s) + slip * slip)
             K += friction * pressing[t] / size * (one - wp.outer(n, n) - wp.outer(s, s) / (size * size))
@@ -318,17 +292,16 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         nodes: wp.array[int],
         points: wp.array[vec3],
         area: wp.array[scalar],
-        skull: wp.uint64,
-        skull_points: wp.array[vec3],
-        corners: wp.array[wp.vec3i],
-        normals: wp.array2d[vec3],
-        features: wp.array2d[int],
+        start: wp.array[scalar],
+        coefficients: wp.array3d[scalar],
+        origin: vec3,
+        spacing: scalar,
         state: int,
         k: scalar,
         friction: scalar,
-        reach: scalar,
         found: wp.array[scalar],
         pressing: wp.array[scalar],
+        directions: wp.array[vec3],
         u: wp.array[vec3],
         out: wp.array[scalar],
         gaps: wp.array[scalar],
@@ -339,12 +312,12 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
             gaps[t] = wp.length(d)
             out[t] = scalar(0.5) * area[t] * k * wp.dot(d, d)
             return
-        gap, n, _H = nearest(skull, skull_points, corners, normals, features, points[nodes[t]] + d, reach)
-        pressure = k * gap + found[t]
+        g, _slope, _H = distance(points[nodes[t]] + d, coefficients, origin, spacing)
+        gaps[t] = g - start[t]
+        pressure = k * gaps[t] + found[t]
         if state == 2:
             pressure = wp.max(pressure, scalar(0.0))
-        gaps[t] = gap
-        s = d - wp.dot(d, n) * n
+        s = d - wp.dot(d, directions[t]) * directions[t]
         rubbed = friction * pressing[t] * (wp.sqrt(wp.dot(s, s) + slip * slip) - slip)
         out[t] = area[t] * (scalar(0.5) / k * pressure * pressure + rubbed)
 

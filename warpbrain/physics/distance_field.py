@@ -1,0 +1,94 @@
+"""How far from a rigid surface something is, smooth enough for Newton's method."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.kernels.distance_field import distance_kernels
+from warpbrain.kernels.precision import Precision
+from warpbrain.mesh.feature_normals import feature_normals
+
+Floats = NDArray[np.float64]
+
+#: Nodes of the largest grid; a finer one is made coarser.
+LARGEST_GRID = 2_000_000
+#: Spacings that the grid goes beyond what it is made for.
+_MARGIN = 4
+
+
+class DistanceField:
+    """The smoothed signed distance from a surface, on a device; see `warpbrain.kernels.distance_field`.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        [m]
+    faces : (k, 3) int array
+        Triangles, oriented outwards; beyond an open rim the surface goes on as the plane of its last triangle.
+    spacing : float
+        Of the grid [m]: what is smaller is smoothed.
+    region : (r, 3) array
+        Points [m] that the grid must hold, beside those of the surface.
+    device : Any
+    precision : Precision
+
+    Attributes
+    ----------
+    coefficients : wp.array3d
+        [m]
+    origin : wp.vec3
+        The grid's first node [m].
+    spacing : float
+        [m]; larger than asked for where the grid would have more than `LARGEST_GRID` nodes.
+    """
+
+    def __init__(
+        self,
+        points: Floats,
+        faces: NDArray[np.integer],
+        spacing: float,
+        region: Floats,
+        device: Any,
+        precision: Precision,
+    ) -> None:
+        self._device, self._precision = device, precision
+        used, corners = np.unique(faces, return_inverse=True)
+        corners = corners.reshape(-1, 3)
+        surface = points[used]
+        low = np.minimum(surface.min(axis=0), region.min(axis=0))
+        size = np.maximum(surface.max(axis=0), region.max(axis=0)) - low
+        self.spacing = max(spacing, float(np.prod(size + 2 * _MARGIN * spacing) / LARGEST_GRID) ** (1.0 / 3.0))
+        low = low - _MARGIN * self.spacing
+        shape = tuple(int(n) for n in np.ceil(size / self.spacing) + 2 * _MARGIN + 1)
+        self.origin = precision.vec3(*low)
+        self.coefficients = wp.zeros(shape, dtype=precision.scalar, device=device)
+        self._fill, self._evaluate = distance_kernels(precision)
+        tree = wp.Mesh(
+            points=wp.array(surface, dtype=wp.vec3f, device=device),
+            indices=wp.array(corners.ravel(), dtype=int, device=device),
+        )
+        normals, rim = feature_normals(surface, corners)
+        reach = 4.0 * float(np.linalg.norm(np.multiply(shape, self.spacing)))
+        inputs = [
+            tree.id,
+            wp.array(surface, dtype=precision.vec3, device=device),
+            wp.array(corners, dtype=wp.vec3i, device=device),
+            wp.array(normals, dtype=precision.vec3, device=device),
+            wp.array(rim, dtype=wp.bool, device=device),
+            self.origin,
+            precision.scalar(self.spacing),
+            precision.scalar(reach),
+            self.coefficients,
+        ]
+        wp.launch(self._fill, dim=shape, inputs=inputs, device=device)
+
+    def at(self, points: wp.array, distances: wp.array, directions: wp.array) -> None:
+        """Write distances [m] and directions away from the surface's inside at points [m]."""
+        inputs = [
+            points, self.coefficients, self.origin, self._precision.scalar(self.spacing), distances, directions
+        ]  # fmt: skip
+        wp.launch(self._evaluate, dim=len(points), inputs=inputs, device=self._device)
