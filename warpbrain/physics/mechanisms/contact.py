@@ -278,7 +278,8 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         g, slope, H = distance(points[nodes[t]] + d, coefficients, origin, spacing)
         pressure = k * (g - start[t]) + found[t]
         K = mat33()
-        if state == 1 or pressure > scalar(0.0):
+        # what just touches counts as pressed: a first step that went through the wall would find no way back
+        if state == 1 or pressure >= scalar(0.0):
             K = k * wp.outer(slope, slope) + pressure * H
         if friction > scalar(0.0):
             n = directions[t]
