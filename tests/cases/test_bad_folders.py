@@ -160,7 +160,7 @@ def test_a_skull_must_be_closed(tmp_path):
     assert re.search(r"skull.stl: the surface is not closed: 3 edge\(s\) .*close the surface", only(folder))
     meshio.write(folder / "skull.stl", meshio.Mesh(corners, [("triangle", faces)]), binary=True)
     case = read_case(folder)
-    assert case.boundaries[1].faces.shape == (4, 3)
+    assert case.boundaries[1].surface.faces.shape == (4, 3)
 
 
 def test_second_order_tetrahedra_are_read_by_their_corners(tmp_path):

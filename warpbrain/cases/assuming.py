@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.parts.mechanisms import in_si
+from warpbrain.cases.parts.named import Named
 from warpbrain.errors import InputError
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Says
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.problems import Problems
+
+#: Kinds of parameters whose values are names.
+_NAMES = ("text", "node set", "element set", "directions", "surface")
 
 
 def assume(case: Case, said: str) -> Case:
@@ -21,7 +28,8 @@ def assume(case: Case, said: str) -> Case:
     case : Case
     said : str
         ``kind`` or ``kind:key=value,key=value``: values as in `case.toml`, in the case's units and axes; several
-        numbers of one key are joined by ``/``. The last word of a key will do where no other key ends with it.
+        numbers of one key are joined by ``/``. The last word of a key will do where no other key ends with it. Files
+        are named from the working directory.
 
     Raises
     ------
@@ -41,25 +49,32 @@ def assume(case: Case, said: str) -> Case:
         raise InputError(f"{said}: no mechanism '{kind}': {f'did you mean {near[0]}?' if near else ', '.join(known)}")
     mechanism = known[kind]
     values: dict[str, Any] = {}
+    named = Named(case.mesh, case.tissues, case.frame, Problems())
     for part in rest.split(",") if rest else []:
         word, equals, text = part.partition("=")
         key = _key(said, mechanism, word)
         if not equals or key in values:
             raise InputError(f"{said}: {part}: expected KEY=VALUE, each key once")
         says = mechanism.parameters()[key]
-        values[key] = in_si(says, _value(said, says, key, text), case.frame)
+        value = _value(said, says, key, text)
+        if isinstance(value, str):
+            values[key] = named.look_up(says.kind, value, partial(Path, value))
+            if named.problems:
+                raise InputError(f"{said}: {key}: {named.problems.found[0]}")
+        else:
+            values[key] = in_si(says, value, case.frame)
     missing = [key for key in mechanism.required() if key not in values]
     if missing:
         says = mechanism.parameters()[missing[0]]
         raise InputError(f"{said}: {missing[0]} is missing{f' [{says.unit}]' if says.unit else ''}: {says.doc}")
     try:
-        made = mechanism.of_case(values, Facts(case.mesh, case.gravity_axis, case.density))
+        made = mechanism.of_case(values, Facts(named.mesh, case.gravity_axis, case.density))
     except ParameterError as error:
         raise InputError(f"{said}: {error.key}: {error}") from None
     except InputError as error:
         raise InputError(f"{said}: {error}") from None
     others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
-    return replace(case, mechanisms=(*others, made))
+    return replace(case, mesh=named.mesh, mechanisms=(*others, made))
 
 
 def _key(said: str, mechanism: type[Mechanism], word: str) -> str:
@@ -71,7 +86,7 @@ def _key(said: str, mechanism: type[Mechanism], word: str) -> str:
 
 
 def _value(said: str, says: Says, key: str, text: str) -> Any:
-    if says.kind in ("text", "node set", "element set"):
+    if says.kind in _NAMES:
         if says.choices and text not in says.choices:
             raise InputError(f"{said}: {key}: found '{text}', expected one of {', '.join(says.choices)}")
         return text

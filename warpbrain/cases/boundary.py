@@ -9,6 +9,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.physics.closed_surface import ClosedSurface
+
 Floats = NDArray[np.float64]
 Ramp = Sequence[tuple[float, float]]
 
@@ -132,19 +134,13 @@ class Contact(Boundary):
 
     Attributes
     ----------
-    file : str
-        The surface, relative to the case folder.
-    points : (n, 3) array
-        [m]
-    faces : (k, 3) int array
+    surface : ClosedSurface
     friction : float
     """
 
     kind: ClassVar[str] = "contact"
-    file: str
-    points: Floats = field(repr=False, compare=False)
-    faces: NDArray[np.int32] = field(repr=False, compare=False)
+    surface: ClosedSurface
     friction: float = 0.0
 
     def sentence(self) -> str:
-        return f"The {self.name} cannot cross the surface of {self.file}; friction {self.friction:g}."
+        return f"The {self.name} cannot cross the surface of {self.surface}; friction {self.friction:g}."

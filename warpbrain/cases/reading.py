@@ -13,6 +13,7 @@ from warpbrain.cases.parts.anatomy import read_anatomy
 from warpbrain.cases.parts.boundaries import check_together, read_boundaries
 from warpbrain.cases.parts.context import Context
 from warpbrain.cases.parts.mechanisms import read_mechanisms
+from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.node_sets import NodeSets
 from warpbrain.cases.parts.recordings import read_recordings
 from warpbrain.cases.parts.tissues import read_body, read_tissues
@@ -75,10 +76,13 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     boundaries = read_boundaries(context, sets)
     # with the node sets that files of this folder name
     mesh = None if sets is None else sets.mesh()
-    mechanisms = read_mechanisms(context, mesh, axis, density)
+    named = None if mesh is None else Named(mesh, tissues, context.frame, problems)
+    mechanisms = read_mechanisms(context, named, axis, density)
     recordings = read_recordings(context, sets, {boundary.name for boundary in boundaries})
-    if mesh is None:
+    if named is None:
         return None
+    # with the element sets and vectors that mechanisms name
+    mesh = named.mesh
     case = Case(
         name=head.get("name", ""),
         title=head.get("title", head.get("name", "")),

@@ -172,7 +172,8 @@ def start_from_mesh(
     if len(numbers) == 1 and array is None:
         notes.append("one tissue: if there are more, --array names the cell array of their labels")
     sets = {**first_sets(points, raw.tetrahedra), **raw.node_sets}
-    mesh = ordered(TetMesh(points, raw.tetrahedra, raw.tissue, sets, raw.element_sets))
+    vectors = {name: values * frame.signs for name, values in raw.element_vectors.items()}
+    mesh = ordered(TetMesh(points, raw.tetrahedra, raw.tissue, sets, raw.element_sets, vectors))
     tissues = {label: given.get(label, f"tissue {label}") for label in numbers}
     _write(folder, mesh, tissues, file)
     return StartedCase(folder, mesh, tissues, measure(mesh), None, None, _cavity_volume(mesh), 0.0, tuple(notes))

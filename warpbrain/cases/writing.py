@@ -19,6 +19,7 @@ from warpbrain.cases.parts.mechanisms import in_file
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.mesh import write_mesh
+from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.recordings.recording import (
     ForceRecording,
@@ -64,14 +65,15 @@ def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
     else:
         name = Path(case.mesh_file).with_suffix(".vtu").name
         tables["mesh"] = {"file": name, "tissue": "tissue"}
-        in_axes = replace(case.mesh, points=frame.directions(case.mesh.points))
+        turned = {name: frame.directions(vectors) for name, vectors in case.mesh.element_vectors.items()}
+        in_axes = replace(case.mesh, points=frame.directions(case.mesh.points), element_vectors=turned)
         write_mesh(folder / name, in_axes, unit=frame.unit)
     tables["tissue"] = {str(label): _tissue(tissue) for label, tissue in sorted(case.tissues.items())}
     tables["body"] = {"density": case.density, "poisson": case.poisson}
     if case.boundaries:
         tables["boundary"] = [_boundary(folder, boundary, frame) for boundary in case.boundaries]
     if case.mechanisms:
-        tables["mechanism"] = [_mechanism(mechanism, frame) for mechanism in case.mechanisms]
+        tables["mechanism"] = [_mechanism(folder, mechanism, frame) for mechanism in case.mechanisms]
     if case.recordings:
         tables["recording"] = [_recording(folder, recording, frame) for recording in case.recordings]
     import tomli_w
@@ -113,8 +115,7 @@ def _boundary(folder: Path, boundary: Boundary, frame: Frame) -> dict[str, Any]:
     if isinstance(boundary, Pressed):
         return table | {"value": boundary.value, **_ramp(boundary.ramp)}
     if isinstance(boundary, Contact):
-        name = _new_file(folder, "surfaces", boundary.name, ".vtu")
-        _write_surface(folder / name, boundary, frame)
+        name = _surface(folder, boundary.surface, boundary.name, frame)
         return table | {"surface": name, "friction": boundary.friction}
     assert isinstance(boundary, Fixed | Sliding)
     return table
@@ -138,19 +139,25 @@ def _displacement(folder: Path, boundary: Displaced, frame: Frame) -> dict[str, 
     return {"value": name}
 
 
-def _write_surface(path: Path, contact: Contact, frame: Frame) -> None:
+def _surface(folder: Path, surface: ClosedSurface, name: str, frame: Frame) -> str:
+    """Write a closed surface; its file, relative to the folder."""
     import meshio
 
-    surface = meshio.Mesh(frame.file_lengths(contact.points), [("triangle", contact.faces)])
-    with whole_file(path) as temporary:
-        meshio.write(temporary, surface, file_format="vtu", binary=True, compression="zlib")
+    file = _new_file(folder, "surfaces", name, ".vtu")
+    with whole_file(folder / file) as temporary:
+        mesh = meshio.Mesh(frame.file_lengths(surface.points), [("triangle", surface.faces)])
+        meshio.write(temporary, mesh, file_format="vtu", binary=True, compression="zlib")
+    return file
 
 
-def _mechanism(mechanism: Mechanism, frame: Frame) -> dict[str, Any]:
-    said = {name: getattr(mechanism, name) for name in mechanism.parameters()}
-    values = {
-        name: in_file(mechanism.parameters()[name], value, frame) for name, value in said.items() if value is not None
-    }
+def _mechanism(folder: Path, mechanism: Mechanism, frame: Frame) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for name, says in mechanism.parameters().items():
+        value = getattr(mechanism, name)
+        if isinstance(value, ClosedSurface):
+            values[name] = _surface(folder, value, Path(value.file).stem, frame)
+        elif value is not None:
+            values[name] = in_file(says, value, frame)
     return {"kind": mechanism.kind, **values, **_ramp(mechanism.ramp)}
 
 

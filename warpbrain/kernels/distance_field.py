@@ -5,8 +5,8 @@ Cubic B-splines on a grid of spacing `h`, with the distances at the grid's nodes
     g(x) = sum_ijk B(x/h - i) B(y/h - j) B(z/h - k) d_ijk
 
 has two continuous derivatives everywhere, however jagged the surface. It is the distance smoothed over about `h`: a
-plane stays a plane (splines reproduce linear functions), edges are rounded over two spacings (de Boor, A Practical Guide
-to Splines, 2001, chapter IX). Beyond the grid the coefficients go on linearly, and so does `g`.
+plane stays a plane (splines reproduce linear functions), edges are rounded over two spacings (de Boor, A Practical
+Guide to Splines, 2001, chapter IX). Beyond the grid the coefficients go on linearly, and so does `g`.
 """
 
 from functools import cache
@@ -39,7 +39,9 @@ def smooth_distance(precision: Precision) -> Any:
             three * r * r * r - scalar(6.0) * r * r + scalar(4.0),
             t * t * t,
         )
-        d = vec4(-half * r * r, half * t * (three * t - scalar(4.0)), half * r * (scalar(4.0) - three * r), half * t * t)
+        d = vec4(
+            -half * r * r, half * t * (three * t - scalar(4.0)), half * r * (scalar(4.0) - three * r), half * t * t
+        )
         dd = vec4(r, three * t - two, three * r - two, t)
         first = int(whole) - 1
         base = wp.clamp(first, 0, n - 4)

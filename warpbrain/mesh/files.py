@@ -5,7 +5,10 @@ Conventions of the files
     * tissue labels: an integer cell array, ``tissue`` unless the caller says otherwise;
     * node sets: named lists of nodes (Abaqus), and every point array of one column that is integer, boolean, or real
       with no values but 0 and 1; non-zero = member;
-    * element sets: every such cell array whose name starts with ``set_``; the set's name is the rest.
+    * element sets: every such cell array whose name starts with ``set_``; the set's name is the rest;
+    * element vectors: every real array of three columns, of cells, or of points where cells have none of that name; an
+      element has the mean of its nodes' vectors, each turned to within a right angle of the first: what has an axis
+      but no sense, as fibres do, must not cancel.
 """
 
 from __future__ import annotations
@@ -134,8 +137,27 @@ def _from_meshio(raw: Any, scale: float, tissue: str | None) -> MeshInFile:
         cells.get(label),  # type: ignore[arg-type]  # TetMesh fills in and converts labels itself
         node_sets,
         _members({name: data for name, data in cells.items() if name != label}, ELEMENT_SET_PREFIX),
+        _vectors(raw.point_data, cells, np.concatenate([raw.cells[b].data[:, :4] for b in blocks])),
     )
     return MeshInFile(mesh, numbers, len(raw.points))
+
+
+def _vectors(
+    of_points: Mapping[str, Any], of_cells: Mapping[str, Any], tetrahedra: NDArray[np.integer]
+) -> dict[str, NDArray[np.float64]]:
+    found = {}
+    for name, data in of_points.items():
+        if _is_vectors(data):
+            at_nodes = np.asarray(data, dtype=np.float64)[tetrahedra]
+            with np.errstate(invalid="ignore"):
+                against = np.einsum("eaj,ej->ea", at_nodes, at_nodes[:, 0]) < 0.0
+            found[name] = np.where(against[:, :, None], -at_nodes, at_nodes).mean(axis=1)
+    return found | {name: np.asarray(data, dtype=np.float64) for name, data in of_cells.items() if _is_vectors(data)}
+
+
+def _is_vectors(data: Any) -> bool:
+    array = np.asarray(data)
+    return array.ndim == 2 and array.shape[1] == 3 and array.dtype.kind == "f"
 
 
 def _named(sets: Mapping[str, Any], count: int) -> dict[str, NDArray[np.bool_]]:
@@ -192,6 +214,7 @@ def write_mesh(path: str | os.PathLike[str], mesh: TetMesh, unit: str = "m") -> 
         cell_data={
             "tissue": [mesh.tissue],
             **{ELEMENT_SET_PREFIX + name: [members.astype(np.uint8)] for name, members in mesh.element_sets.items()},
+            **{name: [vectors] for name, vectors in mesh.element_vectors.items()},
         },
     )
     with whole_file(target) as scratch:

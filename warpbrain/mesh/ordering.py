@@ -31,4 +31,5 @@ def ordered(mesh: TetMesh) -> TetMesh:
         mesh.tissue[elements],
         {name: members[nodes] for name, members in mesh.node_sets.items()},
         {name: members[elements] for name, members in mesh.element_sets.items()},
+        {name: vectors[elements] for name, vectors in mesh.element_vectors.items()},
     )

@@ -45,8 +45,10 @@ def refined(mesh: TetMesh) -> tuple[TetMesh, Ints]:
             both &= outer
         node_sets[name] = np.concatenate([members, both])
     element_sets = {name: np.repeat(members, 8) for name, members in mesh.element_sets.items()}
+    element_vectors = {name: np.repeat(vectors, 8, axis=0) for name, vectors in mesh.element_vectors.items()}
     ends = np.concatenate([np.repeat(np.arange(count)[:, None], 2, axis=1), edges]).astype(np.int32)
-    return TetMesh(points, children, np.repeat(mesh.tissue, 8), node_sets, element_sets), ends
+    tissue = np.repeat(mesh.tissue, 8)
+    return TetMesh(points, children, tissue, node_sets, element_sets, element_vectors), ends
 
 
 def _octahedra(points: Floats, nodes: NDArray[np.int64]) -> Ints:

@@ -72,6 +72,16 @@ def _sets(given: Mapping[str, ArrayLike], length: int, what: str) -> Mapping[str
     return MappingProxyType(checked)
 
 
+def _vectors(given: Mapping[str, ArrayLike], length: int) -> Mapping[str, Floats]:
+    checked = {}
+    for name, values in given.items():
+        array = np.asarray(values, dtype=np.float64)
+        if array.shape != (length, 3):
+            raise MeshError(f"element vectors '{name}' have shape {array.shape}, expected ({length}, 3)")
+        checked[name] = _frozen(array)
+    return MappingProxyType(checked)
+
+
 def _frozen(array: NDArray[Any]) -> NDArray[Any]:
     """A contiguous copy that refuses writing: a checked mesh stays what was checked."""
     copy = np.array(array, order="C", copy=True)
@@ -95,6 +105,8 @@ class TetMesh:
         Named sets of nodes.
     element_sets : mapping of str to (m,) bool array
         Named sets of tetrahedra.
+    element_vectors : mapping of str to (m, 3) array
+        Named vectors of tetrahedra, such as directions of fibres; what is not known may be zero or not finite.
 
     Raises
     ------
@@ -113,6 +125,7 @@ class TetMesh:
     tissue: Ints = None  # type: ignore[assignment]  # filled in below
     node_sets: Mapping[str, Bools] = field(default_factory=dict)
     element_sets: Mapping[str, Bools] = field(default_factory=dict)
+    element_vectors: Mapping[str, Floats] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         points = np.asarray(self.points, dtype=np.float64)
@@ -133,6 +146,7 @@ class TetMesh:
             object.__setattr__(self, name, _frozen(value))
         object.__setattr__(self, "node_sets", _sets(self.node_sets, len(points), "node"))
         object.__setattr__(self, "element_sets", _sets(self.element_sets, count, "element"))
+        object.__setattr__(self, "element_vectors", _vectors(self.element_vectors, count))
 
     def __repr__(self) -> str:
         labels = ", ".join(str(label) for label in np.unique(self.tissue))
@@ -143,8 +157,8 @@ class TetMesh:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # a mapping proxy cannot be pickled, and meshes travel to worker processes
-        sets = (dict(self.node_sets), dict(self.element_sets))
-        return (TetMesh, (self.points, self.tetrahedra, self.tissue, *sets))
+        named = (dict(self.node_sets), dict(self.element_sets), dict(self.element_vectors))
+        return (TetMesh, (self.points, self.tetrahedra, self.tissue, *named))
 
     @property
     def volumes(self) -> Floats:
@@ -159,7 +173,11 @@ class TetMesh:
     @property
     def node_volumes(self) -> Floats:
         """Volume lumped to each node [m3], a quarter of each of its tetrahedra, shape (n,)."""
-        quarters = np.repeat(self.volumes / 4.0, 4)
+        return self.lumped(self.volumes)
+
+    def lumped(self, amounts: ArrayLike) -> Floats:
+        """Amounts (m,) of the tetrahedra shared evenly by their nodes, shape (n,)."""
+        quarters = np.repeat(np.asarray(amounts, dtype=np.float64) / 4.0, 4)
         lumped = np.bincount(self.tetrahedra.ravel(), weights=quarters, minlength=len(self.points))
         return lumped.astype(np.float64)
 
@@ -174,7 +192,7 @@ class TetMesh:
         Returns
         -------
         mesh : TetMesh
-            What remains; nodes that belonged to removed tetrahedra only are gone, and every set is restricted.
+            What remains; nodes that belonged to removed tetrahedra only are gone; sets and vectors are restricted.
         node_ids : (n',) int32 array
             Id in this mesh of every node of the new one.
         element_ids : (m',) int32 array
@@ -199,6 +217,7 @@ class TetMesh:
             self.tissue[element_ids],
             {name: members[node_ids] for name, members in self.node_sets.items()},
             {name: members[element_ids] for name, members in self.element_sets.items()},
+            {name: vectors[element_ids] for name, vectors in self.element_vectors.items()},
         )
         return mesh, node_ids, element_ids
 

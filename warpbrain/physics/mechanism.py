@@ -4,8 +4,8 @@
 2. its parameters, the fields of the class made by `parameter`: unit, limits, what is expected of them and where that
    is from. Keys of `case.toml`, arguments of `--with` and the page in the docs are made from them;
 3. what it does: a mechanism is also one or several of `Load` (forces that do not follow the deformation), `Following`
-   (a term with forces that do), `Weakening` (softer or stiffer elements), `Growing` (larger or smaller ones),
-   `Substituting` (another law) and `Removing` (fewer elements);
+   (a term with forces that do), `Weakening` (softer or stiffer elements), `Emptying` (lighter ones), `Growing` (larger
+   or smaller ones), `Substituting` (another law) and `Removing` (fewer elements);
 4. what it is taken for (`confused_with`) and what must be observed to tell it apart (`needs`).
 
 Whoever lists mechanisms (reading, writing, simulation, diagnosis, docs) walks the registry,
@@ -26,12 +26,14 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
 from warpbrain.physics.ramp import Ramped
 from warpbrain.physics.term import Following
 
 __all__ = [
+    "Emptying",
     "Facts",
     "Following",
     "Growing",
@@ -44,9 +46,10 @@ __all__ = [
     "parameter",
 ]
 
-#: What the value of a parameter can be: a number, free text, the name of a node set with faces, of an element set, a
-#: position, a vector that is no length, or numbers.
-KINDS = ("number", "text", "node set", "element set", "position", "vector", "numbers")
+#: What the value of a parameter can be: a number, free text, the name of a node set with faces, of an element set, of
+#: an array of directions, a closed surface, a position, a vector that is no length, or numbers. Users may say a tissue
+#: for an element set, and files for directions and surfaces (`warpbrain.cases.parts.named`).
+KINDS = ("number", "text", "node set", "element set", "directions", "surface", "position", "vector", "numbers")
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,8 @@ class Says:
     choices : tuple of str
     needed : bool
         Whether a case must give it, whatever default the class has.
+    absent : str
+        What it is taken to be where a case does not give it, in words, if that is not the default of the class.
     expectation : Expectation or None
         In the user's unit; None: never estimated.
     typical : str
@@ -83,6 +88,7 @@ class Says:
     below: float = math.inf
     choices: tuple[str, ...] = ()
     needed: bool = False
+    absent: str = ""
     expectation: Expectation | None = None
     typical: str = ""
     source: str = ""
@@ -158,7 +164,11 @@ class Mechanism(Ramped, abc.ABC):
     def required(cls) -> tuple[str, ...]:
         """Names of the parameters that a case must give."""
         fields = (f for f in dataclasses.fields(cls) if "says" in f.metadata)
-        return tuple(f.name for f in fields if f.default is dataclasses.MISSING or f.metadata["says"].needed)
+        return tuple(
+            f.name
+            for f in fields
+            if f.metadata["says"].needed or (f.default is dataclasses.MISSING and not f.metadata["says"].absent)
+        )
 
     @classmethod
     def described(cls, name: str) -> str:
@@ -167,7 +177,9 @@ class Mechanism(Ramped, abc.ABC):
         if name in cls.required():
             return says.doc
         default: Any = next(f.default for f in dataclasses.fields(cls) if f.name == name)
-        if default is None or default == "":
+        if says.absent:
+            text = says.absent
+        elif default is None or default == "":
             text = "none"
         elif isinstance(default, str):
             text = f"'{default}'"
@@ -217,7 +229,7 @@ class Mechanism(Ramped, abc.ABC):
             value = getattr(self, name)
             if value is None or value == "" or says.kind == "numbers":
                 continue
-            if isinstance(value, str):
+            if isinstance(value, str | ClosedSurface):
                 said.append(f"{name} '{value}'")
             else:
                 # positions are millimetres to people, whatever the case's unit
@@ -243,6 +255,14 @@ class Weakening(Protocol):
 
     def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
         """Factor (m,) on all moduli of each element, where the mechanism acts with a scale from 0 to 1."""
+
+
+@runtime_checkable
+class Emptying(Protocol):
+    """A mechanism that takes tissue away little by little, and its weight and mass with it."""
+
+    def remaining_part(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+        """Part (m,) of each element that is left, where the mechanism acts with a scale from 0 to 1."""
 
 
 @runtime_checkable

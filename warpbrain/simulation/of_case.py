@@ -60,8 +60,7 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
                     nodes=boundary.nodes,
                     state="lifting",
                     friction=boundary.friction,
-                    points=boundary.points,
-                    faces=boundary.faces,
+                    surface=boundary.surface,
                 )
             )
     try:

@@ -170,6 +170,8 @@ _KIND = {
     "text": "text",
     "node set": "text",
     "element set": "text",
+    "directions": "text",
+    "surface": "file",
     "position": "vector",
     "vector": "vector",
     "numbers": "numbers",

@@ -70,7 +70,8 @@ def _read_mesh(context: Context, path: Path, tissue: str | None) -> MeshInFile |
     mesh = found.mesh
     if not np.all(context.frame.signs > 0):
         # both axes conventions are right-handed: turning two axes keeps the orientation of the elements
-        mesh = replace(mesh, points=context.frame.directions(mesh.points))
+        turned = {name: context.frame.directions(vectors) for name, vectors in mesh.element_vectors.items()}
+        mesh = replace(mesh, points=context.frame.directions(mesh.points), element_vectors=turned)
     if left := found.file_nodes - len(mesh.points):
         context.problems.remark(
             path, f"tetrahedra of second order: their corners are used, {left} nodes on edges are not"

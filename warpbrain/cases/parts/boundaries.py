@@ -11,13 +11,11 @@ import numpy as np
 from warpbrain.cases.boundary import Boundary, Contact, Displaced, Fixed, Forced, Pressed, Sliding
 from warpbrain.cases.format.table import Reading
 from warpbrain.cases.format.tables import BOUNDARY
+from warpbrain.cases.parts.closed_surfaces import read_closed_surface
 from warpbrain.cases.parts.context import Context
 from warpbrain.cases.parts.node_sets import NodeSets
 from warpbrain.cases.parts.ramps import read_ramp
-from warpbrain.frame import Frame
 from warpbrain.mesh import TetMesh, boundary_faces, components
-from warpbrain.mesh.soundness import open_edges
-from warpbrain.recordings.surfaces import read_surface_mesh
 from warpbrain.recordings.tables import read_table
 from warpbrain.recordings.text import collected
 
@@ -98,27 +96,10 @@ def _pressed(context: Context, table: Reading, sets: NodeSets | None, common: di
 
 def _contact(context: Context, table: Reading, sets: NodeSets | None, common: dict[str, str]) -> Boundary | None:
     path = context.path(table, "surface")
-    surface = None if path is None else read_surface_mesh(path, context.problems)
-    if path is None or surface is None:
+    if path is None:
         return None
-    if surface.faces is None:
-        context.problems.add(path, "", "found points only, expected a surface of triangles")
-        return None
-    points = Frame(context.frame.unit, surface.axes or context.frame.axes).lengths(surface.points)
-    faces = surface.faces
-    edges = open_edges(faces)
-    if len(edges):
-        context.problems.add(
-            path,
-            "",
-            f"the surface is not closed: {len(edges)} edge(s) do not belong to two triangles, first that of the "
-            f"points {edges[0][0]} and {edges[0][1]}",
-            "contact needs an inside: close the surface",
-        )
-        return None
-    return Contact(
-        **common, file=table.get("surface"), points=points, faces=faces, friction=float(table.get("friction", 0.0))
-    )
+    surface = read_closed_surface(path, table.get("surface"), context.frame, context.problems)
+    return None if surface is None else Contact(**common, surface=surface, friction=float(table.get("friction", 0.0)))
 
 
 _READERS = {

@@ -9,10 +9,10 @@ import numpy as np
 from warpbrain.cases.format.table import Reading
 from warpbrain.cases.format.tables import MECHANISM
 from warpbrain.cases.parts.context import Context
+from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.ramps import read_ramp
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
-from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Says
 from warpbrain.physics.mechanisms import mechanisms
 
@@ -21,9 +21,20 @@ _CURES = {"gravity_axis": "gravity_axis = [0, -1, 0] for a patient who lies on t
 
 
 def read_mechanisms(
-    context: Context, mesh: TetMesh | None, axis: tuple[float, float, float] | None, density: float
+    context: Context, named: Named | None, axis: tuple[float, float, float] | None, density: float
 ) -> tuple[Mechanism, ...]:
-    """Mechanisms in the order of the file, as far as they are right; `axis` is where 'down' is."""
+    """Mechanisms in the order of the file, as far as they are right.
+
+    Parameters
+    ----------
+    context : Context
+    named : Named or None
+        The mesh and what can be named; gains what the mechanisms name. None if there is no mesh.
+    axis : (float, float, float) or None
+        Where 'down' is.
+    density : float
+        [kg/m3]
+    """
     found: list[Mechanism] = []
     kinds: set[str] = set()
     for table in context.lists(MECHANISM):
@@ -34,15 +45,17 @@ def read_mechanisms(
             table.problem("kind", f"a second '{table.variant}': it would act twice")
         kinds.add(table.variant)
         ramp = read_ramp(table)
-        if mesh is None or ramp is None or not all(table.has(name) for name in mechanism.required()):
+        if named is None or ramp is None or not all(table.has(name) for name in mechanism.required()):
             continue
         values = {
-            name: in_si(says, table.get(name), context.frame)
+            name: _value(context, table, named, name, says)
             for name, says in mechanism.parameters().items()
             if table.has(name)
         }
+        if any(value is None for value in values.values()):
+            continue
         try:
-            found.append(mechanism.of_case(values | {"ramp": ramp}, Facts(mesh, axis, density)))
+            found.append(mechanism.of_case(values | {"ramp": ramp}, Facts(named.mesh, axis, density)))
         except ParameterError as error:
             _note(context, table, error)
         except InputError as error:
@@ -50,15 +63,23 @@ def read_mechanisms(
     return tuple(found)
 
 
+def _value(context: Context, table: Reading, named: Named, name: str, says: Says) -> Any:
+    """A value as a mechanism takes it; None, and a problem noted, if a file that it names is wrong."""
+    value = table.get(name)
+    if isinstance(value, str):
+        return named.look_up(says.kind, value, lambda: context.path(table, name))
+    return in_si(says, value, context.frame)
+
+
 def in_si(says: Says, value: Any, frame: Frame) -> Any:
-    """A value of a file in SI units and RAS axes."""
+    """A number or numbers of a file in SI units and RAS axes."""
     if says.kind == "position":
         return tuple(frame.lengths(value).tolist())
     if says.kind == "vector":
         return tuple((says.si * frame.directions(value)).tolist())
     if says.kind == "numbers":
         return tuple((says.si * np.asarray(value, dtype=float)).tolist())
-    return value if isinstance(value, str) else says.si * float(value)
+    return says.si * float(value)
 
 
 def in_file(says: Says, value: Any, frame: Frame) -> Any:

@@ -17,7 +17,7 @@ there those of the last augmentation, or of the last time step: so the friction 
 `f A p (sqrt(s^2 + d^2) - d)`, with `d` = 0.1 mm, over which it builds up.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar
 
@@ -29,6 +29,7 @@ from warpbrain.kernels.distance_field import smooth_distance
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, boundary_faces, face_vectors, node_areas
+from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
@@ -55,8 +56,8 @@ class Contact(Mechanism):
         `k`, relative to the stiffness of a layer of surface elements.
     friction : float
         Coefficient.
-    points, faces : arrays, optional
-        A closed surface [m], oriented outwards, which the nodes stay inside of; the body's own if absent.
+    surface : ClosedSurface, optional
+        Which the nodes stay inside of; the body's own if absent.
     """
 
     nodes: str = parameter("Node set that touches the skull.", kind="node set")
@@ -72,8 +73,12 @@ class Contact(Mechanism):
     penalty: float = parameter(
         "Stiffness of the contact, relative to that of a layer of elements.", default=50.0, above=0.0
     )
-    points: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
-    faces: NDArray[np.int32] | None = field(default=None, repr=False, compare=False)
+    surface: ClosedSurface | None = parameter(  # noqa: RUF009  (a field, as the others)
+        "Closed surface of triangles that the nodes stay inside of: a .stl, .ply, .obj, .vtp or .vtu.",
+        kind="surface",
+        default=None,
+        absent="the body's own surface as it was imaged",
+    )
     kind: ClassVar[str] = "contact"
     sentence: ClassVar[str] = "The brain's surface is not stuck to the skull: it slides along it, or lifts off."
     confused_with: ClassVar[tuple[str, ...]] = ("traction", "gravity")
@@ -86,8 +91,8 @@ class Contact(Mechanism):
 
     def skull(self, mesh: TetMesh) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Points [m] and outward triangles of the surface it touches."""
-        if self.points is not None and self.faces is not None:
-            return self.points, outward(self.points, self.faces)
+        if self.surface is not None:
+            return self.surface.points, self.surface.outward
         own = boundary_faces(mesh.tetrahedra)
         own = own[mesh.node_sets[self.nodes][own].all(axis=1)]
         if not len(own):
@@ -103,12 +108,6 @@ class Contact(Mechanism):
     def bind(self, body: Body) -> "ContactTerm":
         """See `warpbrain.physics.term.Following`."""
         return ContactTerm(body, self)
-
-
-def outward(points: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Triangles of a closed surface, all turned if they enclose a negative volume."""
-    a, b, c = (points[faces[:, i]] - points.mean(axis=0) for i in range(3))
-    return faces if np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0 else faces[:, ::-1]
 
 
 class ContactTerm(Term):
@@ -133,7 +132,7 @@ class ContactTerm(Term):
         self._points = self.array(body.mesh.points, precision.vec3)
         count = len(members)
         self._start = wp.zeros(count, dtype=precision.scalar, device=device)
-        if contact.points is None:
+        if contact.surface is None:
             reached = self.array(body.mesh.points[members], precision.vec3)
             self._field.at(reached, self._start, wp.zeros_like(reached))
         self._found = wp.zeros(count, dtype=precision.scalar, device=device)

@@ -13,9 +13,11 @@ import numpy as np
 import warp as wp
 
 from warpbrain.errors import InputError
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.directions import element_directions, unit_vector
 from warpbrain.physics.expectation import LogNormal, Uniform
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
-from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
 
@@ -85,12 +87,14 @@ _CODE = ExtraEnergy("fibres", _energy, _stress, _moduli)
 
 @dataclass(frozen=True, kw_only=True)
 class Fibres(Mechanism):
-    """Fibres of one direction in all tissue or in an element set.
+    """Fibres in all tissue or in an element set.
 
     Parameters
     ----------
-    direction : (float, float, float)
+    direction : (float, float, float), optional
         Of any length but zero.
+    field : str
+        Vectors of the mesh's elements, in the place of one direction.
     stiffness : float
         `k1` [Pa].
     exponent : float
@@ -101,7 +105,15 @@ class Fibres(Mechanism):
         Element set; empty: everywhere.
     """
 
-    direction: tuple[float, float, float] = parameter("Direction of the fibres.", kind="vector")
+    direction: tuple[float, float, float] | None = parameter(
+        "Direction of the fibres, if it is the same everywhere.", kind="vector", default=None
+    )
+    field: str = parameter(
+        "Direction of the fibres in each element: an array of the mesh, or a .csv, .npy or mesh file of one for each.",
+        kind="directions",
+        default="",
+        typical="principal direction of diffusion tensor imaging",
+    )
     stiffness: float = parameter(
         "k1, of the fibres together.",
         unit="Pa",
@@ -128,15 +140,19 @@ class Fibres(Mechanism):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not any(self.direction) or not np.all(np.isfinite(self.direction)):
-            raise ParameterError("direction", f"found {list(self.direction)}, expected 3 numbers that are not all zero")
+        if self.direction is not None:
+            unit_vector("direction", self.direction)
         for name in ("stiffness", "exponent"):
             if not getattr(self, name) > 0.0:
                 raise InputError(f"fibres: {name} = {getattr(self, name)}: expected a positive number")
 
+    def check(self, mesh: TetMesh) -> None:
+        super().check(mesh)
+        element_directions(mesh, elements_of(mesh, self.elements), self.direction, self.field)
+
     def bind(self, body: Body) -> ExtraEnergyTerm:
         """See `warpbrain.physics.term.Following`."""
         elements = elements_of(body.mesh, self.elements)
-        a = np.asarray(self.direction) / np.linalg.norm(self.direction)
-        row = [self.stiffness, self.exponent, self.dispersion, *a]
-        return ExtraEnergyTerm(body, _CODE, elements, np.tile(row, (len(elements), 1)), self.factor)
+        directions = element_directions(body.mesh, elements, self.direction, self.field)
+        row = np.tile([self.stiffness, self.exponent, self.dispersion], (len(elements), 1))
+        return ExtraEnergyTerm(body, _CODE, elements, np.hstack([row, directions]), self.factor)

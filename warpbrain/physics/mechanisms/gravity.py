@@ -6,7 +6,9 @@ then (diagnosis design, mechanism M1):
     f_a = int N_a [ rho_csf g H(z(X) - level) d + (rho - rho_csf) g (d - d_imaged) ] dV
 
 with `d` the direction of gravity, `z` the height against it above the lowest point of the undeformed mesh, and `H` a
-step smoothed over 3 mm. The second term is there only if the head was turned since imaging.
+step smoothed over 3 mm. The second term is there only if the head was turned since imaging: `direction` is where 'down'
+is in the pose of the surgery, in the axes of the image, `imaged_direction` where it was while imaging, and either is
+the case's `gravity_axis` if it is not said.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.directions import unit_vector
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, parameter
@@ -51,7 +54,16 @@ class Gravity(Load, Mechanism):
         Where 'down' was while the reference was imaged; None: the same as `direction`.
     """
 
-    direction: tuple[float, float, float]
+    direction: tuple[float, float, float] = parameter(
+        "Where 'down' is while it acts.",
+        kind="vector",
+        absent="[case] gravity_axis",
+        typical="the head is turned by up to 90 degrees for surgery; prone to supine moves the brain by 0.5 to 0.8 mm",
+        source="Zappala et al. 2021 (diagnosis design, M1)",
+    )
+    imaged_direction: tuple[float, float, float] | None = parameter(
+        "Where 'down' was while the anatomy was imaged.", kind="vector", default=None, absent="[case] gravity_axis"
+    )
     density: float
     csf_level: float | None = parameter(
         "Height of the fluid's surface against gravity, above the lowest point of the anatomy.",
@@ -64,56 +76,59 @@ class Gravity(Load, Mechanism):
         source="Miga et al. 1999; Davson and Segal 1996 (density of the fluid)",
     )
     lowest: float | None = None
-    imaged_direction: tuple[float, float, float] | None = None
     kind: ClassVar[str] = "gravity"
     confused_with: ClassVar[tuple[str, ...]] = ("pressure", "swelling")
     sentence: ClassVar[str] = "Cerebrospinal fluid drained, and the brain sinks under the weight it no longer carries."
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        unit_vector("gravity_axis", self.direction)
+        unit_vector("direction", self.direction)
         if self.imaged_direction is not None:
-            unit_vector("imaged gravity axis", self.imaged_direction)
+            unit_vector("imaged_direction", self.imaged_direction)
         if self.csf_level is not None and not np.isfinite(self.csf_level):
             raise InputError(f"gravity: csf_level = {self.csf_level}: expected a finite height")
 
     @classmethod
     def of_case(cls, values: Mapping[str, Any], facts: Facts) -> Gravity:
-        if facts.gravity_axis is None:
+        axis = facts.gravity_axis or values.get("direction")
+        if axis is None:
             raise ParameterError("gravity_axis", "missing, but [[mechanism]] gravity needs to know where 'down' is")
+        known: dict[str, Any] = {"direction": axis, "imaged_direction": axis, **values}
         # counted from the whole anatomy: a resection must not move the datum
-        lowest = float((-facts.mesh.points @ unit_vector("gravity_axis", facts.gravity_axis)).min())
-        return cls(direction=facts.gravity_axis, density=facts.density, lowest=lowest, **values)
+        lowest = float((-facts.mesh.points @ unit_vector("direction", known["direction"])).min())
+        return cls(density=facts.density, lowest=lowest, **known)
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
         if self.csf_level is None:
             return ""
         axis = ", ".join(f"{v:g}" for v in self.direction)
-        return f" Its level: {1000.0 * self.csf_level:g} mm above the lowest point; gravity along ({axis}) in RAS."
+        text = f" Its level: {1000.0 * self.csf_level:g} mm above the lowest point; gravity along ({axis}) in RAS"
+        turned = self.degrees_turned
+        return f"{text}, {turned:.1f} degrees from where it was while imaged." if turned >= 0.05 else f"{text}."
+
+    @property
+    def degrees_turned(self) -> float:
+        """Angle between gravity while it acts and while the reference was imaged."""
+        if self.imaged_direction is None:
+            return 0.0
+        down = unit_vector("direction", self.direction)
+        imaged = unit_vector("imaged_direction", self.imaged_direction)
+        return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(down, imaged)), down @ imaged)))
 
     def height(self, mesh: TetMesh) -> NDArray[np.float64]:
         """Height of each node [m] above the point that levels are counted from, against gravity, shape (n,)."""
-        z = -mesh.points @ unit_vector("gravity_axis", self.direction)
+        z = -mesh.points @ unit_vector("direction", self.direction)
         return z - (z.min() if self.lowest is None else self.lowest)
 
     def nodal_forces(self, mesh: TetMesh) -> NDArray[np.float64]:
-        down = unit_vector("gravity_axis", self.direction)
+        down = unit_vector("direction", self.direction)
         if self.csf_level is None:
             return self.density * STANDARD_GRAVITY * mesh.node_volumes[:, None] * down
         # nodal quadrature: exact for a constant density, and without an element that is half in the fluid
         drained = 0.5 * (1.0 + np.tanh(2.0 * (self.height(mesh) - self.csf_level) / SURFACE_WIDTH))
         force = CSF_DENSITY * STANDARD_GRAVITY * drained[:, None] * down
         if self.imaged_direction is not None:
-            turned = down - unit_vector("imaged gravity axis", self.imaged_direction)
+            turned = down - unit_vector("imaged_direction", self.imaged_direction)
             force = force + (self.density - CSF_DENSITY) * STANDARD_GRAVITY * turned
         return mesh.node_volumes[:, None] * force
-
-
-def unit_vector(name: str, direction: tuple[float, float, float]) -> NDArray[np.float64]:
-    """`direction` at length one; `InputError` if it has none."""
-    vector = np.asarray(direction, dtype=float)
-    length = float(np.linalg.norm(vector)) if vector.shape == (3,) else 0.0
-    if not (np.isfinite(length) and length > 0.0):
-        raise InputError(f"{name} = {list(np.ravel(vector))}: expected three numbers that are not all zero")
-    return vector / length

@@ -13,9 +13,11 @@ from typing import Any, ClassVar
 import numpy as np
 import warp as wp
 
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.directions import element_directions, unit_vector
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
-from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
 
@@ -48,14 +50,16 @@ _CODE = ExtraEnergy("residual_stress", _energy, _stress, _moduli)
 
 @dataclass(frozen=True, kw_only=True)
 class ResidualStress(Mechanism):
-    """A tension along one direction in all tissue or in an element set.
+    """A tension along a direction in all tissue or in an element set.
 
     Parameters
     ----------
     tension : float
         `sigma` [Pa]; negative is compression.
-    direction : (float, float, float)
+    direction : (float, float, float), optional
         Of any length but zero.
+    field : str
+        Vectors of the mesh's elements, in the place of one direction.
     elements : str
         Element set; empty: everywhere.
     """
@@ -67,7 +71,15 @@ class ResidualStress(Mechanism):
         typical="100 to 1000 Pa along white-matter tracts of mice",
         source="Xu et al. 2009 (diagnosis design, M13)",
     )
-    direction: tuple[float, float, float] = parameter("Direction of the tension.", kind="vector")
+    direction: tuple[float, float, float] | None = parameter(
+        "Direction of the tension, if it is the same everywhere.", kind="vector", default=None
+    )
+    field: str = parameter(
+        "Direction of the tension in each element: an array of the mesh, or a .csv, .npy or mesh file of one for each.",
+        kind="directions",
+        default="",
+        typical="principal direction of diffusion tensor imaging",
+    )
     elements: str = parameter("Element set that is under it.", default="", kind="element set")
     kind: ClassVar[str] = "residual-stress"
     of_specimens: ClassVar[bool] = True
@@ -77,11 +89,16 @@ class ResidualStress(Mechanism):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not any(self.direction) or not np.all(np.isfinite(self.direction)):
-            raise ParameterError("direction", f"found {list(self.direction)}, expected 3 numbers that are not all zero")
+        if self.direction is not None:
+            unit_vector("direction", self.direction)
+
+    def check(self, mesh: TetMesh) -> None:
+        super().check(mesh)
+        element_directions(mesh, elements_of(mesh, self.elements), self.direction, self.field)
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
         """See `warpbrain.physics.term.Following`."""
         elements = elements_of(body.mesh, self.elements)
-        row = [self.tension, *(np.asarray(self.direction) / np.linalg.norm(self.direction))]
-        return ExtraEnergyTerm(body, _CODE, elements, np.tile(row, (len(elements), 1)), self.factor)
+        directions = element_directions(body.mesh, elements, self.direction, self.field)
+        row = np.full((len(elements), 1), self.tension)
+        return ExtraEnergyTerm(body, _CODE, elements, np.hstack([row, directions]), self.factor)
