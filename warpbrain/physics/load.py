@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from warpbrain.physics.ramp import Ramped
 @dataclass(frozen=True, kw_only=True)
 class Load(Ramped, abc.ABC):
     """A dead load: forces that do not follow the deformation."""
+
+    #: Whether it acts on volume, so that the force on a node goes with the volume of tissue around it.
+    by_volume: ClassVar[bool] = False
 
     @abc.abstractmethod
     def nodal_forces(self, mesh: TetMesh) -> NDArray[np.float64]:

@@ -261,6 +261,9 @@ class Weakening(Protocol):
 class Emptying(Protocol):
     """A mechanism that takes tissue away little by little, and its weight and mass with it."""
 
+    def factor(self, time: float = math.inf) -> float:
+        """Its scale at a time [s]; by default long after its ramp."""
+
     def remaining_part(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
         """Part (m,) of each element that is left, where the mechanism acts with a scale from 0 to 1."""
 

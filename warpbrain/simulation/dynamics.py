@@ -114,9 +114,10 @@ class Simulator:
     def apply_loads(self) -> None:
         """Set the external forces to the model's loads at the end of the coming step."""
         self.system.set_load(time=self.time + self._h)
-        factors = tuple(load.factor(self.time + self._h) for load in self.system.model.loads)
+        model = self.system.model
+        factors = tuple(acting.factor(self.time + self._h) for acting in (*model.loads, *model.emptying))
         if factors != self._external_factor:
-            self.system.external.assign(self.system.model.external_forces(self.time + self._h))
+            self.system.external.assign(model.external_forces(self.time + self._h))
             self._external_factor = factors
 
     def prescribe(self, displacement: NDArray[np.float64]) -> None:

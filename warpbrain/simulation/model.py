@@ -14,7 +14,7 @@ from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import Law
 from warpbrain.physics.load import Load
-from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanism import Emptying, Mechanism
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -160,8 +160,20 @@ class Model:
 
     @property
     def node_masses(self) -> Floats:
-        """Lumped mass of each node [kg], shape (n,)."""
+        """Lumped mass of each node [kg], shape (n,), before any tissue is taken out little by little."""
         return self.density * self.mesh.node_volumes
+
+    @cached_property
+    def emptying(self) -> list[Emptying]:
+        """The mechanisms that take tissue out little by little."""
+        return [mechanism for mechanism in self.mechanisms if isinstance(mechanism, Emptying)]
+
+    def remaining_share(self, scales: Sequence[float]) -> Floats:
+        """Share (n,) of the volume around each node that is left, with a scale from 0 to 1 for each of `emptying`."""
+        part = np.ones(len(self.mesh.tetrahedra))
+        for mechanism, scale in zip(self.emptying, scales, strict=True):
+            part *= mechanism.remaining_part(self.mesh, scale)
+        return self.mesh.lumped(part * self.mesh.volumes) / self.mesh.node_volumes
 
     @property
     def mass(self) -> float:
@@ -174,8 +186,12 @@ class Model:
         return [load.nodal_forces(self.mesh) for load in self.loads]
 
     def external_forces(self, time: float = math.inf) -> Floats:
-        """Sum of the loads on the nodes [N] at a time [s], shape (n, 3); by default long after every ramp."""
+        """Sum of the loads on the nodes [N] at a time [s], shape (n, 3); by default long after every ramp.
+
+        Tissue that has been taken out by then weighs nothing.
+        """
         total = np.zeros(self.mesh.points.shape)
+        left = self.remaining_share([mechanism.factor(time) for mechanism in self.emptying])[:, None]
         for load, forces in zip(self.loads, self._unit_forces, strict=True):
-            total += load.factor(time) * forces
+            total += load.factor(time) * (left * forces if load.by_volume else forces)
         return total

@@ -96,7 +96,7 @@ class System:
     free : wp.array of vec3, shape (n,)
         1 for free components, 0 for constrained ones.
     mass : wp.array, shape (n,)
-        Lumped masses [kg].
+        Lumped masses [kg] of the tissue that is there.
     terms : list of Term
         What else acts with forces that follow the deformation.
     seconds : float
@@ -116,7 +116,7 @@ class System:
         self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
         self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
         # of what alters elements, as they are now; None: not known yet
-        alters = self._growing or self._weakening or self._averages
+        alters = self._growing or self._weakening or model.emptying or self._averages
         self._scales: tuple[float, ...] | None = None if alters else ()
         self._weight = np.ones(self.elements)
         self._growth_stretch: Floats | float = 1.0
@@ -401,20 +401,23 @@ class System:
         """Let terms act with a share of what they do at a time [s]; by default in full, long after every ramp."""
         for term in self.terms:
             term.set_scale(share * term.factor(time))
-        altering = (*self._growing, *self._weakening)
-        scales = tuple(share * mechanism.factor(time) for mechanism in altering)
+        growing, weakening, emptying = self._growing, self._weakening, self.model.emptying
+        scales = tuple(share * mechanism.factor(time) for mechanism in (*growing, *weakening, *emptying))
         if scales == self._scales:
             return
         self._scales = scales
         mesh = self.model.mesh
         self._weight = np.ones(self.elements)
-        for weakening, scale in zip(self._weakening, scales[len(self._growing) :], strict=True):
-            self._weight *= weakening.stiffness_factor(mesh, scale)
+        for softer, scale in zip(weakening, scales[len(growing) :], strict=False):
+            self._weight *= softer.stiffness_factor(mesh, scale)
+        if emptying:
+            left = self.model.remaining_share(scales[len(growing) + len(weakening) :])
+            self.mass.assign(self.model.node_masses * left)
         # a kernel multiplies all that an element does by its volume
         self.volume.assign((PART if self._averages else 1.0) * self._weight * mesh.volumes)
         change = np.ones(self.elements)
-        for growing, scale in zip(self._growing, scales, strict=False):
-            change *= 1.0 + growing.growth(mesh, scale)
+        for larger, scale in zip(growing, scales, strict=False):
+            change *= 1.0 + larger.growth(mesh, scale)
         self._growth_stretch = np.cbrt(change)
         self.set_materials(self.model.materials)
 

@@ -1,7 +1,7 @@
 """A cavity that opens: tissue is taken out little by little, and fluid presses on the walls.
 
-The elements of the set stay, with their moduli multiplied by `1 - s (1 - r)`, `s` from 0 to 1 over the load and `r`
-what is left of them. No element turns inside out, so walls that meet lean on each other through what is left between
+The elements of the set stay, with their moduli, weight and mass multiplied by `1 - s (1 - r)`, `s` from 0 to 1 over the
+load and `r` what is left of them. What is taken out has the velocity that it had, so it does not push what stays. No element turns inside out, so walls that meet lean on each other through what is left between
 them: the contact through a third medium of Wriggers, Schroeder and Schwarz (2013). A fluid at the pressure `p` is the
 energy
 
@@ -59,7 +59,7 @@ class Cavity(Mechanism):
     pressure : float
         Of the fluid in the cavity [Pa], relative to outside.
     left : float
-        Part of the stiffness that is left in the end.
+        Part of stiffness, weight and mass that is left in the end.
     """
 
     elements: str = parameter("Element set that is taken out.", default="resection", kind="element set")
@@ -72,7 +72,7 @@ class Cavity(Mechanism):
         source="diagnosis design, M6",
     )
     left: float = parameter(
-        "Part of its stiffness that is left, through which walls that meet lean on each other.",
+        "Part of its stiffness and weight that is left, through which walls that meet lean on each other.",
         default=1e-4,
         above=0.0,
         below=1.0,
@@ -83,6 +83,10 @@ class Cavity(Mechanism):
 
     def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
         """See `warpbrain.physics.mechanism.Weakening`."""
+        return self.remaining_part(mesh, scale)
+
+    def remaining_part(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+        """See `warpbrain.physics.mechanism.Emptying`."""
         return np.where(mesh.element_sets[self.elements], 1.0 - scale * (1.0 - self.left), 1.0)
 
     def bind(self, body: Body) -> ExtraEnergyTerm:

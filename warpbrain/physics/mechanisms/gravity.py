@@ -76,6 +76,7 @@ class Gravity(Load, Mechanism):
         source="Miga et al. 1999; Davson and Segal 1996 (density of the fluid)",
     )
     lowest: float | None = None
+    by_volume: ClassVar[bool] = True
     kind: ClassVar[str] = "gravity"
     confused_with: ClassVar[tuple[str, ...]] = ("pressure", "swelling")
     sentence: ClassVar[str] = "Cerebrospinal fluid drained, and the brain sinks under the weight it no longer carries."
