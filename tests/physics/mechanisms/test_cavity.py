@@ -27,7 +27,7 @@ SOFT = Material(NeoHookean(1000.0), 0.4)
 
 def column(**cavity) -> Model:
     taken = Cavity(elements="upper", **cavity)
-    options = {"constrained": FOOT, "density": DENSITY, "damping": Damping(0.02, 60.0)}
+    options = {"constrained": FOOT, "density": DENSITY, "damping": Damping(0.02, 0.0)}
     return model_of(MESH, SOFT, loads=(WEIGHT,), mechanisms=(taken,), **options)
 
 
@@ -87,7 +87,10 @@ def test_a_cavity_that_opens_and_closes_in_motion_leaves_no_trace(device):
     simulator.reset()
     simulator.restore(expected, np.zeros_like(expected), 0.0)
     farthest = 0.0
-    for _ in range(400):
+    for step in range(300):
+        if step == 60:
+            # all is open and closed again: what is left comes to rest in long steps
+            simulator.set_time_step(0.05)
         simulator.step()
         farthest = max(farthest, float(np.abs(system.u.numpy() - expected).max()))
     assert farthest > 0.2 * np.abs(expected).max()

@@ -120,11 +120,14 @@ class ContactTerm(Term):
         precision, device = body.precision, body.device
         points, faces = contact.skull(body.mesh)
         own = boundary_faces(body.mesh.tetrahedra)
-        touching = own[np.isin(own, members).any(axis=1)]
+        shared = np.isin(own, members)
+        touching = own[shared.any(axis=1)]
         # what the body's own triangles cannot follow need not be resolved
         spacing = min(_edge(points, faces), _edge(body.mesh.points, touching))
         self._field = DistanceField(points, faces, spacing, body.mesh.points[members], device, precision)
-        area = node_areas(body.mesh.points, boundary_faces(body.mesh.tetrahedra))[members]
+        # a node at the rim of the set touches with what is in the set; one without a face there with all it has
+        area = node_areas(body.mesh.points, own[shared.all(axis=1)])[members]
+        area = np.where(area > 0.0, area, node_areas(body.mesh.points, own)[members])
         modulus = body.shear_moduli.max() + body.volumetric_moduli.max()
         self.stiffness = contact.penalty * modulus / float(np.sqrt(np.median(area)))
         self._area = self.array(area, precision.scalar)
