@@ -1,4 +1,4 @@
-"""Meshes that tests make: a tetrahedron, cubes, and bodies swept from a triangulation."""
+"""Meshes that tests make: a tetrahedron, cubes, bodies swept from a triangulation, and closed surfaces."""
 
 from collections.abc import Callable
 from itertools import permutations
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.closed_surface import ClosedSurface
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -115,3 +116,27 @@ def swept(
     n = len(xy)
     prism = np.concatenate([np.stack(t, 1) for t in ((a, b, c, c + n), (a, b, b + n, c + n), (a, a + n, b + n, c + n))])
     return oriented(points, np.concatenate([prism + n * k for k in range(layers)]), tissue)
+
+
+def room(size: float) -> ClosedSurface:
+    """A box whose floor is at z = 0."""
+    corners = np.array([[x, y, z] for x in (-size, size) for y in (-size, size) for z in (0.0, size)])
+    quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    return ClosedSurface("room", corners, np.array([q[:3] for q in quads] + [[q[0], q[2], q[3]] for q in quads]))
+
+
+def sphere(radius: float, cuts: int) -> ClosedSurface:
+    """An octahedron cut `cuts` times, its points on a sphere."""
+    points = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = np.array([[a, b, c] for a in (0, 3) for b in (1, 4) for c in (2, 5)])
+    turned = np.linalg.det(points[faces]) < 0.0
+    faces[turned] = faces[turned][:, ::-1]
+    for _ in range(cuts):
+        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+        edges, number = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
+        ab, bc, ca = (len(points) + number.reshape(-1, 3)).T
+        a, b, c = faces.T
+        points = np.concatenate([points, points[edges].mean(axis=1)])
+        points /= np.linalg.norm(points, axis=1, keepdims=True)
+        faces = np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    return ClosedSurface("sphere", radius * points, faces)

@@ -33,6 +33,9 @@ class DistanceField:
         Of the grid [m]: what is smaller is smoothed.
     region : (r, 3) array
         Points [m] that the grid must hold, beside those of the surface.
+    in_place : bool
+        Whether the surface is to stay where it is. Smoothing alone, which is smoother, shifts it by `h^2/6` times the
+        sum of its curvatures.
     device : Any
     precision : Precision
 
@@ -52,6 +55,7 @@ class DistanceField:
         faces: NDArray[np.integer],
         spacing: float,
         region: Floats,
+        in_place: bool,
         device: Any,
         precision: Precision,
     ) -> None:
@@ -85,6 +89,17 @@ class DistanceField:
             self.coefficients,
         ]
         wp.launch(self._fill, dim=shape, inputs=inputs, device=device)
+        if in_place:
+            self._shift_back()
+
+    def _shift_back(self) -> None:
+        """Take from the coefficients what smoothing adds, to second order (quasi-interpolation)."""
+        d = self.coefficients.numpy()
+        curved = np.zeros_like(d)
+        for axis in range(3):
+            inner = tuple(slice(1, -1) if a == axis else slice(None) for a in range(3))
+            curved[inner] += np.diff(d, 2, axis=axis)
+        self.coefficients.assign(d - curved / 6.0)
 
     def at(self, points: wp.array, distances: wp.array, directions: wp.array) -> None:
         """Write distances [m] and directions away from the surface's inside at points [m]."""

@@ -5,14 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import energy_at, forces_at, model_of
-from shapes import cube, distorted
+from shapes import cube, distorted, sphere
 
+from warpbrain.cases.assuming import assume
+from warpbrain.cases.shipped import find_case
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanisms.contact import Contact
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.model import Damping, Material, Model
+from warpbrain.simulation.of_case import model_of as model_of_case
+from warpbrain.simulation.relaxation import relax_to_rest
 from warpbrain.simulation.system import System
 
 SOFT = Material(NeoHookean(800.0), 0.4)
@@ -121,13 +126,15 @@ def test_friction_holds_back_what_slides():
     assert 0.1 < abs(reactions[1][0] / reactions[1][2]) < 0.3 + 1e-3
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.4])
 @pytest.mark.parametrize(
     ("state", "augmented"), [("fixed", False), ("sliding", False), ("lifting", False), ("lifting", True)]
 )
-def test_forces_are_the_slope_of_the_energy_and_the_tangent_that_of_the_forces(state, augmented, device):
+def test_forces_are_the_slope_of_the_energy_and_the_tangent_that_of_the_forces(state, augmented, friction, device):
     mesh = distorted(cube(3), 0.05)
     mesh = replace(mesh, node_sets={"all": np.ones(len(mesh.points), dtype=bool)})
-    system = System(model_of(mesh, SOFT, mechanisms=(Contact(nodes="all", state=state),)), device)
+    contact = Contact(nodes="all", state=state, friction=friction)
+    system = System(model_of(mesh, SOFT, mechanisms=(contact,)), device)
     random = np.random.default_rng(4)
     u = 0.02 * random.uniform(-1.0, 1.0, mesh.points.shape)
     if augmented:
@@ -142,3 +149,49 @@ def test_forces_are_the_slope_of_the_energy_and_the_tangent_that_of_the_forces(s
     system.u.assign(u)
     system.evaluate_tangents()
     assert np.abs(system.stiffness_times(d) - change).max() <= 1e-6 * np.abs(change).max()
+
+
+@pytest.mark.parametrize("name", ["0529", "phantom"])
+@pytest.mark.parametrize(("state", "iterations"), [("sliding", 20), ("lifting", 40)])
+def test_a_brain_slides_along_its_own_curved_surface(name, state, iterations, device):
+    """Under its weight, and from rest: Newton's method needs as few iterations as where nothing touches."""
+    case = replace(find_case(name), gravity_axis=(0.0, -1.0, 0.0))
+    case = replace(case, boundaries=tuple(b for b in case.boundaries if b.kind == "fixed"), mechanisms=())
+    case = assume(assume(case, "gravity:level=40"), f"contact:nodes=surface,state={state}")
+    system = System(model_of_case(case)[0], device)
+    state_found = solve_equilibrium(system)
+    assert len(state_found.history) <= iterations
+    (term,) = system.terms
+    gaps = term.gaps(system.u)
+    # held in the wall, or off it
+    assert gaps.max() < 2e-5 and (gaps.min() > -2e-5 if state == "sliding" else gaps.min() < -1e-3)
+    tangential = np.linalg.norm(state_found.u[term.stencils[:, 0]], axis=1)
+    assert tangential.max() > 2e-3
+
+
+def test_it_slides_in_motion_too(device):
+    case = assume(assume(find_case("0529"), "gravity:level=40"), "contact:nodes=surface,state=sliding,penalty=500")
+    # stiff enough that what the penalty gives way is small: motion knows no augmentation
+    system = System(model_of_case(case)[0], device)
+    expected = solve_equilibrium(system).u
+    relax_to_rest(system)
+    assert np.abs(system.u.numpy() - expected).max() < 0.03 * np.abs(expected).max()
+
+
+def test_a_body_within_a_given_sphere_moves_up_to_it(device):
+    """A cube that is pushed towards a sphere around it, 1 mm away from its edges."""
+    mesh = cube(2)
+    mesh = replace(mesh, points=0.02 * (mesh.points - 0.5), node_sets={"all": np.ones(len(mesh.points), dtype=bool)})
+    skull = sphere(0.011 * np.sqrt(3.0), 4)
+    push = NodalForce(nodes="all", total=(0.0, 0.0, -0.05))
+    contact = Contact(nodes="all", state="lifting", surface=skull)
+    simulator = Simulator(
+        System(model_of(mesh, SOFT, loads=(push,), mechanisms=(contact,), damping=Damping(0.01, 30.0)), device),
+        time_step=2e-3,
+    )
+    for _ in range(300):
+        simulator.step()
+    x = mesh.points + simulator.system.u.numpy()
+    reached = np.linalg.norm(x, axis=1).max()
+    assert reached == pytest.approx(0.011 * np.sqrt(3.0), abs=1.5e-4)
+    assert x[:, 2].mean() < -1e-3

@@ -1,9 +1,9 @@
 """A cavity that opens: tissue is taken out little by little, and fluid presses on the walls.
 
 The elements of the set stay, with their moduli, weight and mass multiplied by `1 - s (1 - r)`, `s` from 0 to 1 over the
-load and `r` what is left of them. What is taken out has the velocity that it had, so it does not push what stays. No element turns inside out, so walls that meet lean on each other through what is left between
-them: the contact through a third medium of Wriggers, Schroeder and Schwarz (2013). A fluid at the pressure `p` is the
-energy
+load and `r` what is left of them. What is taken out has the velocity that it had, so it does not push what stays. No
+element turns inside out, so walls that meet lean on each other through what is left between them: the contact through
+a third medium of Wriggers, Schroeder and Schwarz (2013). A fluid at the pressure `p` is the energy
 
     -p J,   P = -p cof F
 

@@ -124,7 +124,9 @@ class ContactTerm(Term):
         touching = own[shared.any(axis=1)]
         # what the body's own triangles cannot follow need not be resolved
         spacing = min(_edge(points, faces), _edge(body.mesh.points, touching))
-        self._field = DistanceField(points, faces, spacing, body.mesh.points[members], device, precision)
+        # of its own surface only differences count: the smoother, the better
+        given = contact.surface is not None
+        self._field = DistanceField(points, faces, spacing, body.mesh.points[members], given, device, precision)
         # a node at the rim of the set touches with what is in the set; one without a face there with all it has
         area = node_areas(body.mesh.points, own[shared.all(axis=1)])[members]
         area = np.where(area > 0.0, area, node_areas(body.mesh.points, own)[members])
@@ -135,7 +137,7 @@ class ContactTerm(Term):
         self._points = self.array(body.mesh.points, precision.vec3)
         count = len(members)
         self._start = wp.zeros(count, dtype=precision.scalar, device=device)
-        if contact.surface is None:
+        if not given:
             reached = self.array(body.mesh.points[members], precision.vec3)
             self._field.at(reached, self._start, wp.zeros_like(reached))
         self._found = wp.zeros(count, dtype=precision.scalar, device=device)
@@ -174,10 +176,14 @@ class ContactTerm(Term):
         self.energy(u)
         return self._gaps.numpy().astype(np.float64)
 
+    def pressures(self) -> NDArray[np.float64]:
+        """Pressure (k,) [Pa] that augmentation has found on each node."""
+        return self._found.numpy().astype(np.float64)
+
     def augment(self, u: wp.array) -> bool:
         if self.mechanism.state == "fixed":
             return False
-        gaps, found = self.gaps(u), self._found.numpy().astype(np.float64)
+        gaps, found = self.gaps(u), self.pressures()
         pressure = self.stiffness * gaps + found
         if self.mechanism.state == "lifting":
             pressure = np.maximum(pressure, 0.0)
@@ -188,7 +194,7 @@ class ContactTerm(Term):
 
     def advance(self, u: wp.array) -> None:
         if self.mechanism.friction > 0.0:
-            self._press(u, self.stiffness * self.gaps(u) + self._found.numpy())
+            self._press(u, self.stiffness * self.gaps(u) + self.pressures())
 
     def _press(self, u: wp.array, pressure: NDArray[np.float64]) -> None:
         """Take a pressure (k,) [Pa] and the directions at a displacement [m] as those of friction."""
