@@ -115,7 +115,8 @@ class Simulator:
         """Set the external forces to the model's loads at the end of the coming step."""
         self.system.set_load(time=self.time + self._h)
         model = self.system.model
-        factors = tuple(acting.factor(self.time + self._h) for acting in (*model.loads, *model.emptying))
+        factors = tuple(load.factor(self.time + self._h) for load in model.loads)
+        factors += tuple(mechanism.factor(self.time + self._h) for mechanism in model.emptying)
         if factors != self._external_factor:
             self.system.external.assign(model.external_forces(self.time + self._h))
             self._external_factor = factors

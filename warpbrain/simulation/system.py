@@ -402,7 +402,8 @@ class System:
         for term in self.terms:
             term.set_scale(share * term.factor(time))
         growing, weakening, emptying = self._growing, self._weakening, self.model.emptying
-        scales = tuple(share * mechanism.factor(time) for mechanism in (*growing, *weakening, *emptying))
+        scales = tuple(share * mechanism.factor(time) for mechanism in (*growing, *weakening))
+        scales += tuple(share * mechanism.factor(time) for mechanism in emptying)
         if scales == self._scales:
             return
         self._scales = scales
