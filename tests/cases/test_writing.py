@@ -29,7 +29,10 @@ EVERYTHING = [
         '[[boundary]]\nname = "air"\nnodes = "top"\nkind = "pressure"\nvalue = -20.0\nramp = [[0.0, 1.0]]\n'
         '[[boundary]]\nname = "wall"\nnodes = "top"\nkind = "sliding"\n'
         '[[boundary]]\nname = "skull"\nnodes = "top"\nkind = "contact"\nsurface = "skull.stl"\nfriction = 0.1\n'
-        '[[mechanism]]\nkind = "gravity"\ncsf_level = 12.0\n'
+        '[[mechanism]]\nkind = "gravity"\ncsf_level = 12.0\ndirection = [0.1, 1.0, 0.0]\n'
+        '[[mechanism]]\nkind = "contact"\nnodes = "top"\nsurface = "skull.stl"\n'
+        '[[mechanism]]\nkind = "fibres"\nfield = "fibres.csv"\nstiffness = 300.0\n'
+        '[[mechanism]]\nkind = "residual-stress"\ntension = 50.0\ndirection = [1, 0, 0]\nelements = "soft"\n'
         '[[mechanism]]\nkind = "resection"\nelements = "corner"',
     ),
 ]
@@ -49,6 +52,8 @@ def everything(folder: Path) -> Path:
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     meshio.write(folder / "skull.stl", meshio.Mesh(corners, [("triangle", faces)]), binary=True)
     raw = meshio.read(folder / "mesh.vtu")
+    rows = "".join(f"{number},1,-2\n" for number in range(len(raw.cells[0].data)))
+    (folder / "fibres.csv").write_text("x,y,z\n" + rows)
     raw.points[:, :2] *= -1.0
     loose = np.flatnonzero(raw.points[:, 2] > 0.0)
     nodes = np.arange(len(raw.points))
@@ -63,7 +68,7 @@ def everything(folder: Path) -> Path:
 
 def test_everything_comes_back(tmp_path):
     case = read_case(everything(tmp_path / "a"))
-    assert len(case.boundaries) == 7 and len(case.mechanisms) == 2 and len(case.recordings) == 3
+    assert len(case.boundaries) == 7 and len(case.mechanisms) == 5 and len(case.recordings) == 3
     again = read_case(write_case(tmp_path / "b", case).parent)
     assert_same(case, again)
     # and once more, in other units and axes
