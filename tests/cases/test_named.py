@@ -120,6 +120,10 @@ def test_a_skull_is_read_in_the_unit_of_the_case(tmp_path, monkeypatch):
     [
         ('kind = "contact"\nnodes = "top"\nsurface = "no.stl"', r"\[mechanism 1\] surface: no such file: .*no\.stl"),
         ('kind = "contact"\nnodes = "top"\nsurface = "open.stl"', r"open\.stl: the surface is not closed"),
+        (
+            'kind = "contact"\nnodes = "top"\nsurface = "metres.stl"',
+            r"surface: 'metres\.stl' is 0\.3 mm .*another unit",
+        ),
         ('kind = "fibres"\nstiffness = 3.0', r"\[mechanism 1\] direction: give either one direction or a field"),
         ('kind = "fibres"\nstiffness = 3.0\nfield = "V9"', r"field: the mesh has no array of directions 'V9' \(it has"),
         ('kind = "fibres"\nstiffness = 3.0\nfield = "no.npy"', r"\[mechanism 1\] field: no such file"),
@@ -135,6 +139,8 @@ def test_what_is_wrong_names_file_and_key(tmp_path, mechanism, expected):
     folder = with_mechanism(tmp_path, mechanism)
     surface = room(100.0)
     meshio.write(folder / "open.stl", meshio.Mesh(surface.points, [("triangle", surface.faces[:9])]), binary=True)
+    small = meshio.Mesh(1e-3 * surface.points, [("triangle", surface.faces)])
+    meshio.write(folder / "metres.stl", small, binary=True)
     np.save(folder / "short.npy", FIELD[:4])
     np.save(folder / "zero.npy", np.where(np.arange(COUNT)[:, None] == 7, 0.0, FIELD))
     (folder / "text.npy").write_text("x")
@@ -173,5 +179,5 @@ def test_a_head_that_is_turned(tmp_path):
     assert "degrees" not in said.detail() and said.direction == (0.0, 0.0, -1.0)
     (said,) = assume(free, "gravity:level=10,direction=0/0/-1,imaged_direction=0/-1/0").mechanisms
     assert "90.0 degrees" in said.detail()
-    with pytest.raises(InputError, match="direction: found .*not all zero"):
+    with pytest.raises(InputError, match=r"direction: found .*not all zero"):
         assume(free, "gravity:level=10,direction=0/0/0")

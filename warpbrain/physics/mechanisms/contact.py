@@ -88,6 +88,20 @@ class Contact(Mechanism):
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)
         self.skull(mesh)
+        if self.surface is None:
+            return
+        members = mesh.node_sets[self.nodes]
+        if not members[boundary_faces(mesh.tetrahedra)].any():
+            raise ParameterError("nodes", f"node set '{self.nodes}' holds no node of the surface")
+        size, held, body = (
+            np.linalg.norm(np.ptp(p, axis=0)) for p in (self.surface.points, mesh.points[members], mesh.points)
+        )
+        if size < 0.5 * held or size > 100.0 * body:
+            raise ParameterError(
+                "surface",
+                f"'{self.surface}' is {1e3 * size:.4g} mm across, the nodes that it holds {1e3 * held:.4g} mm and the "
+                f"body {1e3 * body:.4g} mm: is it in another unit?",
+            )
 
     def skull(self, mesh: TetMesh) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Points [m] and outward triangles of the surface it touches."""
