@@ -50,6 +50,10 @@ class Body(Protocol):
         """Gradients of the shape functions of nodes 1 to 3 as rows, (m,) mat33 [1/m]."""
 
     @property
+    def movable(self) -> NDArray[np.bool_]:
+        """Nodes (n,) of which some component is not prescribed."""
+
+    @property
     def volumetric_moduli(self) -> NDArray[np.float64]:
         """`lam` or `K` of each element (m,) [Pa]."""
 

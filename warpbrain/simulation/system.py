@@ -432,6 +432,11 @@ class System:
         return total
 
     @property
+    def movable(self) -> NDArray[np.bool_]:
+        """Nodes (n,) of which some component is not prescribed."""
+        return np.asarray(~self.model.constrained.all(axis=1))
+
+    @property
     def shear_moduli(self) -> Floats:
         """Shear modulus at rest of each element [Pa], shape (m,)."""
         return self._by_element({label: m.law.shear_modulus for label, m in self.model.materials.items()})

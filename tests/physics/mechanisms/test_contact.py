@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import energy_at, forces_at, model_of
-from shapes import cube, distorted, sphere
+from shapes import cube, distorted, room, sphere
 
 from warpbrain.cases.assuming import assume
 from warpbrain.cases.shipped import find_case
@@ -124,6 +124,19 @@ def test_friction_holds_back_what_slides():
         reactions.append(state.internal[above].sum(axis=0))
     assert abs(reactions[0][0]) < 1e-5 * abs(reactions[0][2])
     assert 0.1 < abs(reactions[1][0] / reactions[1][2]) < 0.3 + 1e-3
+
+
+def test_a_node_that_is_held_beyond_the_wall_is_left_there(device):
+    mesh = on_table(cube(2))
+    model = pressed(replace(mesh, points=mesh.points - [0.0, 0.0, 0.01]), 0.0, state="lifting", surface=room(5.0))
+    held = np.flatnonzero(mesh.node_sets["below"])[0]
+    constrained = model.constrained.copy()
+    constrained[held] = True
+    u = solve_equilibrium(System(replace(model, constrained=constrained), device)).u
+    free = mesh.node_sets["below"].copy()
+    free[held] = False
+    assert np.abs(u[held]).max() == 0.0
+    assert np.abs(u[free, 2] - 0.01).max() < 2e-5
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.4])

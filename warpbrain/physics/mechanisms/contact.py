@@ -148,6 +148,7 @@ class ContactTerm(Term):
         self.stiffness = contact.penalty * modulus / float(np.sqrt(np.median(area)))
         self._area = self.array(area, precision.scalar)
         self._nodes = self.array(members, int)
+        self._movable = body.movable[members]
         self._points = self.array(body.mesh.points, precision.vec3)
         count = len(members)
         self._start = wp.zeros(count, dtype=precision.scalar, device=device)
@@ -201,6 +202,8 @@ class ContactTerm(Term):
         pressure = self.stiffness * gaps + found
         if self.mechanism.state == "lifting":
             pressure = np.maximum(pressure, 0.0)
+        # no pressure brings a node nearer whose place is prescribed
+        pressure = np.where(self._movable, pressure, found)
         self._found.assign(pressure)
         self._press(u, pressure)
         # what is left of the distance where the surface is touched
