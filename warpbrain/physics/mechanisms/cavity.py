@@ -8,6 +8,9 @@ a third medium of Wriggers, Schroeder and Schwarz (2013). A fluid at the pressur
     -p J,   P = -p cof F
 
 of these elements: the same pressure on every wall, following it.
+
+A limit: what other mechanisms add to the law of these elements (fibres, residual stress, viscosity) is not taken out.
+Leave these elements out of its element set.
 """
 
 from dataclasses import dataclass

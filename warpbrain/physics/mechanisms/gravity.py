@@ -58,7 +58,7 @@ class Gravity(Load, Mechanism):
         "Where 'down' is while it acts.",
         kind="vector",
         absent="[case] gravity_axis",
-        typical="the head is turned by up to 90 degrees for surgery; prone to supine moves the brain by 0.5 to 0.8 mm",
+        typical="from prone to supine the brain moves by 0.5 to 0.8 mm",
         source="Zappala et al. 2021 (diagnosis design, M1)",
     )
     imaged_direction: tuple[float, float, float] | None = parameter(
