@@ -89,6 +89,8 @@ class DistanceField:
             self.coefficients,
         ]
         wp.launch(self._fill, dim=shape, inputs=inputs, device=device)
+        # the tree is needed until this is done, and no longer
+        wp.synchronize_device(device)
         if in_place:
             self._shift_back()
 
