@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warpbrain.cases.building.example_sets import RADIUS, with_example_sets
 from warpbrain.mesh import (
     TetMesh,
     boundary_faces,
@@ -45,6 +46,8 @@ def within(nodes: int) -> tuple[int, int]:
 MESHES = {
     "phantom/single-coarse": (1.6092e-3, 2677, 2757, False),
     "phantom/multi-coarse": (1.6092e-3, 4169, 4294, True),
+    "phantom/single-loaded": (1.6092e-3, 2677, 2757, False),
+    "phantom/multi-loaded": (1.6092e-3, 4169, 4294, True),
     "phantom/single-fine": (1.6092e-3, 3500, 5000, False),
     "phantom/multi-fine": (1.6092e-3, 8000, 11000, True),
     **{f"{case}/single": (volume, *within(single), False) for case, (volume, _, single, _) in PUBLISHED.items()},
@@ -276,3 +279,17 @@ def test_files_are_small_and_the_notice_is_there():
     assert size < 7e6
     notice = (DATA / "MNI-NOTICE.txt").read_text(encoding="utf-8")
     assert "McConnell Brain Imaging Centre" in notice and "Permission to use, copy, modify, and distribute" in notice
+
+
+@pytest.mark.parametrize("kind", ["single", "multi"])
+def test_the_loaded_phantom_is_the_coarse_one_with_sets_for_examples(meshes, kind):
+    loaded, wanted = meshes[f"phantom/{kind}-loaded"], with_example_sets(meshes[f"phantom/{kind}-coarse"])
+    np.testing.assert_array_equal(loaded.points, wanted.points)
+    np.testing.assert_array_equal(loaded.tetrahedra, wanted.tetrahedra)
+    np.testing.assert_array_equal(loaded.tissue, wanted.tissue)
+    for sets, others in ((loaded.node_sets, wanted.node_sets), (loaded.element_sets, wanted.element_sets)):
+        assert set(sets) == set(others)
+        for name, members in sets.items():
+            np.testing.assert_array_equal(members, others[name])
+    ball = loaded.volumes[loaded.element_sets["ball"]].sum()
+    assert ball == pytest.approx(4.0 / 3.0 * np.pi * RADIUS**3, rel=0.1)

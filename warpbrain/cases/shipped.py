@@ -18,6 +18,7 @@ SHIPPED = {
         for name in ("0529", "0614", "0660", "0685", "0535", "0555", "0603", "0684", "phantom")
     },
     "phantom-fine": {"multi": "phantom/case-fine.toml", "single": "phantom/case-single-fine.toml"},
+    "phantom-loaded": {"multi": "phantom/case-loaded.toml", "single": "phantom/case-single-loaded.toml"},
 }
 
 

@@ -6,7 +6,7 @@
 3. what it does: a mechanism is also one or several of `Load` (forces that do not follow the deformation), `Following`
    (a term with forces that do), `Weakening` (softer or stiffer elements), `Emptying` (lighter ones), `Growing` (larger
    or smaller ones), `Substituting` (another law) and `Removing` (fewer elements);
-4. what it is taken for (`confused_with`) and what must be observed to tell it apart (`needs`).
+4. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), and an `example`.
 
 Whoever lists mechanisms (reading, writing, simulation, diagnosis, docs) walks the registry,
 `warpbrain.physics.mechanisms`.
@@ -146,6 +146,8 @@ class Mechanism(Ramped, abc.ABC):
     kind: ClassVar[str]
     #: What it is, in one sentence that a surgeon understands.
     sentence: ClassVar[str]
+    #: What `--with` says of it on the case `phantom-loaded`: its picture in the docs and its cost are of this.
+    example: ClassVar[str]
     #: Kinds of mechanisms that have nearly the same effect.
     confused_with: ClassVar[tuple[str, ...]] = ()
     #: What must be observed to tell it from others, in words; empty: one deformed state is enough.

@@ -18,6 +18,7 @@ from warpbrain.cases.building.anatomy import Anatomy, make_anatomy
 from warpbrain.cases.building.cleaning import finished, first_pass, opened_out, small_pieces
 from warpbrain.cases.building.cutting import compact, cut
 from warpbrain.cases.building.errors import BuildError, require_extra
+from warpbrain.cases.building.example_sets import with_example_sets
 from warpbrain.cases.building.individual import individual_warp
 from warpbrain.cases.building.lattice import bcc_lattice
 from warpbrain.cases.building.maps import load_maps
@@ -75,6 +76,10 @@ def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], 
         write_mesh(folder / f"{wanted.file}.vtu", mesh, unit="mm")
         quality = measure(mesh)
         record["meshes"][wanted.file] = describe(mesh, quality)
+        if wanted.with_examples:
+            examined = with_example_sets(mesh)
+            write_mesh(folder / f"{wanted.with_examples}.vtu", examined, unit="mm")
+            record["meshes"][wanted.with_examples] = describe(examined, quality)
         progress(
             f"{wanted.file}: {quality.nodes} nodes, {quality.tetrahedra} tetrahedra, smallest dihedral angle "
             f"{quality.min_dihedral:.1f}, first percentile {quality.first_percentile_dihedral:.1f} degrees"

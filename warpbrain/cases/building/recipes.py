@@ -21,12 +21,15 @@ class MeshRecipe:
         Wanted number of nodes, from - to.
     finer_than : (str, float) or None
         Instead: wanted number of tetrahedra as a multiple of another mesh of the case.
+    with_examples : str
+        Name of a second file, of the same mesh with the sets that examples of mechanisms act on; empty: none.
     """
 
     file: str
     multi: bool
     nodes: tuple[int, int] | None = None
     finer_than: tuple[str, float] | None = None
+    with_examples: str = ""
 
     def size(self, tetrahedra: dict[str, int]) -> Size:
         """The wanted size, given the numbers of tetrahedra of the meshes already made."""
@@ -114,8 +117,8 @@ RECIPES: dict[str, CaseRecipe] = {
     "phantom": CaseRecipe(
         volume=1.6092e-3,
         meshes=(
-            MeshRecipe("single-coarse", multi=False, nodes=_at_least(2677)),
-            MeshRecipe("multi-coarse", multi=True, nodes=_at_least(4169)),
+            MeshRecipe("single-coarse", multi=False, nodes=_at_least(2677), with_examples="single-loaded"),
+            MeshRecipe("multi-coarse", multi=True, nodes=_at_least(4169), with_examples="multi-loaded"),
             MeshRecipe("single-fine", multi=False, finer_than=("single-coarse", 28.31 / 18.32)),
             MeshRecipe("multi-fine", multi=True, finer_than=("multi-coarse", 136.8 / 55.43)),
         ),

@@ -35,6 +35,7 @@ class Asymmetry(Mechanism):
     kind: ClassVar[str] = "asymmetry"
     of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue resists compression more than tension."
+    example: ClassVar[str] = "asymmetry:exponent=-20"
     confused_with: ClassVar[tuple[str, ...]] = ("fibres",)
     needs: ClassVar[tuple[str, ...]] = ("regions or tests both in compression and in tension",)
 

@@ -31,6 +31,7 @@ class Compressibility(Mechanism):
     kind: ClassVar[str] = "compressibility"
     of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue gives way under pressure more, or less, than was assumed."
+    example: ClassVar[str] = "compressibility:poisson=0.35"
     confused_with: ClassVar[tuple[str, ...]] = ("drainage", "swelling")
 
     def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:

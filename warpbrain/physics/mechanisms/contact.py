@@ -81,6 +81,7 @@ class Contact(Mechanism):
     )
     kind: ClassVar[str] = "contact"
     sentence: ClassVar[str] = "The brain's surface is not stuck to the skull: it slides along it, or lifts off."
+    example: ClassVar[str] = "contact:nodes=side,state=lifting"
     confused_with: ClassVar[tuple[str, ...]] = ("traction", "gravity")
     needs: ClassVar[tuple[str, ...]] = ("points near the surface",)
     several: ClassVar[bool] = True

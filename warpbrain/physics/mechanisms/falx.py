@@ -53,6 +53,7 @@ class Falx(Mechanism):
     thickness: float = parameter("Thickness.", default=1e-3, unit="mm", si=1e-3, above=0.0)
     kind: ClassVar[str] = "falx"
     sentence: ClassVar[str] = "A stiff membrane, such as the falx, holds the tissue on both sides of it."
+    example: ClassVar[str] = "falx:nodes=falx"
     confused_with: ClassVar[tuple[str, ...]] = ("inclusion", "contact")
     several: ClassVar[bool] = True
 

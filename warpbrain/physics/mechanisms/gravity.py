@@ -80,6 +80,7 @@ class Gravity(Load, Mechanism):
     kind: ClassVar[str] = "gravity"
     confused_with: ClassVar[tuple[str, ...]] = ("pressure", "swelling")
     sentence: ClassVar[str] = "Cerebrospinal fluid drained, and the brain sinks under the weight it no longer carries."
+    example: ClassVar[str] = "gravity:level=130"
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -43,6 +43,7 @@ class Inclusion(Mechanism):
     radius: float | None = parameter("Its radius.", default=None, unit="mm", si=1e-3, above=0.0)
     kind: ClassVar[str] = "inclusion"
     sentence: ClassVar[str] = "A part of the tissue is stiffer or softer than the rest."
+    example: ClassVar[str] = "inclusion:ratio=10,elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("swelling",)
     several: ClassVar[bool] = True
 

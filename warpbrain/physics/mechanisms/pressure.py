@@ -53,6 +53,7 @@ class Pressure(Mechanism):
     )
     kind: ClassVar[str] = "pressure"
     sentence: ClassVar[str] = "Fluid presses on part of the surface, more than on the rest of it."
+    example: ClassVar[str] = "pressure:nodes=ventricle,value=300"
     confused_with: ClassVar[tuple[str, ...]] = ("gravity", "swelling")
     several: ClassVar[bool] = True
 

@@ -26,6 +26,7 @@ class Resection(Mechanism):
     elements: str = parameter("Element set that was taken out.", default="resection", kind="element set")
     kind: ClassVar[str] = "resection"
     sentence: ClassVar[str] = "Tissue was taken out, and what it held moves into the cavity."
+    example: ClassVar[str] = "resection:elements=ball"
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""

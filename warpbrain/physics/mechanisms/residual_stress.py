@@ -84,6 +84,7 @@ class ResidualStress(Mechanism):
     kind: ClassVar[str] = "residual-stress"
     of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue is under tension before anything is done to it."
+    example: ClassVar[str] = "residual-stress:tension=500,direction=0/0/1,elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("swelling",)
     several: ClassVar[bool] = True
 

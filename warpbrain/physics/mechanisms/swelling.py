@@ -48,6 +48,7 @@ class Swelling(Mechanism):
     kind: ClassVar[str] = "swelling"
     of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue takes up or loses water, and swells or shrinks."
+    example: ClassVar[str] = "swelling:amount=20,elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("pressure", "gravity")
     several: ClassVar[bool] = True
 

@@ -58,6 +58,7 @@ class Traction(Load, Mechanism):
     )
     kind: ClassVar[str] = "traction"
     sentence: ClassVar[str] = "Something presses or pulls on a patch of the surface, such as a retractor."
+    example: ClassVar[str] = "traction:centre=58/-17/50,value=-500/0/-500,radius=15"
     confused_with: ClassVar[tuple[str, ...]] = ("contact", "pressure")
     several: ClassVar[bool] = True
 
