@@ -1,8 +1,101 @@
-"""Writes docs/mechanisms.md from the files of the mechanisms."""
+"""Makes the pages and pictures of the mechanisms from their files: `python docs/make_mechanisms.py [KIND ...]`.
 
+A picture is made again where its mechanism's file, its example or the phantom has changed since; a KIND is in any case.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
 from pathlib import Path
 
-from warpbrain.report.mechanism_text import page
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.assuming import assume
+from warpbrain.cases.case import Case
+from warpbrain.cases.shipped import find_case
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.report.mechanisms.cost import read_costs, sentences
+from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
+from warpbrain.report.mechanisms.index import index
+from warpbrain.report.mechanisms.page import page
+from warpbrain.report.mechanisms.picture import write_picture
+from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.equilibrium import EquilibriumSolver
+from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.system import System
+from warpbrain.terminal.progress import Progress
+from warpbrain.terminal.quiet import start_warp_quietly
+
+DOCS = Path(__file__).parent
+PAGES, FIGURES, RESULTS = DOCS / "mechanisms", DOCS / "figures", DOCS.parent / "bench" / "results"
+EFFECTS = PAGES / "effects.json"
+#: A mechanism that adds less than this in equilibrium [m] is shown in motion, after so many steps of 1 ms.
+NOTHING, STEPS = 1e-6, 50
+
+
+def main() -> None:
+    """Make pictures that are not of the present files, and all pages."""
+    start_warp_quietly()
+    PAGES.mkdir(exist_ok=True)
+    effects = read_effects(EFFECTS)
+    case, progress = find_case(BASE), Progress("pictures")
+    for number, kind in enumerate(mechanisms()):
+        known = effects.get(kind)
+        if known is None or kind in sys.argv[1:] or known != _as_it_is(kind, known):
+            progress.show(number / len(mechanisms()), kind)
+            effects[kind] = draw(case, kind)
+            write_effects(EFFECTS, effects)
+            progress.clear()
+            print(f"{kind}: {effects[kind].largest:.2f} mm", flush=True)
+    costs = read_costs(sorted(RESULTS.glob("mechanisms_*.json")))
+    for kind in mechanisms():
+        _write(PAGES / f"{kind}.md", page(kind, effects[kind], sentences(costs, kind)))
+    _write(PAGES / "index.md", index(effects, costs))
+
+
+def draw(case: Case, kind: str) -> Effect:
+    """Simulate the phantom with and without a mechanism and draw what it adds."""
+    assumed = assume(case, mechanisms()[kind].example)
+    for steps in (0, STEPS):
+        (_, plain, _), (mesh, u, nodes) = _deformed(case, steps), _deformed(assumed, steps)
+        difference = u - plain[nodes]
+        sizes = np.linalg.norm(difference, axis=1)
+        if sizes.max() > NOTHING:
+            break
+    file = _figure(kind)
+    write_picture(file, case, mesh, difference, kind)
+    worst = int(sizes.argmax())
+    x = tuple(round(1000.0 * float(x), 1) for x in mesh.points[worst])
+    largest = round(1000.0 * float(sizes[worst]), 3)
+    return Effect(largest, (x[0], x[1], x[2]), steps, made_from(kind), digest_of(file))
+
+
+def _deformed(case: Case, steps: int) -> tuple[TetMesh, NDArray[np.float64], NDArray[np.int32]]:
+    """Mesh, displacement [m] in equilibrium or after some steps, and ids of its nodes in the case's mesh."""
+    model, nodes = model_of(case)
+    if not steps:
+        return model.mesh, EquilibriumSolver(System(model, "cpu")).solve().u, nodes
+    simulator = Simulator(System(model, "cpu"))
+    for _ in range(steps):
+        simulator.step()
+        simulator.check()
+    return model.mesh, simulator.system.u.numpy().copy(), nodes
+
+
+def _as_it_is(kind: str, known: Effect) -> Effect:
+    return replace(known, made_from=made_from(kind), picture=digest_of(_figure(kind)))
+
+
+def _figure(kind: str) -> Path:
+    return FIGURES / f"mechanism-{kind}.png"
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
 
 if __name__ == "__main__":
-    (Path(__file__).parent / "mechanisms.md").write_text(page(), encoding="utf-8")
+    main()

@@ -62,7 +62,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         action="append",
         default=[],
         metavar="MECHANISM",
-        help="assume one more mechanism, such as gravity:level=60 (see docs/mechanisms.md); can be given several times",
+        help="assume one more mechanism, such as gravity:level=60 (see docs/mechanisms); can be given several times",
     )
     add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
     add(

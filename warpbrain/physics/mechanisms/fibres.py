@@ -134,7 +134,7 @@ class Fibres(Mechanism):
     kind: ClassVar[str] = "fibres"
     of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Nerve fibres make the tissue stiffer along their direction."
-    example: ClassVar[str] = "fibres:direction=1/0/0,stiffness=1000"
+    example: ClassVar[str] = "fibres:direction=1/0/0,stiffness=2000"
     confused_with: ClassVar[tuple[str, ...]] = ("asymmetry", "inclusion")
     needs: ClassVar[tuple[str, ...]] = ("loads along and across the fibres",)
     several: ClassVar[bool] = True

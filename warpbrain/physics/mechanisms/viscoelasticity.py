@@ -55,7 +55,7 @@ class Viscoelasticity(Mechanism):
     kind: ClassVar[str] = "viscoelasticity"
     of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue resists fast deformation more than slow, and its stress relaxes."
-    example: ClassVar[str] = "viscoelasticity:moduli=2,times=0.05"
+    example: ClassVar[str] = "viscoelasticity:moduli=1,times=10"
     confused_with: ClassVar[tuple[str, ...]] = ("drainage",)
     needs: ClassVar[tuple[str, ...]] = ("two times or more, or two rates",)
 

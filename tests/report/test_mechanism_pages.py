@@ -1,0 +1,105 @@
+"""The pages of the mechanisms are those of the code, and their pictures of the files as they are."""
+
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from warpbrain.cases.assuming import assume
+from warpbrain.cases.shipped import find_case
+from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.report.mechanisms.cost import PLAIN, read_costs, row_of, sentences, table
+from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
+from warpbrain.report.mechanisms.index import index
+from warpbrain.report.mechanisms.page import page
+from warpbrain.report.mechanisms.picture import write_picture
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES, FIGURES = DOCS / "mechanisms", DOCS / "figures"
+EFFECTS = read_effects(PAGES / "effects.json")
+COSTS = read_costs(sorted((DOCS.parent / "bench" / "results").glob("mechanisms_*.json")))
+MAKE = "run python docs/make_mechanisms.py"
+
+
+@pytest.mark.parametrize("kind", mechanisms())
+def test_a_page_has_not_drifted(kind):
+    assert kind in EFFECTS, MAKE
+    text = page(kind, EFFECTS[kind], sentences(COSTS, kind))
+    assert (PAGES / f"{kind}.md").read_text(encoding="utf-8") == text, MAKE
+    assert mechanisms()[kind].sentence in text and mechanisms()[kind].example in text
+    for name in mechanisms()[kind].parameters():
+        assert f"| `{name}` |" in text
+
+
+@pytest.mark.parametrize("kind", mechanisms())
+def test_a_picture_is_of_the_present_files(kind):
+    assert kind in EFFECTS, MAKE
+    assert EFFECTS[kind].made_from == made_from(kind), MAKE
+    assert EFFECTS[kind].picture == digest_of(FIGURES / f"mechanism-{kind}.png"), MAKE
+    # it shows something, and what the colours can show
+    assert 0.3 < EFFECTS[kind].largest < 3.0
+
+
+def test_the_index_has_not_drifted_and_nothing_is_left_behind():
+    text = (PAGES / "index.md").read_text(encoding="utf-8")
+    assert text == index(EFFECTS, COSTS), MAKE
+    assert {path.stem for path in PAGES.glob("*.md")} == {"index", *mechanisms()}
+    assert {path.stem for path in FIGURES.glob("mechanism-*.png")} == {f"mechanism-{kind}" for kind in mechanisms()}
+    assert set(EFFECTS) == set(mechanisms())
+
+
+@pytest.mark.parametrize("kind", mechanisms())
+def test_every_mechanism_has_its_four_faces(kind):
+    mechanism = mechanisms()[kind]
+    assert mechanism.sentence.endswith(".")
+    assert set(mechanism.confused_with) <= {*mechanisms(), "drainage"}
+    for name, says in mechanism.parameters().items():
+        assert says.doc.endswith("."), name
+    assert assume(find_case(BASE), mechanism.example).mechanisms[-1].kind == kind
+
+
+def test_effects_come_back(tmp_path):
+    kinds = list(mechanisms())
+    effects = {kind: Effect(1.5, (1.0, 2.0, -3.0), 50, "a", "b") for kind in reversed(kinds)}
+    write_effects(tmp_path / "effects.json", effects)
+    again = read_effects(tmp_path / "effects.json")
+    assert again == effects and list(again) == kinds
+    assert read_effects(tmp_path / "none.json") == {}
+    assert digest_of(tmp_path / "none.json") == ""
+
+
+def test_costs_in_words():
+    kind, other = list(mechanisms())[:2]
+    twice = {"plain": [10.0, 20.0, 30.0], "with": [20.0, 40.0, 45.0]}
+    counts = {"plain": [4, 4], "with": [6, 6]}
+    row = {"kind": kind, "step": twice, "newton": twice, "cg_iterations": counts, "newton_iterations": counts}
+    same = {**row, "kind": PLAIN, "step": {"plain": [1.0], "with": [1.0]}}
+    costs = {"device": "a machine", "date": "2026-01-02", "rows": [same, row]}
+    [line] = sentences([costs], kind)
+    assert "a machine, 2026-01-02" in line and "2.00 times" in line and "6 iterations of conjugate" in line
+    assert row_of(costs, other) is None and sentences([costs], other) == []
+    head, _, first, second, third = table([costs], [kind, other])
+    assert head.count("a machine, 2026-01-02") == 2
+    assert first == "| plain beside plain | 1.00 | 2.00 |"
+    assert second == f"| {kind} | 2.00 | 2.00 |"
+    assert third == f"| {other} |  |  |"
+    assert table([], [kind]) == ["Not measured yet."]
+
+
+def test_the_picture_is_of_the_difference(tmp_path):
+    """Colours on the side that moves, and the dark end of the scale on the other."""
+    case = find_case(BASE)
+    difference = np.zeros(case.mesh.points.shape)
+    difference[case.mesh.points[:, 0] > 0.0, 2] = 0.003
+    write_picture(tmp_path / "a.png", case, case.mesh, difference, "lifted")
+    pixels = matplotlib.image.imread(tmp_path / "a.png")[..., :3]
+    height, width = pixels.shape[:2]
+    right = pixels[height // 4 : 3 * height // 4, width // 2 : int(0.9 * width)]
+    middle = right.shape[1] // 2
+    yellow = (right[..., 0] > 0.9) & (right[..., 1] > 0.8) & (right[..., 2] < 0.3)
+    dark = (right[..., 0] < 0.35) & (right[..., 1] < 0.1) & (right[..., 2] < 0.45) & (right[..., 2] > 0.25)
+    # the patient's right is on the left of the picture
+    assert yellow[:, :middle].sum() > 10 * yellow[:, middle:].sum()
+    assert dark[:, middle:].sum() > 10 * dark[:, :middle].sum()
+    assert len(np.unique(np.round(255 * pixels).reshape(-1, 3), axis=0)) <= 256

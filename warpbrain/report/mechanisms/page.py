@@ -1,0 +1,68 @@
+"""The page of a mechanism."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.report.mechanisms.effect import Effect
+from warpbrain.report.mechanisms.picture import LARGEST, MAGNIFIED, PLACE
+
+
+def page(kind: str, effect: Effect, costs: list[str]) -> str:
+    """The whole page.
+
+    Parameters
+    ----------
+    kind : str
+    effect : Effect
+        Of its example.
+    costs : list of str
+        What its example costs, a sentence a machine.
+    """
+    mechanism = mechanisms()[kind]
+    module = sys.modules[mechanism.__module__]
+    source = f"../../{module.__name__.replace('.', '/')}.py"
+    lines = [f"# {kind}", "", f"*{mechanism.sentence}*", "", inspect.cleandoc(module.__doc__ or ""), ""]
+    lines += ["## Parameters", "", *_table(mechanism), ""]
+    lines += ["## What it does to the phantom", "", *_picture(mechanism, effect), ""]
+    lines += ["## What it is taken for", "", *confusions(mechanism), ""]
+    lines += ["## Cost", "", *(costs or ["Not measured yet."]), ""]
+    lines += [f"[{source.rsplit('/', 1)[1]}]({source}), [all mechanisms](index.md)", ""]
+    return "\n".join(lines)
+
+
+def confusions(mechanism: type[Mechanism]) -> list[str]:
+    """What has nearly the same effect, and what tells them apart."""
+    known = mechanisms()
+    others = [f"[{kind}]({kind}.md)" if kind in known else kind for kind in mechanism.confused_with]
+    lines = [f"Taken for {', '.join(others)}." if others else "Nothing else has nearly the same effect."]
+    if mechanism.needs:
+        return [*lines, f"Told apart by {', '.join(mechanism.needs)}."]
+    return [*lines, *(["One deformed state tells them apart."] if others else [])]
+
+
+def _table(mechanism: type[Mechanism]) -> list[str]:
+    lines = ["| key | unit | | expected | typical | source |", "|---|---|---|---|---|---|"]
+    for name, says in mechanism.parameters().items():
+        expected = "" if says.expectation is None else str(says.expectation)
+        unit = "`units`" if says.kind == "position" else says.unit
+        doc = mechanism.described(name)
+        lines.append(f"| `{name}` | {unit} | {doc} | {expected} | {says.typical} | {says.source} |")
+    return [*lines, "", "`ramp = [[time, factor], ...]` scales what it does over time (s)."]
+
+
+def _picture(mechanism: type[Mechanism], effect: Effect) -> list[str]:
+    state = f"{effect.steps} ms after the load came, from rest" if effect.steps else "in equilibrium"
+    place = ", ".join(f"{x:.0f}" for x in effect.place)
+    return [
+        f"    warpbrain run {effect.command} --with {mechanism.example}",
+        "",
+        f"![{mechanism.kind}: what it does to the phantom](../figures/mechanism-{mechanism.kind}.png)",
+        "",
+        f"The phantom under 1 N on its cap, cut at y = {1000.0 * PLACE:.0f} mm. On the right what the mechanism adds "
+        f"to its displacement, {state}: shape and arrows {MAGNIFIED:g} times as large, colours up to {LARGEST:g} mm, the "
+        f"undeformed surface dashed. At most {effect.largest:.2f} mm, at ({place}) mm.",
+    ]
