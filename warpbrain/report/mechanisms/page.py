@@ -63,6 +63,6 @@ def _picture(mechanism: type[Mechanism], effect: Effect) -> list[str]:
         f"![{mechanism.kind}: what it does to the phantom](../figures/mechanism-{mechanism.kind}.png)",
         "",
         f"The phantom under 1 N on its cap, cut at y = {1000.0 * PLACE:.0f} mm. On the right what the mechanism adds "
-        f"to its displacement, {state}: shape and arrows {MAGNIFIED:g} times as large, colours up to {LARGEST:g} mm, the "
-        f"undeformed surface dashed. At most {effect.largest:.2f} mm, at ({place}) mm.",
+        f"to its displacement, {state}: shape and arrows {MAGNIFIED:g} times as large, colours up to {LARGEST:g} mm, "
+        f"the undeformed surface dashed. At most {effect.largest:.2f} mm, at ({place}) mm.",
     ]
