@@ -1,4 +1,4 @@
-"""`python -m warpbrain.bench mechanisms`: what it prints is what it writes, and the docs read it. No time is asserted."""
+"""`python -m warpbrain.bench mechanisms`: what it prints is what it writes, and what the docs read."""
 
 import json
 import runpy
