@@ -50,7 +50,9 @@ class Falx(Mechanism):
         typical="31.5 MPa by custom; 68.1 MPa in pooled tests of dura",
         source="diagnosis design, M5",
     )
-    thickness: float = parameter("Thickness.", default=1e-3, unit="mm", si=1e-3, above=0.0)
+    thickness: float = parameter(
+        "Thickness.", default=1e-3, unit="mm", si=1e-3, above=0.0, typical="about 1 mm", source="diagnosis design, M5"
+    )
     kind: ClassVar[str] = "falx"
     sentence: ClassVar[str] = "A stiff membrane, such as the falx, holds the tissue on both sides of it."
     example: ClassVar[str] = "falx:nodes=falx"

@@ -50,7 +50,12 @@ class Viscoelasticity(Mechanism):
         source="Budday et al. 2017 (diagnosis design, M8)",
     )
     times: tuple[float, ...] = parameter(
-        "Relaxation time of each branch.", kind="numbers", unit="s", expectation=LogUniform(1.0, 3000.0)
+        "Relaxation time of each branch.",
+        kind="numbers",
+        unit="s",
+        expectation=LogUniform(1.0, 3000.0),
+        typical="9.7 s (cortex), 14.9 s (corona radiata)",
+        source="Budday et al. 2017 (diagnosis design, M8)",
     )
     kind: ClassVar[str] = "viscoelasticity"
     of_specimens: ClassVar[bool] = True

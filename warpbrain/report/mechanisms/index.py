@@ -39,9 +39,9 @@ Each mechanism's example on `phantom-loaded` (coarse mesh, grey and white matter
     python -m warpbrain.bench mechanisms --out bench/results
 
 A time step is 1 ms, linearised, conjugate gradients to 1e-6; an iteration of Newton's method is that of an equilibrium,
-its line search included. Steps with and without take turns in one process; each number is the median of the ratios of
-neighbours in time, and that of the plain model beside itself says how far to trust the others. A mechanism that makes
-the matrix worse conditioned costs iterations of conjugate gradients, which is in these numbers.
+its line search included. Steps with and without take turns in one process, in processor time on a CPU. Each number is
+the median of the ratios of neighbours in time; that of the plain model beside itself says how far to trust the others.
+A mechanism that makes the matrix worse conditioned costs iterations of conjugate gradients, which is in these numbers.
 
 What is off is not there: a model without mechanisms has no terms to sum, and each phase of its step takes as long as
 before there were mechanisms ([benchmarks.md](../benchmarks.md)).
