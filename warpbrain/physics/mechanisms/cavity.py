@@ -82,7 +82,7 @@ class Cavity(Mechanism):
     )
     kind: ClassVar[str] = "cavity"
     sentence: ClassVar[str] = "Tissue is taken out little by little, and the walls of the cavity move in."
-    example: ClassVar[str] = "cavity:elements=ball,pressure=100"
+    example: ClassVar[str] = "cavity:elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("inclusion", "swelling")
 
     def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:

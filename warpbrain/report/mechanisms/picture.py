@@ -30,7 +30,8 @@ _MARKS = {
     "side": ("#009E73", "D", "side"),
     "falx": ("#E69F00", "o", "falx"),
 }
-_BALL = "#CC79A7"
+#: The ball, and the edges of its elements: they tell it from tissue in a grey print.
+_BALL, _BALL_EDGE = "#CC79A7", "#5D3049"
 
 
 def write_picture(path: Path, case: Case, mesh: TetMesh, difference: Floats, title: str) -> None:
@@ -81,12 +82,13 @@ def _draw_phantom(axes: Any, case: Case) -> None:
     section = cut(mesh.points, mesh.tetrahedra, np.zeros(len(mesh.points)), 1, PLACE)
     polygons = [MILLIMETRES * polygon for polygon in section.polygons]
     colours = views.element_colours(mesh, np.zeros(len(mesh.tetrahedra), dtype=bool))[section.elements]
-    colours = np.where(mesh.element_sets["ball"][section.elements], _BALL, colours).tolist()
-    axes.add_collection(PolyCollection(polygons, facecolors=colours, edgecolors=colours, linewidths=0.4))
+    ball = mesh.element_sets["ball"][section.elements]
+    fills, rims = (np.where(ball, colour, colours).tolist() for colour in (_BALL, _BALL_EDGE))
+    axes.add_collection(PolyCollection(polygons, facecolors=fills, edgecolors=rims, linewidths=0.4))
     edges = MILLIMETRES * outline(mesh.points, boundary_faces(mesh.tetrahedra), 1, PLACE)
     axes.add_collection(LineCollection(list(edges), colors=views.TISSUE_EDGE, linewidths=0.9))
     near = np.abs(mesh.points[:, 1] - PLACE) < _NEAR
-    entries: list[tuple[Any, str]] = [(Patch(facecolor=_BALL), "ball")]
+    entries: list[tuple[Any, str]] = [(Patch(facecolor=_BALL, edgecolor=_BALL_EDGE), "ball")]
     for name, (colour, mark, label) in _MARKS.items():
         x = MILLIMETRES * mesh.points[mesh.node_sets[name] & near]
         [drawn] = axes.plot(x[:, 0], x[:, 2], mark, color=colour, markersize=4.5, markeredgecolor="white", mew=0.4)
@@ -128,7 +130,7 @@ def _shrink(path: Path) -> None:
     from PIL import Image
 
     white = np.ones(3)
-    inks = [*(colour for colour, _, _ in _MARKS.values()), _BALL, *views.TISSUE_COLOURS[:2]]
+    inks = [*(colour for colour, _, _ in _MARKS.values()), _BALL, _BALL_EDGE, *views.TISSUE_COLOURS[:2]]
     tints = [t * np.array(to_rgb(ink)) + (1.0 - t) * white for ink in inks for t in (1.0, 0.75, 0.5, 0.25)]
     greys = [t * white for t in np.linspace(0.0, 1.0, 40)]
     colours = np.array([*tints, *greys, *colormaps["viridis"](np.linspace(0.0, 1.0, 256 - len(tints) - 40))[:, :3]])
