@@ -47,7 +47,7 @@ def test_every_sample_is_written(monkeypatch, capsys, tmp_path):
     assert plain["cg_iterations"]["plain"] == plain["cg_iterations"]["with"]
     assert plain["newton_iterations"]["plain"] == plain["newton_iterations"]["with"]
     [line] = sentences(read_costs([file]), "swelling")
-    assert f"CPU, {written['date']}" in line
+    assert line.startswith(f"- {written['device']}, {written['date']}: a time step takes")
 
 
 @pytest.mark.parametrize(

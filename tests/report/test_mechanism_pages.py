@@ -53,6 +53,7 @@ def test_the_index_has_not_drifted_and_nothing_is_left_behind():
 def test_every_mechanism_has_its_four_faces(kind):
     mechanism = mechanisms()[kind]
     assert mechanism.sentence.endswith(".")
+    assert hasattr(mechanism, "example"), f"{kind}: say an example of it on {BASE}"
     assert set(mechanism.confused_with) <= {*mechanisms(), "drainage"}
     for name, says in mechanism.parameters().items():
         assert says.doc.endswith("."), name

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import platform
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import date
@@ -79,7 +80,7 @@ def _bench(options: argparse.Namespace) -> None:
         path = out / f"mechanisms_{short}_{today}.json"
         written = {
             "versions": versions,
-            "device": device.name,
+            "device": _processor() if device.is_cpu else device.name,
             "date": today,
             "precision": options.precision,
             "case": BASE,
@@ -88,6 +89,14 @@ def _bench(options: argparse.Namespace) -> None:
         with whole_file(path) as scratch:
             scratch.write_text(json.dumps(written, indent=1) + "\n", encoding="utf-8")
         print(f"written to {path}")
+
+
+def _processor() -> str:
+    """Name of the processor, as far as the system tells it."""
+    told = Path("/proc/cpuinfo")
+    lines = told.read_text(encoding="utf-8").splitlines() if told.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return next(iter(names), platform.processor() or "CPU")
 
 
 def _line(row: dict[str, Any], ratio: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import Costs, ratio, row_of, table
+from warpbrain.report.mechanisms.cost import Costs, machine, ratio, row_of, table
 from warpbrain.report.mechanisms.effect import Effect
 
 _HEAD = """# Mechanisms
@@ -57,7 +57,7 @@ def index(effects: Mapping[str, Effect], measured: Sequence[Costs]) -> str:
     measured : sequence of Costs
         The first is in the overview.
     """
-    where = f"on {measured[0]['device']}" if measured else "nowhere yet"
+    where = f"on {machine(measured[0])}" if measured else "nowhere yet"
     lines = [_HEAD, "| | | effect | taken for | told apart by | cost |", "|---|---|---|---|---|---|"]
     for kind, mechanism in mechanisms().items():
         row = row_of(measured[0], kind) if measured else None
