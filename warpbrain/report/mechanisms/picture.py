@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.atomic import whole_file
 from warpbrain.cases.case import Case
 from warpbrain.mesh import TetMesh, boundary_faces
 from warpbrain.report import views
@@ -32,6 +31,9 @@ _MARKS = {
 }
 #: The ball, and the edges of its elements: they tell it from tissue in a grey print.
 _BALL, _BALL_EDGE = "#CC79A7", "#5D3049"
+
+#: Every colour of a picture but those of the scale and greys.
+INKS = (*(colour for colour, _, _ in _MARKS.values()), _BALL, _BALL_EDGE, *views.TISSUE_COLOURS[:2])
 
 
 def write_picture(path: Path, case: Case, mesh: TetMesh, difference: Floats, title: str) -> None:
@@ -71,7 +73,6 @@ def write_picture(path: Path, case: Case, mesh: TetMesh, difference: Floats, tit
     bar.set_label("difference of displacement [mm]")
     views.save(figure, path)
     plt.close(figure)
-    _shrink(path)
 
 
 def _draw_phantom(axes: Any, case: Case) -> None:
@@ -121,22 +122,3 @@ def _draw_effect(axes: Any, whole: TetMesh, mesh: TetMesh, difference: Floats) -
         angles="xy", scale_units="xy", scale=1.0, width=0.004, color="white", edgecolor="black", linewidth=0.6,
     )  # fmt: skip
     return shown
-
-
-def _shrink(path: Path) -> None:
-    """Leave 256 colours of a picture, all that it was made of: a third of the bytes, and no difference to an eye."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_rgb
-    from PIL import Image
-
-    white = np.ones(3)
-    inks = [*(colour for colour, _, _ in _MARKS.values()), _BALL, _BALL_EDGE, *views.TISSUE_COLOURS[:2]]
-    tints = [t * np.array(to_rgb(ink)) + (1.0 - t) * white for ink in inks for t in (1.0, 0.75, 0.5, 0.25)]
-    greys = [t * white for t in np.linspace(0.0, 1.0, 40)]
-    colours = np.array([*tints, *greys, *colormaps["viridis"](np.linspace(0.0, 1.0, 256 - len(tints) - 40))[:, :3]])
-    palette = Image.new("P", (1, 1))
-    palette.putpalette(np.round(255.0 * colours).astype(np.uint8).ravel().tolist())
-    with Image.open(path) as image:
-        small = image.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE)
-    with whole_file(path) as scratch:
-        small.save(scratch, optimize=True)
