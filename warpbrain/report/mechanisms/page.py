@@ -39,6 +39,8 @@ def confusions(mechanism: type[Mechanism]) -> list[str]:
     known = mechanisms()
     others = [f"[{kind}]({kind}.md)" if kind in known else kind for kind in mechanism.confused_with]
     lines = [f"Taken for {', '.join(others)}." if others else "Nothing else has nearly the same effect."]
+    if mechanism.of_specimens:
+        lines.append("It acts in specimens too.")
     if mechanism.needs:
         return [*lines, f"Told apart by {', '.join(mechanism.needs)}."]
     return [*lines, *(["One deformed state tells them apart."] if others else [])]
