@@ -59,7 +59,22 @@ def test_what_makes_no_sense_is_told(tmp_path, said, expected):
 def test_elements_that_do_not_lock_move_more(tmp_path):
     folder = write_folder(tmp_path / "case")
     stiff = ("--poisson", "0.49")
-    for elements in ("tet4", "tet4-averaged"):
+    for elements in ("tet4", "tet4-averaged", "tet10"):
         done = run(folder, *stiff, "--elements", elements, "--out", tmp_path / elements)
         assert done.status == 0, done.err
+        assert ("stiffer on linear tetrahedra" in done.out) == (elements == "tet4")
     assert largest(tmp_path / "tet4-averaged") > 1.05 * largest(tmp_path / "tet4")
+    assert largest(tmp_path / "tet10") > 1.05 * largest(tmp_path / "tet4")
+
+
+def test_what_knows_no_midside_nodes_is_refused(tmp_path):
+    said = ("--with", "viscoelasticity:moduli=1000,times=1", "--elements", "tet10")
+    done = run(write_folder(tmp_path / "case"), *said, "--out", tmp_path / "out")
+    assert done.status == 2 and "viscoelasticity: cannot act on elements 'tet10'" in done.err, done.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_error_of_quadratic_elements_is_not_known(tmp_path):
+    said = ("--mesh-error", "--elements", "tet10", "--out", tmp_path / "out")
+    done = run(write_folder(tmp_path / "case"), *said)
+    assert done.status == 2 and "--mesh-error: is not known of --elements tet10" in done.err, done.err

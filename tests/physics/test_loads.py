@@ -52,7 +52,7 @@ def test_weight_above_the_level() -> None:
 
 def test_height_is_measured_against_gravity_from_the_lowest_point() -> None:
     moved = TetMesh(MESH.points + np.array([1.0, 2.0, 3.0]), MESH.tetrahedra)
-    height = Gravity(direction=(0.0, 0.0, 2.0), density=DENSITY).height(moved)
+    height = Gravity(direction=(0.0, 0.0, 2.0), density=DENSITY).height(moved, moved.points)
     np.testing.assert_allclose(height, 0.1 - MESH.points[:, 2], atol=1e-12)
 
 

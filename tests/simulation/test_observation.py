@@ -11,16 +11,16 @@ from warpbrain.recordings.recording import ForceRecording, PointsRecording, Surf
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.observation import observe
 from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.result import result_of
+from warpbrain.simulation.result import nodal_state_of, result_of
 from warpbrain.simulation.system import System
 
 
-@pytest.fixture(scope="module")
-def solved(tmp_path_factory):
+@pytest.fixture(scope="module", params=["tet4", "tet10"])
+def solved(request, tmp_path_factory):
     case = read_case(write_recorded(tmp_path_factory.mktemp("case")))
-    system = System(model_of(case)[0], "cpu")
+    system = System(replace(model_of(case)[0], elements=request.param), "cpu")
     solve_equilibrium(system)
-    return case, result_of(system)
+    return case, nodal_state_of(system)
 
 
 def recorded(case, result, **more):

@@ -67,9 +67,10 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
     add(
         "--elements",
-        choices=("tet4", "tet4-averaged"),
+        choices=("tet4", "tet4-averaged", "tet10"),
         default="tet4",
-        help="plain tetrahedra (default), or averaged gradients, which do not lock in nearly incompressible tissue",
+        help="plain tetrahedra (default); averaged gradients, which do not lock in nearly incompressible tissue; or "
+        "quadratic tetrahedra, with nodes in the middle of edges",
     )
     add(
         "--mesh-error",
@@ -142,10 +143,10 @@ def _run(options: argparse.Namespace) -> None:
     seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **seconds}
 
     from warpbrain.simulation.observation import observe
-    from warpbrain.simulation.result import result_of
+    from warpbrain.simulation.result import nodal_state_of, result_of
 
     result = result_of(system, outcome.get("time_s", math.inf))
-    observed = observe(case, result, outcome.get("time_s"))
+    observed = observe(case, nodal_state_of(system, outcome.get("time_s", math.inf)), outcome.get("time_s"))
     said = tables.describe_result(result)
     compared = describe_comparisons(observed)
     say("", *tables.displacement_lines(said), sep="\n")
@@ -194,6 +195,8 @@ def _check(options: argparse.Namespace) -> None:
         raise InputError(f"--poisson {options.poisson:g}: expected a number in the open interval (-1, 0.5)")
     if not 0.0 < options.tolerance < 1.0:
         raise InputError(f"--tolerance {options.tolerance:g}: expected a number between 0 and 1")
+    if options.mesh_error is not None and options.elements == "tet10":
+        raise InputError("--mesh-error: is not known of --elements tet10: expected tet4 or tet4-averaged")
     if options.mesh_error == "elements" and options.elements != "tet4":
         raise InputError(f"--mesh-error elements: {options.elements} do not lock: --mesh-error size says what is left")
     options.moduli = parse_moduli(options.mu)

@@ -103,6 +103,8 @@ def _tests(options: argparse.Namespace, case: Case) -> list[TestRecording]:
             raise InputError(
                 f"{option}: {case.path} has a [specimen], whose tests are quasi-static: there is no motion"
             )
+    if options.elements == "tet10":
+        raise InputError(f"--elements tet10: {case.path} has a [specimen], whose tests have linear elements only")
     tests = [recording for recording in case.recordings if isinstance(recording, TestRecording)]
     if not tests:
         raise InputError(f"{case.path}: no [[recording]] of kind 'test': nothing is imposed on the [specimen]")

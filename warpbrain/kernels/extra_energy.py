@@ -14,6 +14,7 @@ import warp as wp
 
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.ten_nodes import POINTS, UNROLL, add_blocks, add_forces, gradient_at
 from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks, store_forces
 
 
@@ -93,5 +94,89 @@ def extra_kernels(key: str, energy: Any, stress: Any, moduli: Any, precision: Pr
         e = elements[t]
         F = deformation_gradient(u, nodes[e], inverse_edges[e])
         out[t] = scale[0] * volume[t] * energy(F, data, t)
+
+    return forces, tangents, energies
+
+
+@cache
+def quadratic_extra_kernels(
+    key: str, energy: Any, stress: Any, moduli: Any, precision: Precision
+) -> tuple[Any, Any, Any]:
+    """The same for elements of ten nodes, (m, 10) arrays of int; see `warpbrain.kernels.ten_nodes`."""
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = compiled_module(f"{key}_{precision.name}_quadratic", unroll=UNROLL)
+    share = wp.constant(scalar(1.0 / POINTS))
+
+    @wp.kernel(module=module)
+    def forces(
+        elements: wp.array[int],
+        nodes: wp.array2d[int],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        data: wp.array2d[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        element_forces: wp.array2d[vec3],
+    ):
+        t = wp.tid()
+        e = elements[t]
+        G = inverse_edges[e]
+        V = share * scale[0] * volume[t]
+        for point in range(POINTS):
+            F = gradient_at(u, nodes, e, point, G)
+            add_forces(V * stress(F, data, t), point, G, element_forces, t)
+
+    @wp.kernel(module=module)
+    def tangents(
+        elements: wp.array[int],
+        nodes: wp.array2d[int],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        data: wp.array2d[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        element_forces: wp.array2d[vec3],
+        element_blocks: wp.array2d[mat33],
+    ):
+        t = wp.tid()
+        e = elements[t]
+        G = inverse_edges[e]
+        V = share * scale[0] * volume[t]
+        axes = wp.identity(n=3, dtype=scalar)
+        a, b, c = axes[0], axes[1], axes[2]
+        for point in range(POINTS):
+            F = gradient_at(u, nodes, e, point, G)
+            add_forces(V * stress(F, data, t), point, G, element_forces, t)
+            add_blocks(
+                V * moduli(F, a, a, data, t),
+                V * moduli(F, a, b, data, t),
+                V * moduli(F, a, c, data, t),
+                V * moduli(F, b, b, data, t),
+                V * moduli(F, b, c, data, t),
+                V * moduli(F, c, c, data, t),
+                point,
+                G,
+                element_blocks,
+                t,
+            )
+
+    @wp.kernel(module=module)
+    def energies(
+        elements: wp.array[int],
+        nodes: wp.array2d[int],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        data: wp.array2d[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array[scalar],
+    ):
+        t = wp.tid()
+        e = elements[t]
+        found = scalar(0.0)
+        for point in range(POINTS):
+            F = gradient_at(u, nodes, e, point, inverse_edges[e])
+            found += share * scale[0] * volume[t] * energy(F, data, t)
+        out[t] = found
 
     return forces, tangents, energies

@@ -15,9 +15,18 @@ _CPU_FLAGS = (
 )
 
 
-def compiled_module(name: str) -> Any:
-    """The Warp module of a name, with this package's compiler flags; pass it to ``wp.kernel(module=...)``."""
+def compiled_module(name: str, unroll: int | None = None) -> Any:
+    """The Warp module of a name, with this package's compiler flags; pass it to ``wp.kernel(module=...)``.
+
+    Parameters
+    ----------
+    name : str
+    unroll : int, optional
+        Longest loop that is unrolled; Warp's default if absent.
+    """
     module = wp.get_module(f"warpbrain_{name}")
     module.options["cpu_compiler_flags"] = _CPU_FLAGS
     module.options["enable_backward"] = False
+    if unroll is not None:
+        module.options["max_unroll"] = unroll
     return module

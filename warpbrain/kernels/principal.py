@@ -118,4 +118,4 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
     forces, forces_and_tangents, energy, stress = element_kernels(
         stress_of, energy_of, tangents_of, precision, module, pointwise
     )
-    return ElementKernels(forces, forces_and_tangents, energy, stress, moduli, tangents_of)
+    return ElementKernels(forces, forces_and_tangents, energy, stress, moduli, tangents_of, stress_of, energy_of)

@@ -40,6 +40,8 @@ class ElementKernels:
         launched over (elements, 3, 3).
     tangents : wp.func
         ``(F, G, V, parameters, row) -> V P, K11, K12, K13, K22, K23, K33``, of which kernels of other shapes are made.
+    stress_at, energy_at : wp.func
+        ``(F, parameters, row) -> P`` and ``-> energy density``, likewise.
     """
 
     forces: Any
@@ -48,6 +50,8 @@ class ElementKernels:
     stress: Any
     moduli: Any
     tangents: Any
+    stress_at: Any
+    energy_at: Any
 
 
 class DeviceLaw(Protocol):

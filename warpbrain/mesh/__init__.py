@@ -4,7 +4,9 @@ Importing this package costs NumPy and nothing else; SciPy and meshio are import
 """
 
 from warpbrain.mesh.files import MeshInFile, read_mesh, read_mesh_file, write_mesh
+from warpbrain.mesh.integrals import surface_forces, volume_forces
 from warpbrain.mesh.ordering import ordered
+from warpbrain.mesh.quadratic import QuadraticMesh
 from warpbrain.mesh.quality import Quality, components, dihedral_angles, measure
 from warpbrain.mesh.surface import (
     boundary_faces,
@@ -21,6 +23,7 @@ from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 __all__ = [
     "MeshError",
     "MeshInFile",
+    "QuadraticMesh",
     "Quality",
     "TetMesh",
     "boundary_faces",
@@ -37,5 +40,7 @@ __all__ = [
     "read_mesh",
     "read_mesh_file",
     "split_boundary",
+    "surface_forces",
+    "volume_forces",
     "write_mesh",
 ]

@@ -25,9 +25,8 @@ def refined(mesh: TetMesh) -> tuple[TetMesh, Ints]:
     Returns
     -------
     mesh : TetMesh
-        Nodes 0 to n - 1 are those of the mesh it is of, elements 8 e to 8 e + 7 are in element e. A midpoint is in a
-        node set if both ends of its edge are; in a set of nodes of the surface only if the edge lies on the surface
-        too.
+        Nodes 0 to n - 1 are those of the mesh it is of, elements 8 e to 8 e + 7 are in element e. Midpoints are in
+        node sets by the rule of `inherited`.
     ends : (n', 2) int array
         For each node the two between which it lies in the middle; an old one lies between itself and itself.
     """
@@ -37,18 +36,32 @@ def refined(mesh: TetMesh) -> tuple[TetMesh, Ints]:
     points = np.concatenate([mesh.points, mesh.points[edges].mean(axis=1)])
     nodes = np.concatenate([mesh.tetrahedra, count + number.reshape(-1, 6)], axis=1)
     children = np.concatenate([nodes[:, _CORNERS], _octahedra(points, nodes)], axis=1).reshape(-1, 4)
-    surface, outer = _on_surface(mesh, edges)
-    node_sets = {}
-    for name, members in mesh.node_sets.items():
-        both = members[edges].all(axis=1)
-        if not (members & ~surface).any():
-            both &= outer
-        node_sets[name] = np.concatenate([members, both])
+    ends = np.concatenate([np.repeat(np.arange(count)[:, None], 2, axis=1), edges]).astype(np.int32)
+    surface = np.concatenate(_on_surface(mesh, edges))
+    node_sets = {name: inherited(members, ends, surface) for name, members in mesh.node_sets.items()}
     element_sets = {name: np.repeat(members, 8) for name, members in mesh.element_sets.items()}
     element_vectors = {name: np.repeat(vectors, 8, axis=0) for name, vectors in mesh.element_vectors.items()}
-    ends = np.concatenate([np.repeat(np.arange(count)[:, None], 2, axis=1), edges]).astype(np.int32)
     tissue = np.repeat(mesh.tissue, 8)
     return TetMesh(points, children, tissue, node_sets, element_sets, element_vectors), ends
+
+
+def inherited(members: Bools, ends: Ints, surface: Bools) -> Bools:
+    """A set of nodes once there are midpoints.
+
+    A midpoint is in it if both ends of its edge are; of a set of nodes of the surface only if the edge lies on the
+    surface too.
+
+    Parameters
+    ----------
+    members : (n,) bool array
+    ends : (n', 2) int array
+        The two nodes between which each node lies in the middle.
+    surface : (n',) bool array
+        Nodes, midpoints among them, that are of the boundary.
+    """
+    both = members[ends].all(axis=1)
+    inside = members & ~surface[: len(members)]
+    return np.asarray(both if inside.any() else both & surface)
 
 
 def _octahedra(points: Floats, nodes: NDArray[np.int64]) -> Ints:

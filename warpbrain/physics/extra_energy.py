@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.kernels.extra_energy import extra_kernels
+from warpbrain.kernels.extra_energy import extra_kernels, quadratic_extra_kernels
 from warpbrain.physics.term import Body, Term
 
 
@@ -46,9 +46,10 @@ class ExtraEnergyTerm(Term):
         data: NDArray[np.float64],
         ramp: Callable[[float], float],
     ) -> None:
-        super().__init__(body, body.tetrahedra[elements], ramp)
+        super().__init__(body, body.stencils[elements], ramp)
         scalar = body.precision.scalar
-        self._kernels = extra_kernels(code.key, code.energy, code.stress, code.moduli, body.precision)
+        kernels = extra_kernels if body.quadratic is None else quadratic_extra_kernels
+        self._kernels = kernels(code.key, code.energy, code.stress, code.moduli, body.precision)
         self._elements = self.array(elements, int)
         self._volume = self.array(body.mesh.volumes[elements], scalar)
         self._data = self.array(data, scalar)
@@ -56,7 +57,16 @@ class ExtraEnergyTerm(Term):
 
     def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
         body = self.body
-        inputs = [self._elements, body.nodes, body.inverse_edges, self._volume, self._data, self.scale, u, *outputs]
+        inputs = [
+            self._elements,
+            body.element_nodes,
+            body.inverse_edges,
+            self._volume,
+            self._data,
+            self.scale,
+            u,
+            *outputs,
+        ]
         wp.launch(kernel, dim=len(self._elements), inputs=inputs, device=body.device)
 
     def evaluate_forces(self, u: wp.array) -> None:

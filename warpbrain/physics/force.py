@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.mesh import TetMesh
+from warpbrain.mesh import QuadraticMesh, TetMesh
 from warpbrain.physics.load import Load
 
 
@@ -22,7 +22,7 @@ class NodalForce(Load):
     nodes : str
         Name of the node set.
     total : tuple of three floats
-        Total force [N]; each of the k nodes of the set carries ``total / k``.
+        Total force [N]; each of the k nodes of the set carries ``total / k``, midside nodes like corners.
 
     Raises
     ------
@@ -32,6 +32,7 @@ class NodalForce(Load):
 
     nodes: str
     total: tuple[float, float, float]
+    quadratic: ClassVar[bool] = True
     sentence: ClassVar[str] = "A force presses on part of the surface."
 
     def __post_init__(self) -> None:
@@ -39,7 +40,7 @@ class NodalForce(Load):
         if len(self.total) != 3 or not np.all(np.isfinite(self.total)):
             raise InputError(f"force on '{self.nodes}': total = {self.total}: expected three finite numbers [N]")
 
-    def nodal_forces(self, mesh: TetMesh) -> NDArray[np.float64]:
+    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
         members = mesh.node_sets.get(self.nodes)
         if members is None:
             raise InputError(

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.mesh import TetMesh
+from warpbrain.mesh import QuadraticMesh, TetMesh
 from warpbrain.physics.ramp import Ramped
 
 
@@ -17,9 +17,11 @@ from warpbrain.physics.ramp import Ramped
 class Load(Ramped, abc.ABC):
     """A dead load: forces that do not follow the deformation."""
 
+    #: Whether `nodal_forces` knows what to do with midside nodes.
+    quadratic: ClassVar[bool] = False
     #: Whether it acts on volume, so that the force on a node goes with the volume of tissue around it.
     by_volume: ClassVar[bool] = False
 
     @abc.abstractmethod
-    def nodal_forces(self, mesh: TetMesh) -> NDArray[np.float64]:
+    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
         """Forces on the nodes at factor 1 [N], shape (n, 3)."""

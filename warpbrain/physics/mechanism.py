@@ -152,6 +152,8 @@ class Mechanism(Ramped, abc.ABC):
     confused_with: ClassVar[tuple[str, ...]] = ()
     #: What must be observed to tell it from others, in words; empty: one deformed state is enough.
     needs: ClassVar[tuple[str, ...]] = ()
+    #: Whether what acts on nodes (a `Load`, a term) acts rightly on the midside nodes of quadratic elements too.
+    quadratic: ClassVar[bool] = False
     #: Whether a case can have several.
     several: ClassVar[bool] = False
     #: Whether it means something in a laboratory specimen between its grips.

@@ -17,7 +17,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.kernels.precision import Precision
-from warpbrain.mesh import TetMesh
+from warpbrain.mesh import QuadraticMesh, TetMesh
 
 Ints = NDArray[np.int32]
 
@@ -39,11 +39,27 @@ class Body(Protocol):
 
     @property
     def tetrahedra(self) -> NDArray[np.integer]:
-        """Nodes (m, 4) of each element, ascending."""
+        """Corners (m, 4) of each element, ascending."""
 
     @property
     def nodes(self) -> wp.array:
         """The same on the device."""
+
+    @property
+    def quadratic(self) -> QuadraticMesh | None:
+        """The reference shape with its midside nodes, if elements have some."""
+
+    @property
+    def node_mesh(self) -> TetMesh:
+        """Linear tetrahedra with a corner at every node: the reference shape, or its elements cut into eight."""
+
+    @property
+    def stencils(self) -> NDArray[np.integer]:
+        """Nodes of each element, ascending, (m, 4), or (m, 10) with midside nodes."""
+
+    @property
+    def element_nodes(self) -> wp.array:
+        """The same on the device: (m,) vec4i, or (m, 10) int."""
 
     @property
     def inverse_edges(self) -> wp.array:

@@ -18,8 +18,8 @@ class TriangleTerm(Term):
     Parameters
     ----------
     body : Body
-    triangles : (k, 3) int array
-        Node ids, ascending in each row.
+    triangles : (k, 3) or (k, 6) int array
+        Node ids, ascending in each row; of six, those of the corners first.
     points : (n, 3) array
         Reference positions of the body's nodes [m], from any origin.
     data : (k,) or (k, c) array
@@ -40,7 +40,7 @@ class TriangleTerm(Term):
         ramp: Callable[[float], float],
     ) -> None:
         super().__init__(body, triangles, ramp)
-        self._nodes = self.array(self.stencils, wp.vec3i)
+        self._nodes = self.array(self.stencils, wp.vec3i if self.stencils.shape[1] == 3 else int)
         self._points = self.array(points, body.precision.vec3)
         self._data = self.array(data, body.precision.scalar)
         self._energies = wp.zeros(len(data), dtype=body.precision.scalar, device=body.device)

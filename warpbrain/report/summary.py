@@ -60,6 +60,8 @@ def describe_case(case: Case, model: Model) -> dict[str, Any]:
         "file": str(case.path),
         "nodes": len(model.mesh.points),
         "tetrahedra": len(model.mesh.tetrahedra),
+        "elements": model.elements,
+        "midside_nodes": len(model.node_mesh.points) - len(model.mesh.points),
         "volume_cm3": 1e6 * model.mesh.volume,
         "volume_before_resection_cm3": 1e6 * case.mesh.volume,
         "mass_kg": model.mass,
@@ -113,7 +115,10 @@ def case_lines(summary: Mapping[str, Any]) -> list[str]:
             "  a stand-in: the MNI anatomy deformed and scaled to the paper's volume, not the patient's images"
         )
     lines.append(
-        f"  mesh      {summary['nodes']} nodes, {summary['tetrahedra']} tetrahedra, "
+        f"  mesh      {summary['nodes']} nodes, {summary['tetrahedra']} tetrahedra"
+        + (f" of elements {summary['elements']}" if summary["elements"] != "tet4" else "")
+        + (f" with {summary['midside_nodes']} midside nodes" if summary["midside_nodes"] else "")
+        + ", "
         f"{summary['volume_cm3']:.1f} cm3, {summary['mass_kg']:.4f} kg"
         + (
             f" (before resection {summary['volume_before_resection_cm3']:.1f} cm3)"

@@ -130,7 +130,7 @@ class Simulator:
 
     def reset(self) -> None:
         """Back to rest in the reference shape."""
-        rest = np.zeros(self.system.model.mesh.points.shape)
+        rest = np.zeros((self.system.size, 3))
         self.restore(rest, rest, 0.0)
         for term in self.system.terms:
             term.forget()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
-from warpbrain.mesh import TetMesh, boundary_faces, node_areas, nodes_of
+from warpbrain.mesh import QuadraticMesh, TetMesh, boundary_faces, node_areas, nodes_of
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
@@ -33,7 +33,7 @@ class GivenForces(Load):
 
     forces: Floats
 
-    def nodal_forces(self, mesh: TetMesh) -> Floats:
+    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         return self.forces
 
 

@@ -16,7 +16,7 @@ def require_held(model: Model) -> None:
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 
-    mesh = model.mesh
+    mesh = model.node_mesh
     count = len(mesh.points)
     first = np.repeat(mesh.tetrahedra[:, 0], 3)
     others = mesh.tetrahedra[:, 1:].ravel()

@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.mesh import TetMesh
+from warpbrain.mesh import QuadraticMesh, TetMesh
 from warpbrain.physics.laws import Law
 from warpbrain.physics.load import Load
-from warpbrain.physics.mechanism import Emptying, Mechanism
+from warpbrain.physics.mechanism import Emptying, Following, Mechanism
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 
 #: Kinds of elements; the default first.
-ELEMENTS = ("tet4", "tet4-averaged")
+ELEMENTS = ("tet4", "tet4-averaged", "tet10")
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,7 @@ class Motion:
     Attributes
     ----------
     nodes : (n,) bool array
+        Of the mesh's own nodes; midside nodes between them follow.
     times : (k,) array
         [s], increasing.
     values : (k, 3) array
@@ -98,9 +99,11 @@ class Model:
     density : float
         [kg/m3]
     constrained : (n, 3) bool array
-        Components of the nodal displacements that are prescribed.
+        Components of the nodal displacements that are prescribed. With midside nodes either for every node, or for the
+        mesh's own: then a component that all of these have is prescribed everywhere, and others on the midside nodes
+        that belong to the set of nodes that have it (`warpbrain.mesh.refinement.inherited`).
     prescribed : (n, 3) array
-        Their values [m] at full load; zero where not given.
+        Their values [m] at full load; zero where not given, and the mean of its ends for a midside node.
     loads : sequence of Load
         Forces that do not follow the deformation.
     mechanisms : sequence of Mechanism
@@ -109,12 +112,14 @@ class Model:
         Histories of prescribed displacements, which end at `prescribed`.
     damping : Damping
     elements : str
-        One of `ELEMENTS`: plain linear tetrahedra, or ones that do not lock (`warpbrain.simulation.averaged`).
+        One of `ELEMENTS`: plain linear tetrahedra, linear ones that do not lock (`warpbrain.simulation.averaged`), or
+        quadratic ones with straight sides (`warpbrain.mesh.quadratic`).
 
     Raises
     ------
     InputError
-        If a tissue has no material, an array has the wrong shape or holds NaN, or the density is not positive.
+        If a tissue has no material, an array has the wrong shape or holds NaN, the density is not positive, or
+        something acts that the elements cannot have.
     """
 
     mesh: TetMesh
@@ -129,9 +134,14 @@ class Model:
     elements: str = "tet4"
 
     def __post_init__(self) -> None:
-        shape = self.mesh.points.shape
+        if self.elements not in ELEMENTS:
+            raise InputError(f"elements = {self.elements!r}: expected one of {', '.join(ELEMENTS)}")
+        self._require_quadratic()
+        shape = self.node_mesh.points.shape
         constrained = np.zeros(shape, dtype=bool) if self.constrained is None else np.asarray(self.constrained)
         prescribed = np.zeros(shape) if self.prescribed is None else np.asarray(self.prescribed, dtype=np.float64)
+        if self.quadratic is not None:
+            constrained, prescribed = _with_midsides(self.quadratic, constrained, prescribed)
         if constrained.dtype != bool or constrained.shape != shape:
             raise InputError(f"constrained: expected a boolean array of shape {shape}, found {constrained.shape}")
         if prescribed.shape != shape:
@@ -143,25 +153,54 @@ class Model:
             raise InputError("prescribed: a component that is not constrained has a displacement")
         if not (math.isfinite(self.density) and self.density > 0.0):
             raise InputError(f"density = {self.density:g} kg/m3: expected a positive number")
-        if self.elements not in ELEMENTS:
-            raise InputError(f"elements = {self.elements!r}: expected one of {', '.join(ELEMENTS)}")
         missing = sorted(set(np.unique(self.mesh.tissue).tolist()) - set(self.materials))
         if missing:
             raise InputError(f"materials: no material for tissue {', '.join(map(str, missing))} of the mesh")
         object.__setattr__(self, "constrained", constrained)
         object.__setattr__(self, "prescribed", prescribed)
 
+    def _require_quadratic(self) -> None:
+        """Raise `InputError` if something acts that knows nothing of the midside nodes that the elements have."""
+        if self.elements != "tet10":
+            return
+        following = [m for m in self.mechanisms if isinstance(m, Following)]
+        acting: list[Load | Mechanism] = [*self.loads, *following]
+        for each in acting:
+            if not each.quadratic:
+                name = getattr(each, "kind", type(each).__name__)
+                raise InputError(
+                    f"{name}: cannot act on elements 'tet10', whose midside nodes it does not know: expected tet4 or "
+                    "tet4-averaged"
+                )
+
+    @cached_property
+    def quadratic(self) -> QuadraticMesh | None:
+        """The mesh with midside nodes; None if elements have none."""
+        return QuadraticMesh(self.mesh) if self.elements == "tet10" else None
+
+    @property
+    def node_mesh(self) -> TetMesh:
+        """Linear tetrahedra with a corner at every node: the mesh, or its elements cut into eight."""
+        return self.mesh if self.quadratic is None else self.quadratic.node_mesh
+
     def prescribed_at(self, time: float, share: float) -> Floats:
         """Prescribed displacements (n, 3) [m] at a time [s]; a `share` of those that have no history."""
         displacement = share * self.prescribed
+        own = displacement[: len(self.mesh.points)]
+        moved: Bools = np.zeros(len(own), dtype=bool)
         for motion in self.motions:
-            displacement[motion.nodes] = motion.at(time)
+            own[motion.nodes] = motion.at(time)
+            moved[motion.nodes] = True
+        if self.quadratic is not None and self.motions:
+            beside = np.any(moved[self.quadratic.ends], axis=1, keepdims=True)
+            follow = np.logical_and(self.constrained, beside)
+            displacement[follow] = self.quadratic.between(own)[follow]
         return displacement
 
     @property
     def node_masses(self) -> Floats:
-        """Lumped mass of each node [kg], shape (n,), before any tissue is taken out little by little."""
-        return self.density * self.mesh.node_volumes
+        """Lumped mass of each node [kg], shape (n,), positive, before any tissue is taken out little by little."""
+        return self.density * (self.quadratic or self.mesh).node_volumes
 
     @cached_property
     def emptying(self) -> list[Emptying]:
@@ -173,7 +212,8 @@ class Model:
         part = np.ones(len(self.mesh.tetrahedra))
         for mechanism, scale in zip(self.emptying, scales, strict=True):
             part *= mechanism.remaining_part(self.mesh, scale)
-        return self.mesh.lumped(part * self.mesh.volumes) / self.mesh.node_volumes
+        nodes = self.quadratic or self.mesh
+        return np.asarray(nodes.lumped(part * self.mesh.volumes) / nodes.node_volumes)
 
     @property
     def mass(self) -> float:
@@ -183,15 +223,26 @@ class Model:
     @cached_property
     def _unit_forces(self) -> list[Floats]:
         """Nodal forces of each load at factor 1 [N]; loads are dead, so they are computed once."""
-        return [load.nodal_forces(self.mesh) for load in self.loads]
+        return [load.nodal_forces(self.quadratic or self.mesh) for load in self.loads]
 
     def external_forces(self, time: float = math.inf) -> Floats:
         """Sum of the loads on the nodes [N] at a time [s], shape (n, 3); by default long after every ramp.
 
         Tissue that has been taken out by then weighs nothing.
         """
-        total = np.zeros(self.mesh.points.shape)
+        total = np.zeros(self.constrained.shape)
         left = self.remaining_share([mechanism.factor(time) for mechanism in self.emptying])[:, None]
         for load, forces in zip(self.loads, self._unit_forces, strict=True):
             total += load.factor(time) * (left * forces if load.by_volume else forces)
         return total
+
+
+def _with_midsides(mesh: QuadraticMesh, constrained: Bools, prescribed: Floats) -> tuple[Bools, Floats]:
+    """Constraints and their values, where they are given for corners only, for midside nodes too."""
+    corners = mesh.corners.points.shape
+    if constrained.shape == corners and constrained.dtype == bool:
+        columns = [np.ones(len(mesh.ends), dtype=bool) if c.all() else mesh.inherited(c) for c in constrained.T]
+        constrained = np.stack(columns, axis=1)
+    if prescribed.shape == corners and constrained.shape == mesh.points.shape:
+        prescribed = np.where(constrained, mesh.between(prescribed), 0.0)
+    return constrained, prescribed

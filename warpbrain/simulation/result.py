@@ -27,6 +27,23 @@ class Statistics:
 
 
 @dataclass(frozen=True)
+class NodalState:
+    """The state of all nodes, midside nodes among them: what recordings are compared with.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+        Linear tetrahedra with a corner at every node, undeformed.
+    u, reactions : (n, 3) array
+        As those of `Result`.
+    """
+
+    mesh: TetMesh
+    u: Floats
+    reactions: Floats
+
+
+@dataclass(frozen=True)
 class Result:
     """The state of a body.
 
@@ -45,6 +62,9 @@ class Result:
     reactions : (n, 3) array
         What holds the constrained components [N]: their internal forces less the loads that act on them; zero
         elsewhere.
+
+    Of quadratic elements displacements are those of the mesh's own nodes, strain and stress those in the middle of
+    elements, and half of what holds a midside node is at either end of its edge.
     """
 
     mesh: TetMesh
@@ -77,6 +97,15 @@ def _statistics(sizes: Floats) -> Statistics:
     )
 
 
+def nodal_state_of(system: System, time: float = math.inf) -> NodalState:
+    """The state of all nodes of a system at its present displacement; see `result_of`."""
+    system.evaluate_forces()
+    system.gather_forces()
+    internal = system.internal.numpy().astype(np.float64)
+    reactions = np.where(system.model.constrained, internal - system.model.external_forces(time), 0.0)
+    return NodalState(system.node_mesh, system.u.numpy().astype(np.float64), reactions)
+
+
 def result_of(system: System, time: float = math.inf) -> Result:
     """Evaluate a system at its present displacement.
 
@@ -86,20 +115,21 @@ def result_of(system: System, time: float = math.inf) -> Result:
     time : float
         Of the state [s], for loads with a ramp; by default long after every one.
     """
-    system.evaluate_forces()
-    system.gather_forces()
+    state = nodal_state_of(system, time)
     F = system.deformation_gradients()
     J = np.linalg.det(F)
     cauchy = system.stresses() @ F.transpose(0, 2, 1) / J[:, None, None]
     pressure = -np.trace(cauchy, axis1=1, axis2=2) / 3.0
     deviator = cauchy + pressure[:, None, None] * np.eye(3)
-    internal = system.internal.numpy().astype(np.float64)
+    u, reactions = state.u, state.reactions
+    if system.quadratic is not None:
+        u, reactions = u[: len(system.mesh.points)], system.quadratic.at_corners(reactions)
     return Result(
-        mesh=system.model.mesh,
-        u=system.u.numpy().astype(np.float64),
+        mesh=system.mesh,
+        u=u,
         J=J,
         principal_stretches=np.asarray(np.linalg.svd(F, compute_uv=False), dtype=np.float64),
         von_mises=np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2))),
         pressure=pressure,
-        reactions=np.where(system.model.constrained, internal - system.model.external_forces(time), 0.0),
+        reactions=reactions,
     )

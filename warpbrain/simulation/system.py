@@ -17,8 +17,10 @@ from warpbrain.errors import InputError
 from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.linear import ConjugateGradient
 from warpbrain.kernels.precision import PRECISIONS, Precision
-from warpbrain.kernels.tetrahedron import PAIRS, ElementKernels
+from warpbrain.kernels.quadratic import quadratic_kernels
+from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.quality import EDGES
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.grown import grown
 from warpbrain.physics.mechanism import Following, Growing, Weakening
@@ -108,7 +110,8 @@ class System:
         self.model = model
         self.device = find_device(device)
         self.precision = find_precision(precision)
-        self.size = len(model.mesh.points)
+        self.quadratic = model.quadratic
+        self.size = len(model.node_mesh.points)
         self.elements = len(model.mesh.tetrahedra)
         self._kernels = assembly_kernels(self.precision)
         self._place_mesh()
@@ -142,13 +145,17 @@ class System:
         # rows of the inverse edge matrix: gradients of the shape functions of nodes 1 to 3
         self.shape_gradients = np.linalg.inv(edges.transpose(0, 2, 1))
         self.nodes = self._array(self.tetrahedra, wp.vec4i)
+        self.stencils, self.element_nodes = self.tetrahedra, self.nodes
+        if self.quadratic is not None:
+            self.stencils = self.quadratic.elements
+            self.element_nodes = self._array(self.stencils, int)
         self.inverse_edges = self._array(self.shape_gradients, p.mat33)
         self.volume = self._array(mesh.volumes, p.scalar)
         self.mass = self._array(self.model.node_masses, p.scalar)
 
     def _place_pattern(self) -> None:
         p = self.precision
-        pattern = build_pattern([self.tetrahedra, *(term.stencils for term in self.terms)], self.size)
+        pattern = build_pattern([self.stencils, *(term.stencils for term in self.terms)], self.size)
         self.pairs = self._array(pattern.pairs, wp.vec2i)
         self.pair_positions = self._array(pattern.positions, wp.vec2i)
         self.pair_first = self._array(pattern.first, int)
@@ -168,7 +175,9 @@ class System:
         for (law_type, formulation), materials in self._grouped(self.model).items():
             members = np.flatnonzero(np.isin(self.model.mesh.tissue, list(materials)))
             device_law = law_type.device_law(formulation)
-            kernels = (grown(device_law) if self._growing else device_law).kernels(self.precision)
+            device_law = grown(device_law) if self._growing else device_law
+            linear = self.quadratic is None
+            kernels = device_law.kernels(self.precision) if linear else quadratic_kernels(device_law, self.precision)
             averaged = averaged_terms(self, list(materials), kernels) if self._averages else []
             parameters = self._array(self._parameters(law_type, materials), self.precision.scalar)
             groups.append(ElementGroup(kernels, self._array(members, int), parameters, averaged))
@@ -244,16 +253,21 @@ class System:
         self._all_components = self._array(np.ones((n, 3)), p.vec3)
         self._flat_forces = wp.zeros(len(self.corners), dtype=p.vec3, device=self.device)
         self._flat_blocks = wp.zeros(len(self.contributions), dtype=p.mat33, device=self.device)
-        self.element_forces = self._flat_forces[: 4 * m].reshape((m, 4))
-        self.element_blocks = self._flat_blocks[: len(PAIRS) * m].reshape((m, len(PAIRS)))
-        corner, block = 4 * m, len(PAIRS) * m
-        for term in self.terms:
-            count, nodes = term.stencils.shape
+        corner = block = 0
+
+        def parts(stencils: NDArray[np.integer]) -> tuple[wp.array, wp.array]:
+            """The next forces and blocks, for stencils (k, s)."""
+            nonlocal corner, block
+            count, nodes = stencils.shape
             pairs = nodes * (nodes + 1) // 2
             forces = self._flat_forces[corner : corner + count * nodes].reshape((count, nodes))
             blocks = self._flat_blocks[block : block + count * pairs].reshape((count, pairs))
-            term.place(forces, blocks)
             corner, block = corner + count * nodes, block + count * pairs
+            return forces, blocks
+
+        self.element_forces, self.element_blocks = parts(self.stencils)
+        for term in self.terms:
+            term.place(*parts(term.stencils))
         self.element_energy = wp.zeros(m, dtype=p.scalar, device=self.device)
         self.element_J = wp.zeros(m, dtype=p.scalar, device=self.device)
 
@@ -263,7 +277,7 @@ class System:
         wp.launch(kernel, dim=dim, inputs=list(inputs), device=self.device)
 
     def _geometry(self, group: ElementGroup) -> tuple[wp.array, ...]:
-        return (group.elements, self.nodes, self.inverse_edges, self.volume, group.parameters)
+        return (group.elements, self.element_nodes, self.inverse_edges, self.volume, group.parameters)
 
     def evaluate_forces(self) -> None:
         """Element forces at `u`."""
@@ -387,7 +401,7 @@ class System:
     def energy(self) -> tuple[float, float]:
         """Stored energy [J] at `u`, and the smallest `J` of an element (not positive: the energy means nothing).
 
-        Potentials of terms are in it, of those that have one.
+        Potentials of terms are in it, of those that have one; `J` is that of quadrature points.
         """
         for g in self.groups:
             self._launch(
@@ -454,6 +468,11 @@ class System:
         """The reference shape."""
         return self.model.mesh
 
+    @property
+    def node_mesh(self) -> TetMesh:
+        """Linear tetrahedra with a corner at every node: the reference shape, or its elements cut into eight."""
+        return self.model.node_mesh
+
     def most_compressed(self) -> str:
         """Which element had the smallest `J` when the energy was last evaluated, and where it is, for a message."""
         mesh = self.model.mesh
@@ -462,9 +481,21 @@ class System:
         return f"element {e} at ({x:.1f}, {y:.1f}, {z:.1f}) mm, tissue {mesh.tissue[e]}"
 
     def deformation_gradients(self) -> Floats:
-        """`F` of each element at `u`, shape (m, 3, 3), computed on the host in double precision."""
+        """`F` of each element at `u`, shape (m, 3, 3), computed on the host in double precision.
+
+        Of quadratic elements that in the middle, which is the mean over the element.
+        """
         u = self.u.numpy().astype(np.float64)
-        edges = u[self.tetrahedra[:, 1:]] - u[self.tetrahedra[:, :1]]
+        if self.quadratic is not None:
+            u = u[self.stencils]
+            # gradients in the middle: zero at corners, grad L_c + grad L_d in the middle of edge cd
+            corners = np.zeros((self.elements, 4, 3))
+            for (c, d), middle in zip(EDGES.tolist(), range(4, 10), strict=True):
+                corners[:, c] += u[:, middle]
+                corners[:, d] += u[:, middle]
+        else:
+            corners = u[self.tetrahedra]
+        edges = corners[:, 1:] - corners[:, :1]
         return np.eye(3) + edges.transpose(0, 2, 1) @ self.shape_gradients
 
     def stresses(self) -> Floats:

@@ -81,6 +81,7 @@ class Cavity(Mechanism):
         below=1.0,
     )
     kind: ClassVar[str] = "cavity"
+    quadratic: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue is taken out little by little, and the walls of the cavity move in."
     example: ClassVar[str] = "cavity:elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("inclusion", "swelling")

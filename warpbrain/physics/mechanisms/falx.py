@@ -54,6 +54,7 @@ class Falx(Mechanism):
         "Thickness.", default=1e-3, unit="mm", si=1e-3, above=0.0, typical="about 1 mm", source="diagnosis design, M5"
     )
     kind: ClassVar[str] = "falx"
+    quadratic: ClassVar[bool] = True
     sentence: ClassVar[str] = "A stiff membrane, such as the falx, holds the tissue on both sides of it."
     example: ClassVar[str] = "falx:nodes=falx"
     confused_with: ClassVar[tuple[str, ...]] = ("inclusion", "contact")
@@ -80,8 +81,8 @@ class MembraneTerm(TriangleTerm):
     """`Falx` on a device."""
 
     def __init__(self, body: Body, falx: Falx) -> None:
-        faces = np.sort(falx.faces(body.mesh), axis=1)
-        corners = body.mesh.points[faces]
+        faces = np.sort(falx.faces(body.node_mesh), axis=1)
+        corners = body.node_mesh.points[faces]
         first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         # two directions in the plane, then the gradients of the shape functions of nodes 1 and 2 in them
         along = first / np.linalg.norm(first, axis=1, keepdims=True)
@@ -94,7 +95,7 @@ class MembraneTerm(TriangleTerm):
         area = 0.5 * np.abs(np.linalg.det(edges))
         modulus = falx.thickness * falx.stiffness / 3.0
         data = np.concatenate([(modulus * area)[:, None], gradients.reshape(-1, 4)], axis=1)
-        super().__init__(body, faces, body.mesh.points, data, _kernels(body.precision), falx.factor)
+        super().__init__(body, faces, body.node_mesh.points, data, _kernels(body.precision), falx.factor)
         self._always = falx.factor()
 
     def set_scale(self, scale: float) -> None:

@@ -132,6 +132,7 @@ class Fibres(Mechanism):
     )
     elements: str = parameter("Element set that has them.", default="", kind="element set")
     kind: ClassVar[str] = "fibres"
+    quadratic: ClassVar[bool] = True
     of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Nerve fibres make the tissue stiffer along their direction."
     example: ClassVar[str] = "fibres:direction=1/0/0,stiffness=2000"

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.mesh import TetMesh
+from warpbrain.mesh import QuadraticMesh, TetMesh, volume_forces
 from warpbrain.physics.directions import unit_vector
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Load
@@ -78,6 +78,7 @@ class Gravity(Load, Mechanism):
     lowest: float | None = None
     by_volume: ClassVar[bool] = True
     kind: ClassVar[str] = "gravity"
+    quadratic: ClassVar[bool] = True
     confused_with: ClassVar[tuple[str, ...]] = ("pressure", "swelling")
     sentence: ClassVar[str] = "Cerebrospinal fluid drained, and the brain sinks under the weight it no longer carries."
     example: ClassVar[str] = "gravity:level=130"
@@ -118,19 +119,24 @@ class Gravity(Load, Mechanism):
         imaged = unit_vector("imaged_direction", self.imaged_direction)
         return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(down, imaged)), down @ imaged)))
 
-    def height(self, mesh: TetMesh) -> NDArray[np.float64]:
-        """Height of each node [m] above the point that levels are counted from, against gravity, shape (n,)."""
-        z = -mesh.points @ unit_vector("direction", self.direction)
-        return z - (z.min() if self.lowest is None else self.lowest)
+    def height(self, mesh: TetMesh | QuadraticMesh, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Heights of points (k, 3) [m] above the one that levels of a mesh are counted from, against gravity, (k,)."""
+        up = -unit_vector("direction", self.direction)
+        return np.asarray(points @ up - (float((mesh.points @ up).min()) if self.lowest is None else self.lowest))
 
-    def nodal_forces(self, mesh: TetMesh) -> NDArray[np.float64]:
+    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
         down = unit_vector("direction", self.direction)
-        if self.csf_level is None:
-            return self.density * STANDARD_GRAVITY * mesh.node_volumes[:, None] * down
-        # nodal quadrature: exact for a constant density, and without an element that is half in the fluid
-        drained = 0.5 * (1.0 + np.tanh(2.0 * (self.height(mesh) - self.csf_level) / SURFACE_WIDTH))
-        force = CSF_DENSITY * STANDARD_GRAVITY * drained[:, None] * down
-        if self.imaged_direction is not None:
-            turned = down - unit_vector("imaged_direction", self.imaged_direction)
-            force = force + (self.density - CSF_DENSITY) * STANDARD_GRAVITY * turned
-        return mesh.node_volumes[:, None] * force
+        level = self.csf_level
+        if level is None:
+            weight = self.density * STANDARD_GRAVITY * down
+            return volume_forces(mesh, lambda points: np.tile(weight, (len(points), 1)))
+
+        def density(points: NDArray[np.float64]) -> NDArray[np.float64]:
+            drained = 0.5 * (1.0 + np.tanh(2.0 * (self.height(mesh, points) - level) / SURFACE_WIDTH))
+            force = CSF_DENSITY * STANDARD_GRAVITY * drained[:, None] * down
+            if self.imaged_direction is not None:
+                turned = down - unit_vector("imaged_direction", self.imaged_direction)
+                force = force + (self.density - CSF_DENSITY) * STANDARD_GRAVITY * turned
+            return np.asarray(force)
+
+        return volume_forces(mesh, density)

@@ -8,7 +8,7 @@ Wood, Nonlinear Continuum Mechanics, 2nd ed., section 8.5)
 
 `K_ab` is the symmetric part of `df_a/dx_b`. On a closed surface that is all of it: the sum is the second derivative of
 `p V`, `V` the volume that the surface encloses. On an open one whose rim moves, the rest acts along the rim and is left
-to Newton's method, which then converges linearly.
+to Newton's method, which then converges linearly. Triangles of six nodes: `warpbrain.kernels.curved_pressure`.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,11 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.kernels.curved_pressure import curved_pressure_kernels
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.mesh.integrals import triangle_rule
 from warpbrain.mesh.soundness import open_edges
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
@@ -52,6 +54,7 @@ class Pressure(Mechanism):
         source="volunteers: 7 to 14 Pa; hydrocephalus: tens to hundreds of Pa (diagnosis design, M2)",
     )
     kind: ClassVar[str] = "pressure"
+    quadratic: ClassVar[bool] = True
     sentence: ClassVar[str] = "Fluid presses on part of the surface, more than on the rest of it."
     example: ClassVar[str] = "pressure:nodes=ventricle,value=300"
     confused_with: ClassVar[tuple[str, ...]] = ("gravity", "swelling")
@@ -84,12 +87,19 @@ class PressureTerm(TriangleTerm):
         order = np.argsort(faces, axis=1)
         # a permutation of three is even if it is a rotation
         even = (order[:, 1] - order[:, 0]) % 3 == 1
+        ascending = np.take_along_axis(faces, order, axis=1)
+        if body.quadratic is None:
+            triangles, kernels = ascending, _kernels(body.precision)
+        else:
+            rule = np.column_stack(triangle_rule())
+            triangles = body.quadratic.six_nodes(ascending)
+            kernels = curved_pressure_kernels(body.precision, tuple(map(tuple, rule.tolist())))
         super().__init__(
             body,
-            np.take_along_axis(faces, order, axis=1),
-            body.mesh.points - body.mesh.points[faces].mean(axis=(0, 1)),
+            triangles,
+            body.node_mesh.points - body.mesh.points[faces].mean(axis=(0, 1)),
             pressure.value * np.where(even, 1.0, -1.0),
-            _kernels(body.precision),
+            kernels,
             pressure.factor,
         )
         self.conservative = not len(open_edges(faces))

@@ -82,6 +82,7 @@ class ResidualStress(Mechanism):
     )
     elements: str = parameter("Element set that is under it.", default="", kind="element set")
     kind: ClassVar[str] = "residual-stress"
+    quadratic: ClassVar[bool] = True
     of_specimens: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue is under tension before anything is done to it."
     example: ClassVar[str] = "residual-stress:tension=500,direction=0/0/1,elements=ball"

@@ -13,17 +13,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.mesh import TetMesh, boundary_faces, face_vectors
+from warpbrain.mesh import QuadraticMesh, TetMesh, surface_forces
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
-
-#: Points of a rule of degree 4 on a triangle (Dunavant 1985): barycentric coordinates and weights.
-_A, _B = 0.445948490915965, 0.091576213509771
-_RULE = [
-    *((weights, 0.223381589678011) for weights in ((1 - 2 * _A, _A, _A), (_A, 1 - 2 * _A, _A), (_A, _A, 1 - 2 * _A))),
-    *((weights, 0.109951743655322) for weights in ((1 - 2 * _B, _B, _B), (_B, 1 - 2 * _B, _B), (_B, _B, 1 - 2 * _B))),
-]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +50,7 @@ class Traction(Load, Mechanism):
         expectation=Uniform(5.0, 15.0),
     )
     kind: ClassVar[str] = "traction"
+    quadratic: ClassVar[bool] = True
     sentence: ClassVar[str] = "Something presses or pulls on a patch of the surface, such as a retractor."
     example: ClassVar[str] = "traction:centre=58/-17/50,value=-500/0/-500,radius=15"
     confused_with: ClassVar[tuple[str, ...]] = ("contact", "pressure")
@@ -67,14 +61,9 @@ class Traction(Load, Mechanism):
         if not self.nodal_forces(mesh).any() and any(self.value):
             raise ParameterError("centre", "no face of the surface lies within the radius of this point")
 
-    def nodal_forces(self, mesh: TetMesh) -> NDArray[np.float64]:
-        faces = boundary_faces(mesh.tetrahedra)
-        corners = mesh.points[faces]
-        areas = np.linalg.norm(face_vectors(mesh.points, faces), axis=1)
-        shares = np.zeros(faces.shape)
-        for weights, part in _RULE:
-            at = np.einsum("a,faj->fj", weights, corners)
-            r = np.minimum(np.linalg.norm(at - np.asarray(self.centre), axis=1) / self.radius, 1.0)
-            shares += (part * areas * 0.5 * (1.0 + np.cos(np.pi * r)))[:, None] * np.asarray(weights)
-        nodal = np.bincount(faces.ravel(), shares.ravel(), minlength=len(mesh.points))
-        return nodal[:, None] * np.asarray(self.value)
+    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
+        def traction(points: NDArray[np.float64]) -> NDArray[np.float64]:
+            r = np.minimum(np.linalg.norm(points - np.asarray(self.centre), axis=1) / self.radius, 1.0)
+            return np.outer(0.5 * (1.0 + np.cos(np.pi * r)), self.value)
+
+        return surface_forces(mesh, traction)

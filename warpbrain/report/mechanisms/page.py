@@ -5,7 +5,8 @@ from __future__ import annotations
 import inspect
 import sys
 
-from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.load import Load
+from warpbrain.physics.mechanism import Following, Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.report.mechanisms.effect import Effect
 from warpbrain.report.mechanisms.picture import LARGEST, MAGNIFIED, PLACE
@@ -41,6 +42,8 @@ def confusions(mechanism: type[Mechanism]) -> list[str]:
     lines = [f"Taken for {', '.join(others)}." if others else "Nothing else has nearly the same effect."]
     if mechanism.of_specimens:
         lines.append("It acts in specimens too.")
+    if issubclass(mechanism, Load | Following) and not mechanism.quadratic:
+        lines.append("It does not act on elements `tet10`.")
     if mechanism.needs:
         return [*lines, f"Told apart by {', '.join(mechanism.needs)}."]
     return [*lines, *(["One deformed state tells them apart."] if others else [])]

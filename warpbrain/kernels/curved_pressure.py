@@ -1,0 +1,123 @@
+"""Pressure on triangles of six nodes, which follows them as they move, turn and bend.
+
+With the deformed surface `x(r, s) = sum_a N_a x_a`, oriented outwards (Bonet and Wood, Nonlinear Continuum Mechanics,
+2nd ed., section 8.5),
+
+    f_a  = p int N_a x_r x x_s dr ds
+    K_ab = p/2 int (N_b N_a,r - N_a N_b,r) [x_s] + (N_a N_b,s - N_b N_a,s) [x_r] dr ds,    [d] v = d x v
+
+`K_ab` is the symmetric part of `df_a/dx_b`, which on a closed surface is all of it. Integrands are polynomials of
+degree 4: the rule is exact.
+"""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.ten_nodes import UNROLL
+
+
+@cache
+def curved_pressure_kernels(precision: Precision, rule: tuple[tuple[float, ...], ...]) -> tuple[Any, Any, Any]:
+    """Make (once) kernels for forces, tangent blocks and energies, with one thread for a triangle.
+
+    Parameters
+    ----------
+    precision : Precision
+    rule : tuple of six points
+        Barycentric coordinates of each and its weight; the weights add up to one.
+    """
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = compiled_module(f"curved_pressure_{precision.name}", unroll=UNROLL)
+    table = wp.types.matrix((6, 6), scalar)
+    values, along_r, along_s, weights = _tables(np.array(rule))
+    N = wp.constant(table(*values.ravel()))
+    Nr = wp.constant(table(*along_r.ravel()))
+    Ns = wp.constant(table(*along_s.ravel()))
+    w = wp.constant(wp.types.vector(6, scalar)(*weights))
+
+    @wp.func
+    def place(i: wp.array2d[int], points: wp.array[vec3], u: wp.array[vec3], t: int, q: int, shapes: table):
+        """Sum of deformed positions, weighted by row q of a table."""
+        x = vec3()
+        for a in range(6):
+            x += shapes[q, a] * (points[i[t, a]] + u[i[t, a]])
+        return x
+
+    @wp.kernel(module=module)
+    def forces(
+        nodes: wp.array2d[int],
+        points: wp.array[vec3],
+        value: wp.array[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array2d[vec3],
+    ):
+        t = wp.tid()
+        p = value[t] * scale[0]
+        for a in range(6):
+            out[t, a] = vec3()
+        for q in range(6):
+            normal = wp.cross(place(nodes, points, u, t, q, Nr), place(nodes, points, u, t, q, Ns))
+            for a in range(6):
+                out[t, a] = out[t, a] + (p * w[q] * N[q, a]) * normal
+
+    @wp.kernel(module=module)
+    def tangents(
+        nodes: wp.array2d[int],
+        points: wp.array[vec3],
+        value: wp.array[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array2d[mat33],
+    ):
+        t = wp.tid()
+        p = scalar(0.5) * value[t] * scale[0]
+        for block in range(21):
+            out[t, block] = mat33()
+        for q in range(6):
+            x_r = place(nodes, points, u, t, q, Nr)
+            x_s = place(nodes, points, u, t, q, Ns)
+            for a in range(6):
+                for b in range(a, 6):
+                    d = (N[q, b] * Nr[q, a] - N[q, a] * Nr[q, b]) * x_s
+                    d += (N[q, a] * Ns[q, b] - N[q, b] * Ns[q, a]) * x_r
+                    block = a * (11 - a) // 2 + b
+                    out[t, block] = out[t, block] + wp.skew(p * w[q] * d)
+
+    @wp.kernel(module=module)
+    def energies(
+        nodes: wp.array2d[int],
+        points: wp.array[vec3],
+        value: wp.array[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array[scalar],
+    ):
+        t = wp.tid()
+        enclosed = scalar(0.0)
+        for q in range(6):
+            normal = wp.cross(place(nodes, points, u, t, q, Nr), place(nodes, points, u, t, q, Ns))
+            enclosed += w[q] * wp.dot(place(nodes, points, u, t, q, N), normal)
+        out[t] = value[t] * scale[0] / scalar(3.0) * enclosed
+
+    return forces, tangents, energies
+
+
+def _tables(rule: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """Shape functions and their derivatives by `r = L_1` and `s = L_2` at each point (6, 6), and weights `dr ds`.
+
+    Nodes are the corners 0, 1, 2 and the middles of 01, 02 and 12.
+    """
+    L0, L1, L2 = rule[:, :3].T
+    zero = np.zeros(6)
+    corners = [L * (2.0 * L - 1.0) for L in (L0, L1, L2)]
+    values = [*corners, 4.0 * L0 * L1, 4.0 * L0 * L2, 4.0 * L1 * L2]
+    along_r = [1.0 - 4.0 * L0, 4.0 * L1 - 1.0, zero, 4.0 * (L0 - L1), -4.0 * L2, 4.0 * L2]
+    along_s = [1.0 - 4.0 * L0, zero, 4.0 * L2 - 1.0, -4.0 * L1, 4.0 * (L0 - L2), 4.0 * L1]
+    return np.stack(values, 1), np.stack(along_r, 1), np.stack(along_s, 1), 0.5 * rule[:, 3]

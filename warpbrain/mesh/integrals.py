@@ -1,0 +1,94 @@
+"""Forces on nodes from forces in the volume and on the surface: `int N_a b dV` and `int N_a t dA`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.mesh.quadratic import QuadraticMesh
+from warpbrain.mesh.surface import boundary_faces, face_vectors
+from warpbrain.mesh.tet_mesh import Floats, TetMesh
+
+#: Values (k, 3) of a field at points (k, 3).
+Field = Callable[[Floats], Floats]
+
+
+def _orbits(*orbits: tuple[float, tuple[float, ...]]) -> tuple[Floats, Floats]:
+    """Barycentric points and weights of a rule, from weights and points that stand for all orders of coordinates."""
+    from itertools import permutations
+
+    points = [sorted(set(permutations(point))) for _, point in orbits]
+    weights = np.repeat([weight for weight, _ in orbits], [len(same) for same in points])
+    return np.concatenate(points), weights
+
+
+def triangle_rule() -> tuple[Floats, Floats]:
+    """Six points of a rule of degree 4 on a triangle (Dunavant 1985): barycentric points (6, 3), weights (6,)."""
+    a, b = 0.445948490915965, 0.091576213509771
+    return _orbits((0.223381589678011, (1 - 2 * a, a, a)), (0.109951743655322, (1 - 2 * b, b, b)))
+
+
+def tetrahedron_rule() -> tuple[Floats, Floats]:
+    """Fourteen points of a rule of degree 5 on a tetrahedron (Walkington 2000): points (14, 4), weights (14,)."""
+    a, b, c = 0.3108859192633006, 0.0927352503108912, 0.0455037041256496
+    return _orbits(
+        (0.1126879257180159, (1 - 3 * a, a, a, a)),
+        (0.0734930431163619, (1 - 3 * b, b, b, b)),
+        (0.0425460207770815, (0.5 - c, 0.5 - c, c, c)),
+    )
+
+
+def shape_values(bary: Floats) -> Floats:
+    """Quadratic shape functions (q, 6) on triangles or (q, 10) on tetrahedra, at barycentric points (q, 3) or (q, 4).
+
+    Those of corners, `L (2 L - 1)`, then those of edges, `4 L_a L_b`: 01, 02, 12 of a triangle, in the order of
+    `warpbrain.mesh.quality.EDGES` of a tetrahedron.
+    """
+    triangle = bary.shape[1] == 3
+    first, second = ((0, 0, 1), (1, 2, 2)) if triangle else ((0, 0, 0, 1, 1, 2), (1, 2, 3, 2, 3, 3))
+    return np.concatenate([bary * (2.0 * bary - 1.0), 4.0 * bary[:, first] * bary[:, second]], axis=1)
+
+
+def volume_forces(mesh: TetMesh | QuadraticMesh, density: Field) -> Floats:
+    """Forces (n, 3) [N] of a force in the volume [N/m3].
+
+    On linear tetrahedra by nodal quadrature, exact for a constant one. On quadratic ones by a rule of degree 5; of a
+    constant one a corner has `-V/20` of an element, a midside node `V/5`.
+    """
+    if isinstance(mesh, TetMesh):
+        return np.asarray(mesh.node_volumes[:, None] * density(mesh.points))
+    bary, weights = tetrahedron_rule()
+    corners = mesh.points[mesh.elements[:, :4]]
+    return _summed(mesh, mesh.elements, corners, mesh.corners.volumes, bary, weights, shape_values(bary), density)
+
+
+def surface_forces(mesh: TetMesh | QuadraticMesh, traction: Field) -> Floats:
+    """Forces (n, 3) [N] of a force on the boundary [Pa], by a rule of degree 4 on each triangle."""
+    linear = mesh if isinstance(mesh, TetMesh) else mesh.corners
+    faces = boundary_faces(linear.tetrahedra)
+    areas = np.linalg.norm(face_vectors(linear.points, faces), axis=1)
+    bary, weights = triangle_rule()
+    if isinstance(mesh, TetMesh):
+        return _summed(mesh, faces, mesh.points[faces], areas, bary, weights, bary, traction)
+    return _summed(mesh, mesh.faces, mesh.points[faces], areas, bary, weights, shape_values(bary), traction)
+
+
+def _summed(
+    mesh: TetMesh | QuadraticMesh,
+    nodes: NDArray[np.integer],
+    corners: Floats,
+    sizes: Floats,
+    bary: Floats,
+    weights: Floats,
+    shapes: Floats,
+    field: Field,
+) -> Floats:
+    """Sum over elements with nodes (k, s), corners (k, c, 3) and sizes (k,), at points of shape values (q, s)."""
+    total = np.zeros(mesh.points.shape)
+    for point, weight, values in zip(bary, weights, shapes, strict=True):
+        force = (weight * sizes)[:, None] * field(np.einsum("c,kci->ki", point, corners))
+        for node, value in zip(nodes.T, values, strict=True):
+            np.add.at(total, node, value * force)
+    return total

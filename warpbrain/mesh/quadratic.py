@@ -1,0 +1,113 @@
+"""Tetrahedra of second order: ten nodes each, four corners and a node in the middle of every edge.
+
+Sides are straight: a midside node lies halfway between the ends of its edge in the reference shape, and only there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.refinement import inherited, refined
+from warpbrain.mesh.surface import boundary_faces, nodes_of
+from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
+
+#: Parts of a tetrahedron's mass for each corner and each midside node: the diagonal of the consistent mass matrix,
+#: `V/70` and `8 V/105`, scaled to the mass of the element (Hinton, Rock and Zienkiewicz 1976).
+CORNER_MASS, MIDSIDE_MASS = 1.0 / 36.0, 4.0 / 27.0
+
+
+@dataclass(frozen=True, eq=False)
+class QuadraticMesh:
+    """A mesh with midside nodes.
+
+    Parameters
+    ----------
+    corners : TetMesh
+        What it is of; its n nodes come first.
+
+    Attributes
+    ----------
+    node_mesh : TetMesh
+        Linear tetrahedra with a corner at each of the N nodes: every element cut into eight. Sets are those of
+        `corners`, see `warpbrain.mesh.refinement.refined`.
+    ends : (N, 2) int array
+        Corners between which each node lies in the middle; a corner lies between itself and itself.
+    elements : (m, 10) int array
+        Nodes of each tetrahedron, ascending: its corners, then its midside nodes in the order of
+        `warpbrain.mesh.quality.EDGES`.
+    """
+
+    corners: TetMesh
+    node_mesh: TetMesh = field(init=False)
+    ends: Ints = field(init=False)
+    elements: Ints = field(init=False)
+
+    def __post_init__(self) -> None:
+        node_mesh, ends = refined(self.corners)
+        corners = np.sort(self.corners.tetrahedra, axis=1)
+        elements = np.concatenate([corners, self._midsides(ends, corners[:, EDGES])], axis=1)
+        for name, value in (("node_mesh", node_mesh), ("ends", ends), ("elements", elements.astype(np.int32))):
+            object.__setattr__(self, name, value)
+
+    def _midsides(self, ends: Ints, edges: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Node in the middle of each edge (..., 2), its ends ascending."""
+        factors = np.array([len(self.corners.points), 1])
+        first = len(self.corners.points)
+        found = np.searchsorted(ends[first:].astype(np.int64) @ factors, edges.astype(np.int64) @ factors)
+        return np.asarray(first + found, dtype=np.int64)
+
+    @property
+    def points(self) -> Floats:
+        """Node positions (N, 3) [m]."""
+        return self.node_mesh.points
+
+    @property
+    def node_sets(self) -> Mapping[str, Bools]:
+        """Named sets of all nodes, (N,) bool arrays."""
+        return self.node_mesh.node_sets
+
+    @property
+    def node_volumes(self) -> Floats:
+        """Volume lumped to each node [m3], shape (N,), positive everywhere; for masses."""
+        return self.lumped(self.corners.volumes)
+
+    def lumped(self, values: Floats) -> Floats:
+        """Values of elements (m,) shared among their nodes, shape (N,)."""
+        shares = values[:, None] * np.repeat([CORNER_MASS, MIDSIDE_MASS], [4, 6])
+        return np.bincount(self.elements.ravel(), shares.ravel(), minlength=len(self.ends)).astype(np.float64)
+
+    @cached_property
+    def on_surface(self) -> Bools:
+        """Nodes of the boundary, (N,) bool."""
+        return nodes_of(boundary_faces(self.node_mesh.tetrahedra), len(self.ends))
+
+    @cached_property
+    def faces(self) -> Ints:
+        """Triangles of the boundary (b, 6), oriented outwards: corners 0, 1, 2, then the middles of 01, 02 and 12."""
+        return self.six_nodes(boundary_faces(self.corners.tetrahedra))
+
+    def six_nodes(self, triangles: ArrayLike) -> Ints:
+        """Triangles (k, 3) of corners with their midside nodes, (k, 6)."""
+        corners = np.asarray(triangles)
+        sides = np.sort(corners[:, [[0, 1], [0, 2], [1, 2]]], axis=2)
+        return np.concatenate([corners, self._midsides(self.ends, sides)], axis=1).astype(np.int32)
+
+    def inherited(self, members: Bools) -> Bools:
+        """A set of corners (n,) as a set of all nodes (N,), by the rule of `warpbrain.mesh.refinement.inherited`."""
+        return inherited(members, self.ends, self.on_surface)
+
+    def between(self, values: Floats) -> Floats:
+        """Values at corners (n, ...) at all nodes (N, ...): those of midside nodes are the means of their ends."""
+        return np.asarray(values[self.ends].mean(axis=1))
+
+    def at_corners(self, forces: Floats) -> Floats:
+        """Forces (N, 3) as forces on corners (n, 3), half of a midside node's at each end: the same sum and moments."""
+        found = np.zeros((len(self.corners.points), forces.shape[1]))
+        np.add.at(found, self.ends, 0.5 * forces[:, None, :])
+        return found
