@@ -23,6 +23,7 @@ EXAMPLES: dict[str, dict] = {
     "fibres": {"direction": (1.0, 2.0, 0.5), "stiffness": 500.0, "exponent": 2.0, "dispersion": 0.1},
     "falx": {"nodes": "all", "stiffness": 2e3, "thickness": 0.1},
     "cavity": {"elements": "half", "pressure": 150.0, "left": 0.2},
+    "drainage": {"permeability": 1e-9, "pressure": 100.0, "exchange": 1e-6, "capillary_pressure": 300.0},
     "residual-stress": {"tension": 200.0, "direction": (0.0, 1.0, 1.0), "elements": "half"},
 }
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from warpbrain.cli import run_slowly
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -85,6 +86,13 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     motion = parser.add_mutually_exclusive_group()
     motion.add_argument("--steps", type=int, metavar="N", help="follow the motion for N time steps of 1 ms")
     motion.add_argument("--to-rest", action="store_true", help="follow the damped motion until it is at rest")
+    add(
+        "--until",
+        type=float,
+        metavar="SECONDS",
+        help="follow slow change without inertia until then, in --steps steps that grow (default: 20): for drainage "
+        "and viscoelasticity",
+    )
     add(
         "--tolerance",
         type=float,
@@ -199,6 +207,7 @@ def _check(options: argparse.Namespace) -> None:
         raise InputError("--mesh-error: is not known of --elements tet10: expected tet4 or tet4-averaged")
     if options.mesh_error == "elements" and options.elements != "tet4":
         raise InputError(f"--mesh-error elements: {options.elements} do not lock: --mesh-error size says what is left")
+    run_slowly.check(options)
     options.moduli = parse_moduli(options.mu)
     for name, value in (("--sample", options.sample), ("--seed", options.seed)):
         if value is not None and value < 0:
@@ -293,6 +302,8 @@ def _simulate(
     options: argparse.Namespace, system: System, say: Any
 ) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
     """Find the state that the arguments ask for; returns what to report of it, and times and counts by phase."""
+    if options.until is not None:
+        return run_slowly.follow(options, system, say)
     if options.steps is not None:
         return _follow(options, system, say, Progress("motion", options.quiet))
     if options.to_rest:
@@ -471,6 +482,10 @@ def _mesh_error(
 def _subtitle(case: Case, outcome: Mapping[str, Any]) -> str:
     tissues = [(tissue.name, tissue.known_law) for _, tissue in sorted(case.tissues.items())]
     laws = ", ".join(f"{name} {law.name} {law.shear_modulus:g} Pa" for name, law in tissues)
-    state = f"after {1000 * outcome['time_s']:.0f} ms" if outcome["kind"] == "motion" else outcome["kind"]
+    state = outcome["kind"]
+    if state == "motion":
+        state = f"after {1000 * outcome['time_s']:.0f} ms"
+    elif state == "slow change":
+        state = f"after {outcome['time_s']:g} s"
     stand_in = "stand-in, not the patient's images; " if case.origin == "stand-in" else ""
     return f"{stand_in}{laws}; {state}"

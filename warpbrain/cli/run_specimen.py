@@ -98,7 +98,8 @@ def _tests(options: argparse.Namespace, case: Case) -> list[TestRecording]:
         raise InputError(
             f"--mesh-error: {case.path} has a [specimen], which has no one state: compare --elements tet4-averaged"
         )
-    for option, given in (("--steps", options.steps is not None), ("--to-rest", options.to_rest)):
+    motions = {"--steps": options.steps is not None, "--to-rest": options.to_rest, "--until": options.until is not None}
+    for option, given in motions.items():
         if given:
             raise InputError(
                 f"{option}: {case.path} has a [specimen], whose tests are quasi-static: there is no motion"

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -78,6 +79,30 @@ class Body(Protocol):
         """At rest, of each element (m,) [Pa]."""
 
 
+@dataclass(frozen=True)
+class Coupling:
+    """Unknowns `p` of a term's own, one for a node, which follow the displacement: `A p = c - b(u)`.
+
+    Of the forces `-(db/du)^T p`, blocks can hold what they do at the same `p`. That `p` changes with `u` adds
+    `(db/du)^T A^-1 (db/du)`, which is dense: linear solvers take `A` and `db/du` themselves.
+
+    Attributes
+    ----------
+    offsets, columns : wp.array of int
+        Sparse rows; a node without unknown has none.
+    compliance : wp.array
+        `A_ij`, positive definite.
+    own, others : wp.array of vec3
+        `db_i/du_j` and `db_j/du_i`.
+    """
+
+    offsets: wp.array
+    columns: wp.array
+    compliance: wp.array
+    own: wp.array
+    others: wp.array
+
+
 class Term(abc.ABC):
     """A family of stencils with forces, tangent blocks and, if there is one, an energy.
 
@@ -107,6 +132,8 @@ class Term(abc.ABC):
     conservative: bool = True
     #: Shortest time [s] in which it forgets what was; None if it has no memory.
     forgets_in: float | None = None
+    #: Its own unknowns; None if there are none.
+    coupling: Coupling | None = None
 
     def __init__(self, body: Body, stencils: NDArray[np.integer], ramp: Callable[[float], float] | None = None) -> None:
         self.body = body
@@ -141,6 +168,28 @@ class Term(abc.ABC):
 
     def forget(self) -> None:  # noqa: B027
         """Tell a term with a memory that the body is at rest in its reference shape, and always was."""
+
+    @property
+    def coupled(self) -> bool:
+        """Whether its own unknowns follow the displacement in the coming steps."""
+        return self.coupling is not None
+
+    def add_stiffness(  # noqa: B027
+        self, x: wp.array, factor: float, y: wp.array, columns: wp.array, rows: wp.array
+    ) -> None:
+        """Add to `y` a factor times that part of its tangent times `x` which is not in the blocks.
+
+        Parameters
+        ----------
+        x, y : wp.array of vec3, shape (n,)
+        factor : float
+        columns, rows : wp.array of vec3, shape (n,)
+            1 for the components of `x` that count, and for those of `y` that are added to; 0 for others.
+        """
+
+    def nodal_pressures(self) -> dict[str, NDArray[np.float64]]:
+        """Pressures of its own at the nodes (n,) [Pa], by name, where the forces were last evaluated."""
+        return {}
 
     @abc.abstractmethod
     def evaluate_forces(self, u: wp.array) -> None:

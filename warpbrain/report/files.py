@@ -19,8 +19,8 @@ MILLIMETRES = 1000.0
 def write_result(path: Path, result: Result, mesh_error: NDArray[np.float64] | None = None) -> None:
     """Write a result as compressed VTU, coordinates and displacement in mm.
 
-    Point arrays: ``displacement`` [mm], ``reaction`` [N], the node sets and, if it was estimated, ``mesh_error`` [mm]:
-    what is to be added to the displacement. Cell arrays: ``tissue``, ``J``,
+    Point arrays: ``displacement`` [mm], ``reaction`` [N], the node sets, ``fluid_pressure`` [Pa] of drainage and, if it
+    was estimated, ``mesh_error`` [mm]: what is to be added to the displacement. Cell arrays: ``tissue``, ``J``,
     ``principal_stretches`` (descending), ``von_mises`` and ``pressure`` [Pa] of the Cauchy stress.
     """
     import meshio
@@ -35,6 +35,7 @@ def write_result(path: Path, result: Result, mesh_error: NDArray[np.float64] | N
             "displacement": result.u * MILLIMETRES,
             "reaction": result.reactions,
             **({} if mesh_error is None else {"mesh_error": mesh_error * MILLIMETRES}),
+            **result.nodal_pressures,
         },
         cell_data={
             "tissue": [mesh.tissue],

@@ -25,8 +25,7 @@ SET_TITLES = {
 #: What no model of this version holds, said with every run.
 _LEFT_OUT = (
     "unless assumed above: contact with the skull away from the nodes that are fixed; falx and tentorium; pressure of "
-    "fluid in ventricles and cavity; viscosity other than damping; direction of fibres. In any case: flow of fluid "
-    "through tissue"
+    "fluid in ventricles and cavity; viscosity other than damping; direction of fibres; flow of fluid through tissue"
 )
 #: Said of elements that lock. The figures: docs/verification.md.
 _LOCKING = (
@@ -104,6 +103,9 @@ def describe_result(result: Result) -> dict[str, Any]:
         "von_mises_Pa": {"largest": result.von_mises.max()},
         "pressure_Pa": {"smallest": result.pressure.min(), "largest": result.pressure.max()},
         "reaction_N": result.reactions.sum(axis=0),
+        "pressures_at_nodes_Pa": {
+            name: {"smallest": values.min(), "largest": values.max()} for name, values in result.nodal_pressures.items()
+        },
     }
 
 
@@ -150,6 +152,10 @@ def displacement_lines(summary: Mapping[str, Any]) -> list[str]:
         f"  volume ratio J {J['smallest']:.3f} to {J['largest']:.3f}; largest von Mises stress "
         f"{summary['von_mises_Pa']['largest']:.0f} Pa"
     )
+    lines += [
+        f"  {name.replace('_', ' ')} {p['smallest']:.3g} to {p['largest']:.3g} Pa"
+        for name, p in summary["pressures_at_nodes_Pa"].items()
+    ]
     return lines
 
 

@@ -159,8 +159,11 @@ class Simulator:
         scalar = s.precision.scalar
         k, m = h * damping.stiffness + h * h, 1.0 + h * damping.mass
         s.gather_forces()
-        s.assemble(k, m)
+        # damping is that of the skeleton alone: pore fluid damps by itself, and a time does not make it stiffer
+        s.assemble(k, m, coupling=h * h)
         self._cg.multiply(self.v, s.increment)
+        if first:
+            s.add_coupling(self.v, h * h, s.increment)
         along_Av = -1.0 if first else -damping.stiffness / (damping.stiffness + h)
         along_Mv = 0.0 if first else -m - along_Av * m
         wp.launch(
@@ -174,7 +177,8 @@ class Simulator:
         )  # fmt: skip
         if self._moving:
             # later iterations have the motion in v and lack only its share of the damping force
-            s.subtract_constrained_load(self._v_prescribed, k if first else h * damping.stiffness)
+            share = h * damping.stiffness
+            s.subtract_constrained_load(self._v_prescribed, k if first else share, h * h if first else 0.0)
         self._cg.prepare()
 
     def solve_system(self, first: bool = True) -> None:

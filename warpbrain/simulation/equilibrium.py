@@ -146,6 +146,8 @@ class EquilibriumSolver:
     options : EquilibriumOptions
     on_step : callable, optional
         Called with each `NewtonStep` as it is taken.
+    clock : PhaseClock, optional
+        Adds up the wall time by phase.
 
     Attributes
     ----------
@@ -158,11 +160,12 @@ class EquilibriumSolver:
         system: System,
         options: EquilibriumOptions | None = None,
         on_step: Callable[[NewtonStep], None] | None = None,
+        clock: PhaseClock | None = None,
     ) -> None:
         self.system = system
         self.options = options or EquilibriumOptions()
         self._on_step = on_step
-        self.clock = PhaseClock(system.device)
+        self.clock = clock or PhaseClock(system.device)
         self._reference_shift: float | None = None
         self._cg = system.linear_solver(
             tolerance=self.options.cg_tolerance,
@@ -228,24 +231,29 @@ class EquilibriumSolver:
         InputError, SolveError
             As `solve`.
         """
-        require_held(self.system.model)
-        for term in self.system.terms:
-            term.set_time_step(time_step)
-        found = self._follow(np.array(start, dtype=np.float64), self.system.model.external_forces(time), time)
+        found = self.try_step(start, time_step, time)
         self.system.u.assign(found.u)
         for term in self.system.terms:
             term.advance(self.system.u)
         return found
 
+    def try_step(self, start: Floats, time_step: float, time: float = math.inf) -> Equilibrium:
+        """As `step`, but terms with a memory do not take the step into it: what they say is still of its end."""
+        require_held(self.system.model)
+        for term in self.system.terms:
+            term.set_time_step(time_step)
+        return self._follow(np.array(start, dtype=np.float64), self.system.model.external_forces(time), time)
+
     def _follow(self, u: Floats, full: Floats, time: float | None = None) -> Equilibrium:
         """Go from a state to full load; at a time, what acts is all there and only what is prescribed moves."""
         model = self.system.model
         origin = np.where(model.constrained, u, 0.0)
+        prescribed = model.prescribed if time is None else model.prescribed_at(time, 1.0)
         self._history = []
         done, step = 0.0, self.options.max_load_step
         while done < 1.0:
             load = min(1.0, done + step)
-            target = origin + load * (model.prescribed - origin * model.constrained)
+            target = origin + load * (prescribed - origin * model.constrained)
             if time is None:
                 self.system.set_load(load)
             else:

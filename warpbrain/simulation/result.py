@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,8 @@ class Result:
     reactions : (n, 3) array
         What holds the constrained components [N]: their internal forces less the loads that act on them; zero
         elsewhere.
+    nodal_pressures : mapping of str to (n,) array
+        What mechanisms know at the nodes [Pa]: ``fluid_pressure`` of drainage.
 
     Of quadratic elements displacements are those of the mesh's own nodes, strain and stress those in the middle of
     elements, and half of what holds a midside node is at either end of its edge.
@@ -74,6 +76,7 @@ class Result:
     von_mises: Floats
     pressure: Floats
     reactions: Floats
+    nodal_pressures: Mapping[str, Floats] = field(default_factory=dict)
 
     def displacement_statistics(self) -> Mapping[str, Statistics]:
         """Statistics of the displacement by node set, and of all nodes under ``"all nodes"``."""
@@ -132,4 +135,5 @@ def result_of(system: System, time: float = math.inf) -> Result:
         von_mises=np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2))),
         pressure=pressure,
         reactions=reactions,
+        nodal_pressures={name: p for term in system.terms for name, p in term.nodal_pressures().items()},
     )

@@ -92,9 +92,12 @@ class SensitivitySolver:
         Raises
         ------
         SolveError
-            If the equilibrium is unstable, so that it has no derivative, or a linear solve does not converge.
+            If the equilibrium is unstable, so that it has no derivative, or a linear solve does not converge; or if it
+            is that of a step in which unknowns of a term's own follow the displacement.
         """
         system = self.system
+        if any(term.coupled for term in system.terms):
+            raise SolveError("sensitivity: fluid flows in this step, and only a steady state has derivatives yet")
         point = np.asarray(theta, dtype=np.float64)
         constrained = system.model.constrained
         system.u.assign(np.asarray(u, dtype=np.float64))

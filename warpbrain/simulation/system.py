@@ -25,6 +25,7 @@ from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.grown import grown
 from warpbrain.physics.mechanism import Following, Growing, Weakening
 from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, averaged_terms, own_modulus
+from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.pattern import build_pattern
 
@@ -101,6 +102,8 @@ class System:
         Lumped masses [kg] of the tissue that is there.
     terms : list of Term
         What else acts with forces that follow the deformation.
+    coupling_root : wp.array, shape (1,)
+        Root of the factor in the matrix of what of the stiffness is not in blocks.
     seconds : float
         Wall time that the pre-processing took [s].
     """
@@ -125,6 +128,7 @@ class System:
         self._growth_stretch: Floats | float = 1.0
         self.groups = self._group_elements()
         self.terms += [term for group in self.groups for term in group.averaged]
+        self._coupled = [term for term in self.terms if term.coupling is not None]
         self._place_pattern()
         self._place_fields()
         self.set_load()
@@ -249,6 +253,7 @@ class System:
 
         self.u, self.internal, self.external = vectors(), vectors(), vectors()
         self.load, self.solution, self.increment = vectors(), vectors(), vectors()
+        self.coupling_root = wp.ones(1, dtype=p.scalar, device=self.device)
         self.free = self._array(1.0 - self.model.constrained, p.vec3)
         self._all_components = self._array(np.ones((n, 3)), p.vec3)
         self._flat_forces = wp.zeros(len(self.corners), dtype=p.vec3, device=self.device)
@@ -306,9 +311,14 @@ class System:
             self._kernels.gather_forces, self.size, self.corner_first, self.corners, self._flat_forces, self.internal
         )
 
-    def assemble(self, k: float, m: float) -> None:
-        """`matrix = k K + m M` from the element blocks, constrained rows and columns replaced by the identity."""
+    def assemble(self, k: float, m: float, coupling: float | None = None) -> None:
+        """`matrix = k K + m M` from the element blocks, constrained rows and columns replaced by the identity.
+
+        What of `K` is not in blocks counts `coupling` times, `k` times if absent: the linear solver adds it.
+        """
         scalar = self.precision.scalar
+        if self._coupled:
+            self.coupling_root.fill_(math.sqrt(k if coupling is None else coupling))
         self._launch(
             self._kernels.gather_matrix,
             len(self.pairs),
@@ -324,8 +334,20 @@ class System:
             self.matrix.values,
         )
 
-    def subtract_constrained_load(self, increment: wp.array, k: float) -> None:
-        """`load -= k K increment` on the free components, for increments of the constrained ones."""
+    def add_coupling(self, x: wp.array, factor: float, y: wp.array) -> None:
+        """Add to `y` a factor times what of `K x` is not in blocks; constrained components are left out."""
+        for term in self.terms:
+            term.add_stiffness(x, factor, y, self.free, self.free)
+
+    def subtract_constrained_load(self, increment: wp.array, k: float, coupling: float | None = None) -> None:
+        """`load -= k K increment` on the free components, for increments of the constrained ones.
+
+        What of `K` is not in blocks counts `coupling` times, `k` times if absent.
+        """
+        for term in self.terms if coupling != 0.0 else ():
+            term.add_stiffness(
+                increment, -(k if coupling is None else coupling), self.load, self._all_components, self.free
+            )
         self._launch(
             self._kernels.constrained_load,
             self.size,
@@ -342,7 +364,7 @@ class System:
         )
 
     def stiffness_times(self, increment: Floats) -> Floats:
-        """`K increment` [N] on every component, constrained ones included, from the element blocks, shape (n, 3)."""
+        """`K increment` [N] on every component, constrained ones included, shape (n, 3)."""
         self.increment.assign(increment)
         self.load.zero_()
         self._launch(
@@ -359,6 +381,8 @@ class System:
             self.precision.scalar(-1.0),
             self.load,
         )
+        for term in self.terms:
+            term.add_stiffness(self.increment, 1.0, self.load, self._all_components, self._all_components)
         return self.load.numpy().astype(np.float64)
 
     def linear_solver(
@@ -368,9 +392,12 @@ class System:
         max_iterations: int,
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
-    ) -> ConjugateGradient:
-        """Conjugate gradients for ``matrix solution = load``; see `warpbrain.kernels.linear`."""
-        return ConjugateGradient(
+    ) -> LinearSolver:
+        """A solver for ``matrix solution = load``: conjugate gradients (`warpbrain.kernels.linear`).
+
+        Where a term has unknowns of its own: `warpbrain.simulation.coupled`.
+        """
+        conjugate_gradient = ConjugateGradient(
             self.matrix,
             self.diagonal,
             self.load,
@@ -381,10 +408,18 @@ class System:
             preconditioner=preconditioner,
             watch_curvature=watch_curvature,
         )
+        if not self._coupled:
+            return conjugate_gradient
+        # MINRES takes some times the iterations of CG
+        most = 4 * max_iterations
+        return CoupledSolver(self, self._coupled, conjugate_gradient, tolerance=tolerance, max_iterations=most)
 
     def load_kernels(self) -> float:
         """Compile what a run needs, or find it in Warp's cache, at the present state; returns the seconds it took."""
         start = time.perf_counter()
+        # in a step, in which a term may need more than in an equilibrium
+        for term in self.terms:
+            term.set_time_step(1.0)
         self.evaluate_forces()
         self.evaluate_tangents()
         self.gather_forces()
@@ -395,6 +430,8 @@ class System:
         solver.prepare()
         solver.solve()
         self.energy()
+        for term in self.terms:
+            term.set_time_step(math.inf)
         wp.synchronize_device(self.device)
         return time.perf_counter() - start
 

@@ -13,7 +13,8 @@ from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import solve_equilibrium
-from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.model import Damping, Material, Model
+from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
 
 MU = 700.0
@@ -88,7 +89,7 @@ def test_stress_is_the_hereditary_integral_to_second_order(strain, rate):
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
 
 
-def test_the_tangent_of_a_step_is_the_slope_of_its_forces():
+def test_a_step_has_a_potential_and_its_tangent_is_the_slope_of_its_forces():
     system = system_of(Viscoelasticity(moduli=MODULI, times=TIMES))
     random = np.random.default_rng(0)
     u, d = (0.1 * random.uniform(-1.0, 1.0, (system.size, 3)) for _ in range(2))
@@ -97,6 +98,8 @@ def test_the_tangent_of_a_step_is_the_slope_of_its_forces():
     system.u.assign(0.5 * u)
     term.advance(system.u)
     h = 1e-5
+    slope = (energy_at(system, u + h * d) - energy_at(system, u - h * d)) / (2.0 * h)
+    assert np.vdot(forces_at(system, u), d) == pytest.approx(slope, rel=1e-7)
     change = (forces_at(system, u + h * d) - forces_at(system, u - h * d)) / (2.0 * h)
     system.u.assign(u)
     system.evaluate_tangents()
@@ -152,3 +155,24 @@ def test_motion_relaxes_to_the_equilibrium_without_viscosity():
 def test_branches_that_make_no_sense(moduli, times):
     with pytest.raises(InputError, match="expected"):
         Viscoelasticity(moduli=moduli, times=times)
+
+
+def test_slow_change_relaxes_as_motion_does():
+    """Without inertia: the reactions of equilibria at the same times are those of light tissue in motion."""
+    model = replace(held(), density=1e-6, damping=Damping(0.0, 0.0))
+    model = replace(model, mechanisms=(Viscoelasticity(moduli=(3.0,), times=(5.0,)),))
+    top, times = model.prescribed[:, 0] > 0.0, 0.5 * np.arange(1, 9)
+    slow = System(model, "cpu")
+    expected = [moment.state.internal[top, 0].sum() for moment in follow_slowly(slow, times.tolist())]
+    system = System(model, "cpu")
+    simulator = Simulator(system, time_step=0.5, newton=6, tolerance=1e-10)
+    simulator.prescribe(model.prescribed)
+    for reaction in expected:
+        simulator.step()
+        system.evaluate_forces()
+        system.gather_forces()
+        assert system.internal.numpy()[top, 0].sum() == pytest.approx(reaction, rel=1e-5)
+    # nothing but a look at it: the memory is that of the step
+    slow.evaluate_forces()
+    slow.gather_forces()
+    assert slow.internal.numpy()[top, 0].sum() == pytest.approx(expected[-1], rel=1e-9)

@@ -1,0 +1,363 @@
+"""Kernels of a fluid in the pores of linear tetrahedra: its pressure at the nodes, linear in each element.
+
+In an element of reference volume `V` with the gradients `g_a` of its shape functions, at `F` with `J = det F`:
+
+    b_a = V/4 (J - 1)                              fluid that the deformation takes up [m3]
+    H_ab = V k/J (cof F g_a) . (cof F g_b)         flow, Darcy's law in the deformed body [m3/(Pa s)]
+    M_ab = V (1 + delta_ab)/20                     storage and exchange
+    N_ab = V/(2 mu) ((1 + delta_ab)/20 - 1/16)     stabilisation
+
+`J C^-1 = cof F^T cof F / J`. `N` is what White and Borja (2008) add to the rate of storage: the product of what of two
+pressures is not constant in an element (Dohrmann and Bochev 2004). It is zero for a uniform pressure, so no fluid is
+lost, and zero in a steady flow, which has no rate.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warpbrain.kernels.invariants import cofactor
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.tetrahedron import PAIRS, deformation_gradient, store_blocks, store_forces
+
+
+@dataclass(frozen=True)
+class PoreKernels:
+    """Kernels of one precision.
+
+    Attributes
+    ----------
+    compliance : wp.Kernel
+        One thread for an element: the ten entries of its part of `S M + N + h (H + k_c M)`.
+    gather_compliance : wp.Kernel
+        One thread for an entry of the sparse matrix of all nodes; rows and columns of drained nodes are those of the
+        identity.
+    volumes : wp.Kernel
+        One thread for an element: `b_a`, the same for each of its nodes.
+    content : wp.Kernel
+        One thread for a node: the fluid `b + (S M + N) p` around it.
+    supply : wp.Kernel
+        One thread for a node: right-hand side of the pressure beyond that of the drained nodes.
+    forces, tangents : wp.Kernel
+        One thread for an element: forces of the pressure; with tangent blocks and `db/du` of its nodes too.
+    gather_coupling : wp.Kernel
+        One thread for an entry: `db_i/du_j` and `db_j/du_i`, zero for the `b` of drained nodes.
+    taken_up, push : wp.Kernel
+        One thread for a node: `db/du x`, and `y += factor (db/du)^T p`.
+    multiply, invert_diagonal, apply_diagonal : wp.Kernel
+        One thread for a row of a sparse matrix of scalars.
+    """
+
+    compliance: Any
+    gather_compliance: Any
+    volumes: Any
+    content: Any
+    supply: Any
+    forces: Any
+    tangents: Any
+    gather_coupling: Any
+    taken_up: Any
+    push: Any
+    multiply: Any
+    invert_diagonal: Any
+    apply_diagonal: Any
+
+
+#: Place of the entry (a, b) of an element among its ten.
+PLACES = tuple(PAIRS.index((min(a, b), max(a, b))) for a in range(4) for b in range(4))
+
+
+@cache
+def pore_kernels(precision: Precision) -> PoreKernels:
+    """Make (once) the kernels of a precision."""
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = compiled_module(f"pore_{precision.name}")
+    vec16i = wp.types.vector(length=16, dtype=int)
+    places = wp.constant(vec16i(*PLACES))
+
+    @wp.func
+    def shape_gradient(G: mat33, a: int):
+        g = -(G[0] + G[1] + G[2])
+        if a > 0:
+            g = G[a - 1]
+        return g
+
+    @wp.kernel(module=module)
+    def compliance(
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        softness: wp.array[scalar],
+        permeability: scalar,
+        mass: scalar,
+        stabilisation: scalar,
+        flow: scalar,
+        u: wp.array[vec3],
+        out: wp.array2d[scalar],
+    ):
+        t = wp.tid()
+        e = elements[t]
+        G = inverse_edges[e]
+        F = deformation_gradient(u, nodes[e], G)
+        cof = cofactor(F)
+        J = wp.dot(F[0], cof[0])
+        V = volume[t]
+        k = flow * permeability * V / J
+        even = V / scalar(20.0) * (mass + stabilisation * softness[t])
+        less = V / scalar(16.0) * stabilisation * softness[t]
+        for a in range(4):
+            ga = cof * shape_gradient(G, a)
+            for b in range(a, 4):
+                entry = even - less + k * wp.dot(ga, cof * shape_gradient(G, b))
+                if a == b:
+                    entry += even
+                out[t, places[4 * a + b]] = entry
+
+    @wp.kernel(module=module)
+    def gather_compliance(
+        rows: wp.array[int],
+        columns: wp.array[int],
+        first: wp.array[int],
+        contributions: wp.array[int],
+        entries: wp.array2d[scalar],
+        closed: wp.array[scalar],
+        values: wp.array[scalar],
+    ):
+        k = wp.tid()
+        i = rows[k]
+        j = columns[k]
+        total = scalar(0.0)
+        for c in range(first[k], first[k + 1]):
+            which = contributions[c]
+            total += entries[which // 16, places[which % 16]]
+        total *= closed[i] * closed[j]
+        if i == j:
+            total += scalar(1.0) - closed[i]
+        values[k] = total
+
+    @wp.kernel(module=module)
+    def volumes(
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array[scalar],
+    ):
+        t = wp.tid()
+        e = elements[t]
+        F = deformation_gradient(u, nodes[e], inverse_edges[e])
+        # det(I + D) - 1 from the invariants of D: small changes keep their digits in single precision
+        D = F - wp.identity(n=3, dtype=scalar)
+        tr = wp.trace(D)
+        second = scalar(0.5) * (tr * tr - wp.ddot(D, wp.transpose(D)))
+        out[t] = volume[t] / scalar(4.0) * (tr + second + wp.determinant(D))
+
+    @wp.kernel(module=module)
+    def content(
+        corner_first: wp.array[int],
+        corners: wp.array[int],
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        taken: wp.array[scalar],
+        entries: wp.array2d[scalar],
+        beyond: wp.array[scalar],
+        pressure: scalar,
+        scale: wp.array[scalar],
+        out: wp.array[scalar],
+    ):
+        i = wp.tid()
+        total = scalar(0.0)
+        for c in range(corner_first[i], corner_first[i + 1]):
+            t = corners[c] // 4
+            a = corners[c] % 4
+            near = nodes[elements[t]]
+            total += taken[t]
+            for b in range(4):
+                total += entries[t, places[4 * a + b]] * (beyond[near[b]] + pressure * scale[0])
+        out[i] = total
+
+    @wp.kernel(module=module)
+    def supply(
+        corner_first: wp.array[int],
+        corners: wp.array[int],
+        taken: wp.array[scalar],
+        held: wp.array[scalar],
+        lumped: wp.array[scalar],
+        closed: wp.array[scalar],
+        memory: scalar,
+        source: scalar,
+        scale: wp.array[scalar],
+        out: wp.array[scalar],
+    ):
+        i = wp.tid()
+        total = scalar(0.0)
+        for c in range(corner_first[i], corner_first[i + 1]):
+            total += taken[corners[c] // 4]
+        out[i] = closed[i] * (memory * (held[i] - total) + source * scale[0] * lumped[i])
+
+    @wp.func
+    def mean_pressure(near: wp.vec4i, beyond: wp.array[scalar], pressure: scalar):
+        total = beyond[near[0]] + beyond[near[1]] + beyond[near[2]] + beyond[near[3]]
+        return pressure + total / scalar(4.0)
+
+    @wp.kernel(module=module)
+    def forces(
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        beyond: wp.array[scalar],
+        pressure: scalar,
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        element_forces: wp.array2d[vec3],
+    ):
+        t = wp.tid()
+        e = elements[t]
+        G = inverse_edges[e]
+        p = mean_pressure(nodes[e], beyond, pressure * scale[0])
+        store_forces(-p * volume[t] * cofactor(deformation_gradient(u, nodes[e], G)), G, element_forces, t)
+
+    @wp.func
+    def second_derivative(c: vec3, d: vec3):
+        """`g . d(cof F)/dF . h`, times `J`, from `cof F g` and `cof F h`."""
+        return wp.outer(c, d) - wp.outer(d, c)
+
+    @wp.kernel(module=module)
+    def tangents(
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        beyond: wp.array[scalar],
+        pressure: scalar,
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        element_forces: wp.array2d[vec3],
+        element_blocks: wp.array2d[mat33],
+        element_coupling: wp.array2d[vec3],
+    ):
+        t = wp.tid()
+        e = elements[t]
+        G = inverse_edges[e]
+        F = deformation_gradient(u, nodes[e], G)
+        cof = cofactor(F)
+        J = wp.dot(F[0], cof[0])
+        V = volume[t]
+        p = mean_pressure(nodes[e], beyond, pressure * scale[0])
+        store_forces(-p * V * cof, G, element_forces, t)
+        a, b, c = cof * G[0], cof * G[1], cof * G[2]
+        s = -p * V / J
+        zero = mat33()
+        store_blocks(
+            zero,
+            s * second_derivative(a, b),
+            s * second_derivative(a, c),
+            zero,
+            s * second_derivative(b, c),
+            zero,
+            element_blocks,
+            t,
+        )
+        quarter = V / scalar(4.0)
+        element_coupling[t, 0] = -quarter * (a + b + c)
+        element_coupling[t, 1] = quarter * a
+        element_coupling[t, 2] = quarter * b
+        element_coupling[t, 3] = quarter * c
+
+    @wp.kernel(module=module)
+    def gather_coupling(
+        rows: wp.array[int],
+        columns: wp.array[int],
+        first: wp.array[int],
+        contributions: wp.array[int],
+        element_coupling: wp.array2d[vec3],
+        closed: wp.array[scalar],
+        own: wp.array[vec3],
+        others: wp.array[vec3],
+    ):
+        k = wp.tid()
+        total = vec3()
+        other = vec3()
+        for c in range(first[k], first[k + 1]):
+            which = contributions[c]
+            corner = which % 16
+            total += element_coupling[which // 16, corner % 4]
+            other += element_coupling[which // 16, corner // 4]
+        own[k] = closed[rows[k]] * total
+        others[k] = closed[columns[k]] * other
+
+    @wp.kernel(module=module)
+    def taken_up(
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        own: wp.array[vec3],
+        mask: wp.array[vec3],
+        x: wp.array[vec3],
+        out: wp.array[scalar],
+    ):
+        i = wp.tid()
+        total = scalar(0.0)
+        for k in range(offsets[i], offsets[i + 1]):
+            j = columns[k]
+            total += wp.dot(own[k], wp.cw_mul(mask[j], x[j]))
+        out[i] = total
+
+    @wp.kernel(module=module)
+    def push(
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        others: wp.array[vec3],
+        p: wp.array[scalar],
+        factor: scalar,
+        mask: wp.array[vec3],
+        y: wp.array[vec3],
+    ):
+        i = wp.tid()
+        total = vec3()
+        for k in range(offsets[i], offsets[i + 1]):
+            total += p[columns[k]] * others[k]
+        y[i] = y[i] + factor * wp.cw_mul(mask[i], total)
+
+    @wp.kernel(module=module)
+    def multiply(
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        values: wp.array[scalar],
+        x: wp.array[scalar],
+        y: wp.array[scalar],
+    ):
+        i = wp.tid()
+        total = scalar(0.0)
+        for k in range(offsets[i], offsets[i + 1]):
+            total += values[k] * x[columns[k]]
+        y[i] = total
+
+    @wp.kernel(module=module)
+    def invert_diagonal(
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        values: wp.array[scalar],
+        inverse: wp.array[scalar],
+    ):
+        i = wp.tid()
+        # a node outside the pores has no row, and no pressure
+        inverse[i] = scalar(1.0)
+        for k in range(offsets[i], offsets[i + 1]):
+            if columns[k] == i:
+                inverse[i] = scalar(1.0) / values[k]
+
+    @wp.kernel(module=module)
+    def apply_diagonal(inverse: wp.array[scalar], x: wp.array[scalar], y: wp.array[scalar]):
+        i = wp.tid()
+        y[i] = inverse[i] * x[i]
+
+    return PoreKernels(
+        compliance, gather_compliance, volumes, content, supply, forces, tangents, gather_coupling, taken_up, push,
+        multiply, invert_diagonal, apply_diagonal,
+    )  # fmt: skip

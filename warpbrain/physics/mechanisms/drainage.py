@@ -1,0 +1,342 @@
+"""Drainage: fluid in the pores of the tissue carries load until it has flowed away (Biot's consolidation).
+
+The case's own law, with its Poisson ratio, is that of the drained skeleton (`compressibility` says another). The
+pressure `p` of the fluid adds to its stress, and the fluid is kept (Biot 1941; Coussy, Poromechanics, 2004):
+
+    P = P_skeleton - p J F^-T
+    d/dt (J - 1 + S p) = Div(k J F^-1 F^-T Grad p) + k_c (p_c - p)
+
+`k` is the permeability of the deformed tissue, the same in all directions of space, over the viscosity of the fluid;
+`S` its storage, zero where solid and fluid are incompressible; `k_c` lets fluid in or out of the blood, as in oedema or
+under mannitol. On drained faces the pressure is given; through all others nothing flows.
+
+Backward Euler in time, with the flow `H` that belongs to the shape at the beginning of a step. The pressure is linear
+in each element, and for a given displacement the solution of one symmetric system,
+
+    (S M + N + h (H + k_c M)) p = fluid at the beginning - b(u) + h k_c M p_c,     b(u) = what `J - 1` takes up
+
+(`warpbrain.kernels.pore`; `N` stabilises pairs of linear displacement and linear pressure as in White and Borja, CMAME
+197, 2008). So a step has a potential, and its forces are the slope of it. In an equilibrium the flow is steady: the
+pressure is that of the drained faces where nothing is exchanged, and the skeleton carries the load alone.
+
+The ramp, and the share of a load step, multiply both pressures, `pressure` and `capillary_pressure`.
+
+A step shorter than `d^2 / (6 c)`, `d` the size of the elements at a drained face and `c = k (K + 4/3 mu)`, cannot
+follow the pressure there, which overshoots (Vermeer and Verruijt 1981).
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.kernels.minimal_residual import MinimalResidual
+from warpbrain.kernels.pore import pore_kernels
+from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.physics.expectation import LogNormal, Normal
+from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.regions import elements_of
+from warpbrain.physics.term import Body, Coupling, Term
+
+#: Iterations of a solve for the pressure.
+_MAX_ITERATIONS = 20_000
+#: Relative change of a steady pressure that is worth another solve.
+_STEADY = 1e-7
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drainage(Mechanism):
+    """Fluid in the pores of tissue.
+
+    Parameters
+    ----------
+    permeability : float
+        `k` [m4/(N s)].
+    storage : float
+        `S` [1/Pa].
+    drained : str
+        Node set whose faces are open; empty: the whole surface.
+    pressure : float
+        Of the fluid at drained faces [Pa].
+    exchange : float
+        `k_c` [1/(Pa s)].
+    capillary_pressure : float
+        `p_c` [Pa].
+    elements : str
+        Element set that has pores; empty: all.
+    """
+
+    permeability: float = parameter(
+        "Permeability over the viscosity of the fluid.",
+        unit="m4/(N s)",
+        above=0.0,
+        expectation=LogNormal(1e-10, 10.0),
+        typical="1e-11 to 1e-9; fluid moves within 10 min of a change of posture",
+        source="diagnosis design, M9",
+    )
+    storage: float = parameter(
+        "Fluid that a pressure stores without a change of volume; zero if nothing is compressible.",
+        default=0.0,
+        unit="1/Pa",
+        above=-1e-30,
+    )
+    drained: str = parameter(
+        "Node set on whose faces the fluid is free to leave; the whole surface if empty.", default="", kind="node set"
+    )
+    pressure: float = parameter(
+        "Pressure of the fluid at drained faces.", default=0.0, unit="Pa", expectation=Normal(0.0, 500.0)
+    )
+    exchange: float = parameter(
+        "Fluid that comes out of the blood vessels, for each Pa below the capillary pressure.",
+        default=0.0,
+        unit="1/(Pa s)",
+        above=-1e-30,
+    )
+    capillary_pressure: float = parameter(
+        "Pressure at which nothing is exchanged with the blood vessels; lower under mannitol, higher in oedema.",
+        default=0.0,
+        unit="Pa",
+        expectation=Normal(0.0, 1000.0),
+    )
+    elements: str = parameter("Element set that has pores; all if empty.", default="", kind="element set")
+    kind: ClassVar[str] = "drainage"
+    sentence: ClassVar[str] = "Fluid in the tissue carries load at first, and flows away over minutes."
+    confused_with: ClassVar[tuple[str, ...]] = ("viscoelasticity", "compressibility", "swelling")
+    needs: ClassVar[tuple[str, ...]] = ("two times or more", "a change of volume, or bodies of two sizes")
+
+    def check(self, mesh: TetMesh) -> None:
+        super().check(mesh)
+        if not self.open_nodes(mesh).any() and self.exchange <= 0.0:
+            name = f"node set '{self.drained}'" if self.drained else "the surface"
+            raise ParameterError("drained", f"{name} holds no face of the tissue with pores: its fluid could not leave")
+
+    def open_nodes(self, mesh: TetMesh) -> NDArray[np.bool_]:
+        """Nodes (n,) at which the pressure of the fluid is given: of the drained faces of elements with pores."""
+        faces = boundary_faces(mesh.tetrahedra)
+        if self.drained:
+            faces = faces[mesh.node_sets[self.drained][faces].all(axis=1)]
+        nodes = np.zeros(len(mesh.points), dtype=bool)
+        nodes[faces] = True
+        porous = np.zeros(len(mesh.points), dtype=bool)
+        porous[mesh.tetrahedra[elements_of(mesh, self.elements)]] = True
+        return nodes & porous
+
+    def bind(self, body: Body) -> "DrainageTerm":
+        """See `warpbrain.physics.term.Following`."""
+        return DrainageTerm(body, self)
+
+
+class DrainageTerm(Term):
+    """`Drainage` on a device, with the fluid that it remembers.
+
+    The pressure is held as that of the drained nodes and what is `beyond` it, zero there.
+
+    Attributes
+    ----------
+    softness : wp.array, shape (k,)
+        `1/(2 mu)` of each element [1/Pa], of the stabilisation.
+    """
+
+    coupling: Coupling
+
+    def __init__(self, body: Body, mechanism: Drainage) -> None:
+        elements = elements_of(body.mesh, mechanism.elements)
+        super().__init__(body, body.tetrahedra[elements], mechanism.factor)
+        self.mechanism = mechanism
+        self._kernels = pore_kernels(body.precision)
+        scalar, vec3 = body.precision.scalar, body.precision.vec3
+        size, count = len(body.mesh.points), len(elements)
+        volumes = body.mesh.volumes[elements]
+        self._elements = self.array(elements, int)
+        self._volume = self.array(volumes, scalar)
+        self.softness = self.array(0.5 / body.shear_moduli[elements], scalar)
+        self._closed = self.array(~mechanism.open_nodes(body.mesh), scalar)
+        lumped = np.bincount(self.stencils.ravel(), np.repeat(0.25 * volumes, 4), minlength=size)
+        self._lumped = self.array(lumped, scalar)
+        self._place_rows(size)
+
+        def zeros(*shape: int, dtype: object = scalar) -> wp.array:
+            return wp.zeros(shape, dtype=dtype, device=body.device)
+
+        self._storage, self._entries = zeros(count, 10), zeros(count, 10)
+        self._element_coupling = zeros(count, 4, dtype=vec3)
+        self._taken, self._held, self._diagonal = zeros(count), zeros(size), zeros(size)
+        self._shape = zeros(size, dtype=vec3)
+        entries = len(self._rows)
+        self.coupling = Coupling(
+            self._offsets, self._columns, zeros(entries), zeros(entries, dtype=vec3), zeros(entries, dtype=vec3)
+        )
+        self._h = np.inf
+        solvers = (
+            MinimalResidual(
+                size, scalar, body.precision, body.device, operator=self._multiply, preconditioner=self._precondition,
+                max_iterations=_MAX_ITERATIONS,
+            )
+            for _ in range(2)
+        )  # fmt: skip
+        # of the pressure, which begins with the last one, and of changes of it
+        self._solver, self._change = solvers
+        self._beyond = self._solver.x
+        self._tolerance = max(1e-12, 20.0 * body.precision.epsilon)
+        self._storage_entries()
+        self._renew()
+
+    def _place_rows(self, size: int) -> None:
+        """Sparse rows over the nodes, and who contributes to each entry: `16 e + 4 a + b` for node pairs (a, b)."""
+        nodes = self.stencils.astype(np.int64)
+        key = (nodes[:, :, None] * size + nodes[:, None, :]).ravel()
+        contributions = np.argsort(key, kind="stable")
+        key = key[contributions]
+        first = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
+        rows, columns = np.divmod(key[first], size)
+        self._rows, self._columns = self.array(rows, int), self.array(columns, int)
+        self._offsets = self.array(np.searchsorted(rows, np.arange(size + 1)), int)
+        self._first = self.array(np.r_[first, len(key)], int)
+        self._contributions = self.array(contributions, int)
+        corners = np.argsort(nodes.ravel(), kind="stable")
+        self._corner_first = self.array(np.searchsorted(nodes.ravel()[corners], np.arange(size + 1)), int)
+        self._corners = self.array(corners, int)
+
+    # -- the pressure's system ------------------------------------------------------------------------------------
+
+    def _launch(self, kernel: object, dim: int, *inputs: object) -> None:
+        wp.launch(kernel, dim=dim, inputs=list(inputs), device=self.body.device)
+
+    @property
+    def _geometry(self) -> tuple[wp.array, ...]:
+        return (self._elements, self.body.nodes, self.body.inverse_edges, self._volume)
+
+    def _multiply(self, x: wp.array, y: wp.array) -> None:
+        coupling = self.coupling
+        inputs = (coupling.offsets, coupling.columns, coupling.compliance)
+        self._launch(self._kernels.multiply, len(x), *inputs, x, y)
+
+    def _precondition(self, x: wp.array, y: wp.array) -> None:
+        self._launch(self._kernels.apply_diagonal, len(x), self._diagonal, x, y)
+
+    def _element_compliance(self, mass: float, stabilisation: float, flow: float, out: wp.array) -> None:
+        scalar = self.body.precision.scalar
+        self._launch(
+            self._kernels.compliance, len(self.stencils), *self._geometry, self.softness,
+            scalar(self.mechanism.permeability), scalar(mass), scalar(stabilisation), scalar(flow), self._shape, out,
+        )  # fmt: skip
+
+    def _storage_entries(self) -> None:
+        self._element_compliance(self.mechanism.storage, 1.0, 0.0, self._storage)
+
+    def _renew(self) -> None:
+        """`A`, for the time step and the shape at the beginning of it."""
+        steady, m = not self.coupled, self.mechanism
+        mass = m.exchange if steady else m.storage + self._h * m.exchange
+        self._element_compliance(mass, 0.0 if steady else 1.0, 1.0 if steady else self._h, self._entries)
+        self._launch(
+            self._kernels.gather_compliance, len(self._rows), self._rows, self._columns, self._first,
+            self._contributions, self._entries, self._closed, self.coupling.compliance,
+        )  # fmt: skip
+        inputs = (self.coupling.offsets, self.coupling.columns, self.coupling.compliance)
+        self._launch(self._kernels.invert_diagonal, len(self._diagonal), *inputs, self._diagonal)
+
+    def _solve(self, u: wp.array) -> None:
+        """The pressure at a displacement."""
+        scalar, m, steady = self.body.precision.scalar, self.mechanism, not self.coupled
+        self._launch(self._kernels.volumes, len(self.stencils), *self._geometry, u, self._taken)
+        exchanged = m.exchange * (m.capillary_pressure - m.pressure)
+        source = exchanged if steady else self._h * exchanged - m.storage * m.pressure
+        self._launch(
+            self._kernels.supply, len(self._held), self._corner_first, self._corners, self._taken, self._held,
+            self._lumped, self._closed, scalar(0.0 if steady else 1.0), scalar(source), self.scale, self._solver.b,
+        )  # fmt: skip
+        self._solver.solve(self._tolerance)
+
+    def pressures(self) -> NDArray[np.float64]:
+        """Pressure of the fluid at the nodes (n,) [Pa], at the displacement of the last evaluation.
+
+        Zero where there are no pores.
+        """
+        base = self.mechanism.pressure * float(self.scale.numpy()[0])
+        found = base + self._beyond.numpy().astype(np.float64)
+        return np.where(self._lumped.numpy() > 0.0, found, 0.0)
+
+    def nodal_pressures(self) -> dict[str, NDArray[np.float64]]:
+        return {"fluid_pressure": self.pressures()}
+
+    # -- memory ---------------------------------------------------------------------------------------------------
+
+    @property
+    def coupled(self) -> bool:
+        return bool(np.isfinite(self._h))
+
+    def set_time_step(self, h: float) -> None:
+        if h != self._h:
+            self._h = h
+            self._renew()
+
+    def advance(self, u: wp.array) -> None:
+        self._solve(u)
+        scalar = self.body.precision.scalar
+        self._launch(
+            self._kernels.content, len(self._held), self._corner_first, self._corners, self._elements,
+            self.body.nodes, self._taken, self._storage, self._beyond, scalar(self.mechanism.pressure), self.scale,
+            self._held,
+        )  # fmt: skip
+        wp.copy(self._shape, u)
+        self._renew()
+
+    def forget(self) -> None:
+        self._held.zero_()
+        self._shape.zero_()
+        self._beyond.zero_()
+        self._renew()
+
+    def augment(self, u: wp.array) -> bool:
+        if self.coupled:
+            return False
+        # a steady flow is that of the deformed shape
+        before = self.pressures()
+        wp.copy(self._shape, u)
+        self._renew()
+        self._solve(u)
+        after = self.pressures()
+        return bool(np.abs(after - before).max() > _STEADY * np.abs(after).max())
+
+    # -- forces ---------------------------------------------------------------------------------------------------
+
+    def _act(self, kernel: object, u: wp.array, *outputs: wp.array) -> None:
+        pressure = self.body.precision.scalar(self.mechanism.pressure)
+        self._launch(kernel, len(self.stencils), *self._geometry, self._beyond, pressure, self.scale, u, *outputs)
+
+    def evaluate_forces(self, u: wp.array) -> None:
+        self._solve(u)
+        self._act(self._kernels.forces, u, self.forces)
+
+    def evaluate_tangents(self, u: wp.array) -> None:
+        self._solve(u)
+        self._act(self._kernels.tangents, u, self.forces, self.blocks, self._element_coupling)
+        coupling = self.coupling
+        self._launch(
+            self._kernels.gather_coupling, len(self._rows), self._rows, self._columns, self._first,
+            self._contributions, self._element_coupling, self._closed, coupling.own, coupling.others,
+        )  # fmt: skip
+
+    def add_stiffness(self, x: wp.array, factor: float, y: wp.array, columns: wp.array, rows: wp.array) -> None:
+        if not self.coupled:
+            return
+        coupling, n = self.coupling, len(self._held)
+        sparse = (coupling.offsets, coupling.columns)
+        self._launch(self._kernels.taken_up, n, *sparse, coupling.own, columns, x, self._change.b)
+        self._change.x.zero_()
+        self._change.solve(self._tolerance)
+        number = self.body.precision.scalar(factor)
+        self._launch(self._kernels.push, n, *sparse, coupling.others, self._change.x, number, rows, y)
+
+    def energy(self, u: wp.array) -> float:
+        self._solve(u)
+        beyond, taken = self._beyond.numpy().astype(np.float64), self._taken.numpy().astype(np.float64)
+        base = self.mechanism.pressure * float(self.scale.numpy()[0])
+        if self.coupled:
+            own = 0.5 * float(beyond @ self._solver.b.numpy().astype(np.float64))
+        else:
+            own = -float(taken @ beyond[self.stencils].sum(axis=1))
+        return own - 4.0 * base * float(taken.sum())

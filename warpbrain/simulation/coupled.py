@@ -1,0 +1,160 @@
+"""Linear systems with unknowns of a term's own: the pressure of pore fluid beside the displacement.
+
+To eliminate `p` from `A p = -(db/du) d` leaves a dense matrix, `K + w B^T A^-1 B` with `B = db/du`. Both together are
+sparse, and symmetric:
+
+    [      K       -sqrt(w) B^T ] [ d ]   [ r ]
+    [ -sqrt(w) B        -A      ] [ p ] = [ 0 ]
+
+but indefinite: MINRES (`warpbrain.kernels.minimal_residual`), preconditioned by the inverse diagonal blocks of `K` and
+the diagonal of `A + w B diag(K)^-1 B^T`. `A` is next to nothing where fluid has no time to flow; what is left of the
+second row is a force many times larger. So a solve ends only when the residual of the eliminated system is small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import warp as wp
+
+from warpbrain.kernels.coupled import coupled_kernels
+from warpbrain.kernels.linear import ConjugateGradient, LinearResult
+from warpbrain.kernels.minimal_residual import MinimalResidual, four_vector
+from warpbrain.physics.term import Term
+
+if TYPE_CHECKING:
+    from warpbrain.simulation.system import System
+
+#: What MINRES is asked for, relative to what is asked of the solve, in the first place; and how often it may go on.
+_FIRST, _ROUNDS = 0.3, 6
+
+
+class LinearSolver(Protocol):
+    """What solves the system's linear systems."""
+
+    def multiply(self, x: wp.array, z: wp.array) -> None:
+        """`z = A x` of what is in the matrix."""
+
+    def prepare(self) -> None:
+        """Take notice of new values of the matrix."""
+
+    def solve(self, tolerance: float | None = None) -> None:
+        """Solve, from the present content of the solution array if that helps."""
+
+    def result(self) -> LinearResult:
+        """How the last solve ended."""
+
+
+class CoupledSolver:
+    """Solves the system's matrix together with what a term adds to it.
+
+    Parameters
+    ----------
+    system : System
+    terms : sequence of Term
+        Those with unknowns of their own: one.
+    conjugate_gradient : ConjugateGradient
+        For times when these do not follow the displacement.
+    tolerance : float
+        Relative.
+    max_iterations : int
+    """
+
+    def __init__(
+        self,
+        system: System,
+        terms: Sequence[Term],
+        conjugate_gradient: ConjugateGradient,
+        *,
+        tolerance: float,
+        max_iterations: int,
+    ) -> None:
+        [self._term] = terms
+        self._system, self._plain = system, conjugate_gradient
+        self._tolerance = tolerance
+        p, n, device = system.precision, system.size, system.device
+        self._kernels = coupled_kernels(p)
+        self._inverse = wp.zeros(n, dtype=p.mat33, device=device)
+        self._diagonal = wp.zeros(n, dtype=p.scalar, device=device)
+        self._product = wp.zeros(n, dtype=p.vec3, device=device)
+        self._solver = MinimalResidual(
+            n, four_vector(p), p, device,
+            operator=self._multiply, preconditioner=self._precondition, max_iterations=max_iterations,
+        )  # fmt: skip
+        self._result: LinearResult | None = None
+
+    def _launch(self, kernel: object, *inputs: object) -> None:
+        wp.launch(kernel, dim=self._system.size, inputs=list(inputs), device=self._system.device)
+
+    def _multiply(self, x: wp.array, y: wp.array) -> None:
+        s, c = self._system, self._term.coupling
+        assert c is not None
+        self._launch(
+            self._kernels.multiply, s.matrix.offsets, s.matrix.columns, s.matrix.values, c.offsets, c.columns,
+            c.compliance, c.own, c.others, s.free, s.coupling_root, x, y,
+        )  # fmt: skip
+
+    def _precondition(self, x: wp.array, y: wp.array) -> None:
+        self._launch(self._kernels.apply_diagonal, self._inverse, self._diagonal, x, y)
+
+    def multiply(self, x: wp.array, z: wp.array) -> None:
+        """See `LinearSolver`."""
+        self._plain.multiply(x, z)
+
+    def prepare(self) -> None:
+        """See `LinearSolver`."""
+        if not self._term.coupled:
+            self._plain.prepare()
+            return
+        s, c = self._system, self._term.coupling
+        assert c is not None
+        self._launch(self._kernels.invert_diagonal, s.diagonal, s.matrix.values, self._inverse)
+        self._launch(
+            self._kernels.invert_coupled_diagonal, c.offsets, c.columns, c.compliance, c.own, s.free, s.coupling_root,
+            self._inverse, self._diagonal,
+        )  # fmt: skip
+
+    def solve(self, tolerance: float | None = None) -> None:
+        """See `LinearSolver`; begins with zero, for a guess of the displacement alone is none for both."""
+        self._result = None
+        if not self._term.coupled:
+            self._plain.solve(tolerance)
+            return
+        s = self._system
+        wanted = self._tolerance if tolerance is None else tolerance
+        self._launch(self._kernels.pack, s.load, self._solver.b)
+        self._solver.x.zero_()
+        tighter, iterations = _FIRST, 0
+        for _ in range(1 if s.device.is_capturing else _ROUNDS):
+            self._solver.solve(tighter * wanted)
+            self._launch(self._kernels.unpack, self._solver.x, s.solution)
+            if s.device.is_capturing:
+                return
+            steps, _, _ = self._solver.result()
+            iterations += steps
+            self._result = self._look(iterations, wanted)
+            if self._result.converged or steps == 0 or not np.isfinite(self._result.residual):
+                break
+            tighter *= 0.3 * self._result.tolerance / self._result.residual
+
+    def _look(self, iterations: int, wanted: float) -> LinearResult:
+        """The residual of the eliminated system, and the curvature along the solution."""
+        s = self._system
+        self._plain.multiply(s.solution, self._product)
+        root = float(s.coupling_root.numpy()[0])
+        s.add_coupling(s.solution, root * root, self._product)
+        load, product = s.load.numpy().astype(np.float64), self._product.numpy().astype(np.float64)
+        solution = s.solution.numpy().astype(np.float64)
+        along = float(np.vdot(solution, solution))
+        curvature = float(np.vdot(solution, product)) / along if along > 0.0 else float("nan")
+        residual = float(np.linalg.norm(load - product))
+        return LinearResult(iterations, residual, wanted * float(np.linalg.norm(load)), curvature)
+
+    def result(self) -> LinearResult:
+        """See `LinearSolver`."""
+        if not self._term.coupled:
+            return self._plain.result()
+        # of a captured solve there is nothing but what it left
+        return self._result or self._look(self._solver.result()[0], self._tolerance)

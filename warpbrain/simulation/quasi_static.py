@@ -1,0 +1,133 @@
+"""Slow change: equilibrium at each of a series of times, for tissue that remembers, with inertia left out.
+
+Over minutes a brain is in equilibrium at every moment, while its stress relaxes and its fluid flows away. Every term
+takes the step as its own rule says (backward Euler, or of second order); a step in which Newton's method finds no way
+is halved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError, SolveError
+from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver, NewtonStep
+from warpbrain.simulation.held import require_held
+from warpbrain.simulation.phase_clock import PhaseClock
+from warpbrain.simulation.system import System
+
+#: How often a step is halved before the run gives up.
+_HALVINGS = 6
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The state at one of the times.
+
+    Attributes
+    ----------
+    time : float
+        [s]
+    state : Equilibrium
+        Its history is that of the last step alone.
+    steps : int
+        Steps since the time before; more than one where a step was halved.
+    """
+
+    time: float
+    state: Equilibrium
+    steps: int
+
+    @property
+    def largest(self) -> float:
+        """Displacement of the node that moved farthest [m]."""
+        return float(np.linalg.norm(self.state.u, axis=1).max())
+
+    @property
+    def min_J(self) -> float:
+        """Smallest volume ratio of an element; 1 where nothing moved."""
+        return self.state.history[-1].min_J if self.state.history else 1.0
+
+
+def growing_times(end: float, count: int) -> list[float]:
+    """Times [s] up to an end with steps that grow evenly: what flows or relaxes is fast at first, and slower later."""
+    return [end * (k / count) ** 2 for k in range(1, count + 1)]
+
+
+def follow_slowly(
+    system: System,
+    times: Sequence[float],
+    options: EquilibriumOptions | None = None,
+    on_step: Callable[[NewtonStep], None] | None = None,
+    clock: PhaseClock | None = None,
+) -> Iterator[Moment]:
+    """Equilibria at a series of times, from rest at the time 0.
+
+    What acts without a ramp of its own is there from the first step on.
+
+    Parameters
+    ----------
+    system : System
+    times : sequence of float
+        [s], positive and increasing.
+    options : EquilibriumOptions
+        Its load steps share what is prescribed within a step.
+    on_step : callable, optional
+        Called with each `NewtonStep`.
+    clock : PhaseClock, optional
+        Adds up the wall time by phase.
+
+    Yields
+    ------
+    Moment
+        As soon as it is reached: the system has its displacement, and its terms are at the end of the step.
+
+    Raises
+    ------
+    InputError
+        If the times do not increase from 0, or nothing holds the body.
+    SolveError
+        If no equilibrium is found: when, where and why.
+    """
+    series = np.asarray(times, dtype=np.float64)
+    if (
+        series.ndim != 1
+        or not len(series)
+        or not np.all(np.isfinite(series))
+        or np.any(np.diff(series, prepend=0) <= 0)
+    ):
+        raise InputError(f"times = {list(times)} s: expected positive numbers that increase")
+    require_held(system.model)
+    solver = EquilibriumSolver(system, options, on_step, clock)
+    for term in system.terms:
+        term.forget()
+    u, now, pending = np.zeros(system.model.mesh.points.shape), 0.0, False
+    for time in series.tolist():
+        step, taken = time - now, 0
+        while now < time:
+            if pending:
+                # only now is it known that nobody looks at the state before any more
+                _advance(system, u)
+            pending = False
+            # the last step ends at the time itself, whatever the rounding
+            end = time if now + 1.5 * step > time else now + step
+            try:
+                state = solver.try_step(u, end - now, end)
+            except SolveError:
+                step *= 0.5
+                if step < (time - now) * 0.5**_HALVINGS:
+                    raise
+                continue
+            u, now, taken, pending = state.u, end, taken + 1, True
+        system.u.assign(u)
+        yield Moment(time, state, taken)
+
+
+def _advance(system: System, u: NDArray[np.float64]) -> None:
+    """Let terms with a memory keep what they need of a step that stands."""
+    system.u.assign(u)
+    for term in system.terms:
+        term.advance(system.u)
