@@ -33,7 +33,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "run",
         help="simulate a case",
         description="Simulates a case and writes result.vtu, summary.json, deformation.png and comparison.csv. "
-        "Without --steps or --to-rest it finds the static equilibrium.",
+        "Without --steps, --to-rest or --until it finds the static equilibrium.",
     )
     add = parser.add_argument
     add(

@@ -25,6 +25,8 @@ def check(options: argparse.Namespace) -> None:
         raise InputError(f"--until {options.until:g}: expected a positive number of seconds")
     if options.to_rest:
         raise InputError(f"--until {options.until:g}: means nothing with --to-rest")
+    if options.mesh_error is not None:
+        raise InputError(f"--until {options.until:g}: the error of the mesh is not estimated for slow change yet")
 
 
 def follow(
