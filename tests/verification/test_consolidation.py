@@ -16,8 +16,8 @@ from shapes import box
 
 from warpbrain.mesh import TetMesh, boundary_faces, node_areas
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.load import Load
 from warpbrain.physics.mechanisms.drainage import Drainage, DrainageTerm
-from warpbrain.physics.ramp import Ramped
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.model import Damping, Material, Model, Motion
 from warpbrain.simulation.quasi_static import follow_slowly
@@ -49,7 +49,7 @@ MANDEL = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cover(Ramped):
+class Cover(Load):
     """A dead force for each area [Pa], downwards, on the last face along an axis."""
 
     value: float
