@@ -1,7 +1,8 @@
 """Derivatives of an equilibrium by its laws, against equilibria beside it, and identities that they obey."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,34 +54,34 @@ def body(laws: list[Law], formulation: str, load: str, poisson: float = 0.45) ->
     return Model(mesh, materials, 1000.0, constrained, prescribed, loads)
 
 
-def in_coordinates(model: Model) -> tuple[Callable[[Floats], Mapping[int, Material]], Floats]:
-    """Materials by the coordinates of all tissues, and the coordinates they have."""
+def in_coordinates(model: Model) -> tuple[Callable[[Floats], Model], Floats]:
+    """Models by the coordinates of all tissues, and the coordinates they have."""
     each = {label: to_coordinates(material.law) for label, material in model.materials.items()}
 
-    def materials(theta: Floats) -> dict[int, Material]:
+    def models(theta: Floats) -> Model:
         found, at = {}, 0
         for label, old in model.materials.items():
             count = len(each[label])
             law = from_coordinates(old.law.name, theta[at : at + count].tolist())
             found[label] = Material(law, old.poisson, old.formulation)
             at += count
-        return found
+        return replace(model, materials=found)
 
-    return materials, np.concatenate([each[label] for label in model.materials])
+    return models, np.concatenate([each[label] for label in model.materials])
 
 
 def relative(found: Floats, expected: Floats) -> float:
     return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
 
 
-def differences(system: System, materials: Callable, theta: Floats, k: int, step: float) -> tuple[Floats, Floats]:
+def differences(system: System, models: Callable, theta: Floats, k: int, step: float) -> tuple[Floats, Floats]:
     """`du/dtheta_k` and `dR/dtheta_k` by five-point differences of equilibria."""
     solver = EquilibriumSolver(system, TIGHT)
     u, reactions = 0.0, 0.0
     for distance, weight in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0)):
         beside = theta.copy()
         beside[k] += distance * step
-        system.set_materials(materials(beside))
+        system.set_model(models(beside))
         found = solver.solve()
         u = u + weight * found.u
         reactions = reactions + weight * result_of(system).reactions
@@ -94,18 +95,18 @@ def differences(system: System, materials: Callable, theta: Floats, k: int, step
 def test_against_equilibria_beside(tissues: int, law: str, formulation: str, load: str, device: str) -> None:
     laws = [LAWS[law], LAWS[law].scaled_to(2500.0)][:tissues]
     model = body(laws, formulation, load)
-    materials, theta = in_coordinates(model)
+    models, theta = in_coordinates(model)
     system = System(model, device)
     equilibrium = solve_equilibrium(system, TIGHT)
-    found = sensitivities(system, equilibrium, materials, theta)
+    found = sensitivities(system, equilibrium, models, theta)
     assert found.u.shape == found.reactions.shape == (len(theta), len(model.mesh.points), 3)
     assert not found.u[:, model.constrained].any() and not found.reactions[:, ~model.constrained].any()
     for k in range(len(theta)):
-        du, dR = differences(system, materials, theta, k, 2e-3)
+        du, dR = differences(system, models, theta, k, 2e-3)
         if tissues == 1 and k == 0 and load == "displaced":
             # one modulus and no force: nothing moves, all forces are in proportion
             assert np.abs(found.u[k]).max() <= 1e-9 * np.abs(equilibrium.u).max()
-            system.set_materials(materials(theta))
+            system.set_model(models(theta))
             assert relative(found.reactions[k], forces_at(system, equilibrium.u) * model.constrained) < 1e-9
         else:
             assert relative(found.u[k], du) < 1e-6
@@ -115,11 +116,11 @@ def test_against_equilibria_beside(tissues: int, law: str, formulation: str, loa
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_laws_may_differ(formulation: str, device: str) -> None:
     model = body([NeoHookean(800.0), MooneyRivlin(200.0, 300.0), Ogden((-300.0,), (-6.0,))], formulation, "gravity")
-    materials, theta = in_coordinates(model)
+    models, theta = in_coordinates(model)
     system = System(model, device)
-    found = sensitivities(system, solve_equilibrium(system, TIGHT), materials, theta)
+    found = sensitivities(system, solve_equilibrium(system, TIGHT), models, theta)
     for k in range(len(theta)):
-        assert relative(found.u[k], differences(system, materials, theta, k, 2e-3)[0]) < 1e-6
+        assert relative(found.u[k], differences(system, models, theta, k, 2e-3)[0]) < 1e-6
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
@@ -127,10 +128,10 @@ def test_laws_may_differ(formulation: str, device: str) -> None:
 def test_all_moduli_together_move_nothing_where_displacements_do_it_all(law: str, formulation: str) -> None:
     """Forces scale, positions do not: absolute moduli cannot be told from positions."""
     model = body([LAWS[law], LAWS[law].scaled_to(3000.0)], formulation, "displaced")
-    materials, theta = in_coordinates(model)
+    models, theta = in_coordinates(model)
     system = System(model, "cpu")
     equilibrium = solve_equilibrium(system, TIGHT)
-    found = sensitivities(system, equilibrium, materials, theta)
+    found = sensitivities(system, equilibrium, models, theta)
     moduli = [0, len(theta) // 2]
     together = found.u[moduli].sum(axis=0)
     assert np.linalg.norm(together) < 1e-8 * np.linalg.norm(found.u[0])
@@ -141,34 +142,34 @@ def test_all_moduli_together_move_nothing_where_displacements_do_it_all(law: str
 def test_under_small_dead_loads_displacement_falls_as_the_modulus_rises(device: str) -> None:
     """Linear elasticity: `u ~ 1 / mu`, so `du/d ln mu = -u`."""
     model = body([NeoHookean(1e9)], "coupled", "gravity")
-    materials, theta = in_coordinates(model)
+    models, theta = in_coordinates(model)
     system = System(model, device)
     equilibrium = solve_equilibrium(system, TIGHT)
-    assert relative(sensitivities(system, equilibrium, materials, theta).u[0], -equilibrium.u) < 1e-5
+    assert relative(sensitivities(system, equilibrium, models, theta).u[0], -equilibrium.u) < 1e-5
 
 
 def test_single_precision_is_what_it_can_be(device: str) -> None:
     model = body([NeoHookean(1000.0), NeoHookean(3000.0)], "coupled", "gravity")
-    materials, theta = in_coordinates(model)
+    models, theta = in_coordinates(model)
     exact = System(model, device)
-    expected = sensitivities(exact, solve_equilibrium(exact, TIGHT), materials, theta)
+    expected = sensitivities(exact, solve_equilibrium(exact, TIGHT), models, theta)
     single = System(model, device, "single")
-    found = sensitivities(single, solve_equilibrium(single), materials, theta)
+    found = sensitivities(single, solve_equilibrium(single), models, theta)
     assert relative(found.u, expected.u) < 2e-3
 
 
 def test_a_solver_serves_many_states(device: str) -> None:
     """Another state, then the first again: the same bits, and the system left at that state."""
     model = body([LAWS["ogden"]], "coupled", "gravity")
-    materials, theta = in_coordinates(model)
+    models, theta = in_coordinates(model)
     system = System(model, device)
     solver = SensitivitySolver(system)
     u = solve_equilibrium(system, TIGHT).u
-    first = solver.solve(u, materials, theta)
-    system.set_materials(materials(theta + 0.3))
+    first = solver.solve(u, models, theta)
+    system.set_model(models(theta + 0.3))
     other = solve_equilibrium(system, TIGHT).u
-    assert relative(solver.solve(other, materials, theta + 0.3).u, first.u) > 1e-2
-    again = solver.solve(u, materials, theta)
+    assert relative(solver.solve(other, models, theta + 0.3).u, first.u) > 1e-2
+    again = solver.solve(u, models, theta)
     np.testing.assert_array_equal(again.u, first.u)
     np.testing.assert_array_equal(system.u.numpy(), u)
     assert system.model.materials[1].law.shear_modulus == pytest.approx(1000.0)
@@ -178,20 +179,21 @@ def test_an_unstable_state_has_no_derivative() -> None:
     """A column pressed far beyond its buckling load, kept straight by its symmetry."""
     model = body([NeoHookean(1000.0)], "coupled", "displaced")
     squeezed = model.mesh.points * np.array([0.0, 0.0, -0.65])
-    materials, theta = in_coordinates(model)
     constrained = np.repeat(model.mesh.points[:, 2:] < 1e-9, 3, axis=1)
-    system = System(Model(model.mesh, model.materials, 1000.0, constrained), "cpu")
+    model = Model(model.mesh, model.materials, 1000.0, constrained)
+    models, theta = in_coordinates(model)
+    system = System(model, "cpu")
     with pytest.raises(SolveError, match="unstable"):
-        SensitivitySolver(system).solve(squeezed, materials, theta)
+        SensitivitySolver(system).solve(squeezed, models, theta)
 
 
 def test_a_solve_that_does_not_converge_is_an_error() -> None:
     model = body([NeoHookean(1000.0)], "coupled", "gravity")
-    materials, theta = in_coordinates(model)
+    models, theta = in_coordinates(model)
     system = System(model, "cpu")
     u = solve_equilibrium(system).u
     with pytest.raises(SolveError, match="did not converge in 16 iterations"):
-        SensitivitySolver(system, max_cg=3).solve(u, materials, theta)
+        SensitivitySolver(system, max_cg=3).solve(u, models, theta)
 
 
 # -- other parameters in a system that is already there -------------------------------------------------------------

@@ -17,6 +17,9 @@ from warpbrain.ensemble.resting import Resting
 from warpbrain.ensemble.sample import Outcome, Sample
 from warpbrain.ensemble.stepping import step_samples
 from warpbrain.errors import InputError
+from warpbrain.physics.load import Load
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.relaxation import RelaxationOptions
 from warpbrain.simulation.system import System, find_precision
@@ -58,7 +61,11 @@ class Job:
     def __post_init__(self) -> None:
         if self.model.mechanisms:
             kinds = ", ".join(dict.fromkeys(mechanism.kind for mechanism in self.model.mechanisms))
-            raise InputError(f"an ensemble cannot have mechanisms whose forces follow the deformation yet: {kinds}")
+            alike = ", ".join(kind for kind, known in mechanisms().items() if acts_before_all(known))
+            raise InputError(
+                f"an ensemble cannot have the mechanism {kinds} yet: only what is the same forces, or the same tissue "
+                f"left, for every sample ({alike})"
+            )
         if self.model.elements != "tet4":
             raise InputError(f"an ensemble cannot have elements '{self.model.elements}' yet: expected tet4")
 
@@ -101,6 +108,11 @@ class Job:
             for item in part if isinstance(part, tuple) else (part,):
                 digest.update(np.ascontiguousarray(item).tobytes() if isinstance(item, np.ndarray) else _text(item))
         return digest.hexdigest()
+
+
+def acts_before_all(mechanism: type[Mechanism]) -> bool:
+    """Whether a mechanism is done with once loads and mesh are made, whatever the laws and the deformation are."""
+    return issubclass(mechanism, Load) or hasattr(mechanism, "remaining")
 
 
 def _text(value: Any) -> bytes:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.errors import InputError
 from warpbrain.estimation.parameters import Parameters
-from warpbrain.physics.mechanism import Substituting
+from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.of_case import plain_model_of
 from warpbrain.simulation.sensitivity import Sensitivities, SensitivitySolver
 from warpbrain.simulation.system import System
 
@@ -67,14 +67,11 @@ class Forward:
     """
 
     def __init__(self, case: Case, theta: Floats, device: str | None = None, added: Floats | None = None) -> None:
-        for mechanism in case.mechanisms:
-            if isinstance(mechanism, Substituting):
-                raise InputError(
-                    f"{case.path}: [[mechanism]] kind = '{mechanism.kind}': says what law tissues have, and so does an "
-                    "estimate: leave it out, or write its law into the tissues"
-                )
         self.parameters = Parameters.of(case)
-        self.system = System(model_of(self.parameters.applied(case, theta))[0], device)
+        self._mechanisms = case.mechanisms
+        self._plain, _ = plain_model_of(self.parameters.applied(case, theta))
+        self.system = System(self._model(theta), device)
+        self._last: State | None = None
         self.solves = 0
         self._external = self.system.model.external_forces()
         if added is not None:
@@ -101,11 +98,19 @@ class Forward:
             If none is found.
         """
         self.solves += 1
-        self.system.set_materials(self.parameters.materials(theta))
+        self.system.set_model(self._model(theta))
         found = self._solvers[tolerance].solve(self._external, start)
         reactions = np.where(self.system.model.constrained, found.internal - self._external, 0.0)
-        return State(theta.copy(), found.u, reactions, len(found.history), found.unstable_iterations > 0)
+        self._last = State(theta.copy(), found.u, reactions, len(found.history), found.unstable_iterations > 0)
+        return self._last
 
     def differentiate(self, state: State) -> Sensitivities:
         """Derivatives of a state by its parameters; `SolveError` if it is unstable."""
-        return self._sensitivity.solve(state.u, self.parameters.materials, state.theta)
+        if state is not self._last and any(term.memory for term in self.system.terms):
+            # what contacts have found is that of the state that was solved for last
+            state = self.solve(state.theta, state.u)
+        return self._sensitivity.solve(state.u, self._model, state.theta)
+
+    def _model(self, theta: Floats) -> Model:
+        plain = replace(self._plain, materials=self.parameters.materials(theta))
+        return with_mechanisms(plain, self._mechanisms)

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.gp.coordinates import Coordinate, coordinates, from_coordinates, to_coordinates
-from warpbrain.physics.laws import Law
+from warpbrain.physics.laws import Law, NeoHookean
 from warpbrain.physics.laws.stability import require_stable
+from warpbrain.physics.mechanism import Substituting
 from warpbrain.simulation.model import Material
 
 Floats = NDArray[np.float64]
@@ -61,7 +62,7 @@ class Parameters:
     tissues, groups, laws_of, formulations : tuple of str
         Name of each, group of the generative model (may be empty), law and formulation.
     poisson : float
-        Ratio at rest, which is kept.
+        Ratio at rest, which is kept: that of the case, or what a mechanism says that it is.
     """
 
     labels: tuple[tuple[int, ...], ...]
@@ -78,7 +79,7 @@ class Parameters:
         Raises
         ------
         InputError
-            If tissues of one group have different laws or formulations.
+            If tissues of one group have different laws or formulations, or a mechanism says what law tissues have.
         """
         members: dict[str, list[int]] = {}
         for label in np.unique(case.remaining[0].tissue).tolist():
@@ -100,7 +101,7 @@ class Parameters:
             tuple(tissue.prior for tissue in first),
             tuple(tissue.model for tissue in first),
             tuple(tissue.formulation for tissue in first),
-            case.poisson,
+            _poisson(case),
         )
 
     @property
@@ -190,6 +191,20 @@ class Parameters:
                 require_stable(law, self.poisson, formulation)
             except InputError as error:
                 raise InputError(f"{tissue}: {error}") from None
+
+
+def _poisson(case: Case) -> float:
+    """Poisson ratio with what mechanisms say of it; `InputError` if one says another law."""
+    law, poisson = NeoHookean(1.0), case.poisson
+    for mechanism in case.mechanisms:
+        if isinstance(mechanism, Substituting):
+            another, poisson, _ = mechanism.substitute(0, law, poisson, "coupled")
+            if another is not law:
+                raise InputError(
+                    f"{case.path}: [[mechanism]] kind = '{mechanism.kind}': says what law tissues have, and so does an "
+                    "estimate: leave it out, or write its law into the tissues"
+                )
+    return poisson
 
 
 def _listed(words: Sequence[str]) -> str:

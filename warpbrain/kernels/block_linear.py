@@ -176,13 +176,17 @@ class BlockConjugateGradient:
         kernel = linear_kernels(self._precision).invert_diagonal
         self._launch(kernel, self._shape[0], self._diagonal, self._matrix.values, self._inverse)
 
-    def solve(self, right_hand_sides: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def solve(
+        self, right_hand_sides: Sequence[NDArray[np.float64]], tolerance: float | None = None
+    ) -> NDArray[np.float64]:
         """Solve from zero.
 
         Parameters
         ----------
         right_hand_sides : sequence of (n, 3) arrays
             As many as the solver was made for.
+        tolerance : float, optional
+            In place of the solver's own.
 
         Returns
         -------
@@ -194,7 +198,7 @@ class BlockConjugateGradient:
         self._iterations.zero_()
         self._launch(self._kernels.begin, self._shape, self._inverse, self._b, self._z, self._p)
         self._dots(self._b, self._b, self._z, self._residual)
-        self._goal.assign(self._tolerance**2 * self._residual.numpy()[:, 0])
+        self._goal.assign((tolerance or self._tolerance) ** 2 * self._residual.numpy()[:, 0])
         if self._graph is None:
             with wp.ScopedCapture(device=self._device) as capture:
                 for _ in range(ROUND):

@@ -8,6 +8,10 @@
    or smaller ones), `Substituting` (another law) and `Removing` (fewer elements);
 4. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), and an `example`.
 
+Its derivatives by its parameters are nobody's work: `warpbrain.simulation.beside` differences what it does. For that a
+`Following` one's term names the arrays of what it remembers (`Term.memory`) and takes the body's moduli in
+`Term.take_moduli`, if it has either.
+
 Whoever lists mechanisms (reading, writing, simulation, diagnosis, docs) walks the registry,
 `warpbrain.physics.mechanisms`.
 """
@@ -78,6 +82,8 @@ class Says:
     typical : str
         Range in the literature, with unit.
     source : str
+    method : bool
+        It is a setting of the method, no property of a body: never differentiated or estimated.
     """
 
     doc: str
@@ -92,6 +98,7 @@ class Says:
     expectation: Expectation | None = None
     typical: str = ""
     source: str = ""
+    method: bool = False
 
 
 def parameter(doc: str, *, default: Any = dataclasses.MISSING, **known: Any) -> Any:
@@ -154,6 +161,8 @@ class Mechanism(Ramped, abc.ABC):
     needs: ClassVar[tuple[str, ...]] = ()
     #: Whether what acts on nodes (a `Load`, a term) acts rightly on the midside nodes of quadratic elements too.
     quadratic: ClassVar[bool] = False
+    #: Whether it is there or not, and nothing in between: its effect is a difference, not a derivative at nothing.
+    switches: ClassVar[bool] = False
     #: Whether a case can have several.
     several: ClassVar[bool] = False
     #: Whether it means something in a laboratory specimen between its grips.

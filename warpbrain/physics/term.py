@@ -11,7 +11,7 @@ from __future__ import annotations
 import abc
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import warp as wp
@@ -134,6 +134,10 @@ class Term(abc.ABC):
     forgets_in: float | None = None
     #: Its own unknowns; None if there are none.
     coupling: Coupling | None = None
+    #: Names of the arrays that hold what it remembers of earlier steps and augmentations.
+    memory: ClassVar[tuple[str, ...]] = ()
+    #: Names of what is of rigid shapes around the body, which no number of a mechanism changes.
+    shapes: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, body: Body, stencils: NDArray[np.integer], ramp: Callable[[float], float] | None = None) -> None:
         self.body = body
@@ -190,6 +194,42 @@ class Term(abc.ABC):
     def nodal_pressures(self) -> dict[str, NDArray[np.float64]]:
         """Pressures of its own at the nodes (n,) [Pa], by name, where the forces were last evaluated."""
         return {}
+
+    def take_moduli(self) -> None:  # noqa: B027
+        """Take the body's moduli, which have changed."""
+
+    def remembered(self) -> tuple[wp.array, ...]:
+        """A copy of what it remembers."""
+        return tuple(wp.clone(getattr(self, name)) for name in self.memory)
+
+    def recall(self, remembered: tuple[wp.array, ...]) -> None:
+        """Remember that instead."""
+        for name, values in zip(self.memory, remembered, strict=True):
+            wp.copy(getattr(self, name), values)
+
+    def fits(self, other: Term) -> bool:
+        """Whether `adopt` can take what another term is: stencils and arrays of the same shapes."""
+        if type(self) is not type(other) or not np.array_equal(self.stencils, other.stencils):
+            return False
+        own = vars(self)
+        return all(own[name].shape == array.shape for name, array in other._arrays().items())
+
+    def adopt(self, other: Term) -> None:
+        """Become what another term on the same body is, in the same arrays: a captured graph reads these.
+
+        Its ramp and plain values are taken too. What it remembers stays, and so do rigid shapes.
+        """
+        for name, array in other._arrays().items():
+            wp.copy(getattr(self, name), array)
+        kept = (*self.memory, *self.shapes, "body", "scale", "forces", "blocks")
+        for name, value in vars(other).items():
+            if name not in kept and not isinstance(value, wp.array):
+                setattr(self, name, value)
+
+    def _arrays(self) -> dict[str, wp.array]:
+        """What it is made of on the device, by name."""
+        kept = (*self.memory, "scale", "forces", "blocks")
+        return {name: a for name, a in vars(self).items() if isinstance(a, wp.array) and name not in kept}
 
     @abc.abstractmethod
     def evaluate_forces(self, u: wp.array) -> None:

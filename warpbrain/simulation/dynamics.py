@@ -92,6 +92,7 @@ class Simulator:
         self._graph_moves = False
         system.solution.zero_()
         self._external_factor: tuple[float, ...] | None = None
+        self._external_of = system.model
         self.apply_loads()
 
     def set_time_step(self, time_step: float) -> None:
@@ -101,8 +102,7 @@ class Simulator:
         self._remember()
         self._h = time_step
         self._graph = None
-        for term in self.system.terms:
-            term.set_time_step(time_step)
+        self.system.set_time_step(time_step)
 
     @property
     def time_step(self) -> float:
@@ -117,9 +117,9 @@ class Simulator:
         model = self.system.model
         factors = tuple(load.factor(self.time + self._h) for load in model.loads)
         factors += tuple(mechanism.factor(self.time + self._h) for mechanism in model.emptying)
-        if factors != self._external_factor:
+        if factors != self._external_factor or model is not self._external_of:
             self.system.external.assign(model.external_forces(self.time + self._h))
-            self._external_factor = factors
+            self._external_factor, self._external_of = factors, model
 
     def prescribe(self, displacement: NDArray[np.float64]) -> None:
         """Move the constrained components to a displacement [m], shape (n, 3), in the coming step; then they rest."""
@@ -132,8 +132,7 @@ class Simulator:
         """Back to rest in the reference shape."""
         rest = np.zeros((self.system.size, 3))
         self.restore(rest, rest, 0.0)
-        for term in self.system.terms:
-            term.forget()
+        self.system.forget()
 
     def restore(self, u: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
         """Set displacement [m] and velocity [m/s], both (n, 3), and time [s].
@@ -221,8 +220,7 @@ class Simulator:
     def _remember(self) -> None:
         """Let terms with a memory keep what they need of the last step: only now is it known that it stands."""
         if self._pending:
-            for term in self.system.terms:
-                term.advance(self.system.u)
+            self.system.advance()
         self._pending = False
 
     def step(self) -> None:

@@ -207,9 +207,8 @@ class EquilibriumSolver:
         require_held(model)
         full = model.external_forces() if external is None else external
         u = np.zeros_like(full) if start is None else np.array(start, dtype=np.float64)
-        for term in self.system.terms:
-            term.set_time_step(math.inf)
-            term.forget()
+        self.system.set_time_step(math.inf)
+        self.system.forget()
         return self._follow(u, full)
 
     def step(self, start: Floats, time_step: float, time: float = math.inf) -> Equilibrium:
@@ -233,15 +232,13 @@ class EquilibriumSolver:
         """
         found = self.try_step(start, time_step, time)
         self.system.u.assign(found.u)
-        for term in self.system.terms:
-            term.advance(self.system.u)
+        self.system.advance()
         return found
 
     def try_step(self, start: Floats, time_step: float, time: float = math.inf) -> Equilibrium:
         """As `step`, but terms with a memory do not take the step into it: what they say is still of its end."""
         require_held(self.system.model)
-        for term in self.system.terms:
-            term.set_time_step(time_step)
+        self.system.set_time_step(time_step)
         return self._follow(np.array(start, dtype=np.float64), self.system.model.external_forces(time), time)
 
     def _follow(self, u: Floats, full: Floats, time: float | None = None) -> Equilibrium:

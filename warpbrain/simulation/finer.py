@@ -14,7 +14,7 @@ from warpbrain.mesh import QuadraticMesh, TetMesh, boundary_faces, node_areas, n
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
-from warpbrain.physics.mechanisms.resection import Resection
+from warpbrain.physics.mechanism import Removing
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.of_case import model_of
 
@@ -56,7 +56,7 @@ class FinerCase:
         self._coarse, _ = case.remaining
         mesh, ends = refined(self._coarse)
         self.prolongation = prolongation(ends, len(self._coarse.points))
-        mechanisms = tuple(m for m in case.mechanisms if not isinstance(m, Resection))
+        mechanisms = tuple(m for m in case.mechanisms if not isinstance(m, Removing))
         boundaries = tuple(b for b in case.boundaries if not isinstance(b, Forced))
         self.case = replace(case, mesh=mesh, mechanisms=mechanisms, boundaries=boundaries)
 

@@ -10,14 +10,21 @@ from warpbrain.cases.case import Case, Tissue
 from warpbrain.errors import InputError
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
-from warpbrain.physics.mechanism import Removing, Substituting
+from warpbrain.physics.mechanism import Mechanism, Substituting
 from warpbrain.physics.mechanisms.contact import Contact as SkullContact
 from warpbrain.physics.mechanisms.pressure import Pressure
+from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.model import Material, Model, Motion
 
 
 def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
-    """The model of a case.
+    """The model of a case, as by `plain_model_of`, with all that the case assumes."""
+    plain, nodes = plain_model_of(case)
+    return with_mechanisms(plain, case.mechanisms), nodes
+
+
+def plain_model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
+    """The model of a case without the mechanisms that it assumes; see `warpbrain.simulation.assumed`.
 
     Returns
     -------
@@ -37,8 +44,8 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
     mesh, nodes = case.remaining
     constrained = np.zeros(mesh.points.shape, dtype=bool)
     prescribed = np.zeros(mesh.points.shape)
-    loads: list[Load] = [m for m in case.mechanisms if isinstance(m, Load)]
-    mechanisms = [m for m in case.mechanisms if not isinstance(m, Removing | Load)]
+    loads: list[Load] = []
+    mechanisms: list[Mechanism] = []
     motions: list[Motion] = []
     for boundary in case.boundaries:
         members = case.mesh.node_sets[boundary.nodes][nodes]
@@ -64,7 +71,10 @@ def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
                 )
             )
     try:
-        materials = {label: material_of(case, label, tissue) for label, tissue in case.tissues.items()}
+        materials = {
+            label: Material(tissue.known_law, case.poisson, tissue.formulation)
+            for label, tissue in case.tissues.items()
+        }
     except InputError as error:
         raise InputError(f"{case.path}: [tissue] {error}") from None
     return Model(mesh, materials, case.density, constrained, prescribed, loads, mechanisms, motions), nodes

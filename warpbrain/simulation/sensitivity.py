@@ -1,14 +1,17 @@
-"""How an equilibrium changes with the parameters of its laws: the implicit function theorem.
+"""How an equilibrium changes with its parameters, of laws, mechanisms and loads: the implicit function theorem.
 
-At equilibrium `f_int(u, theta) = f_ext` on the free components, whatever `theta` is, and the constrained ones do not
-move. Loads are dead and know nothing of the laws. Hence, with the tangent stiffness `K` at `u`,
+At equilibrium `r = f_int(u, theta) - f_ext(theta) = 0` on the free components, whatever `theta` is, and the constrained
+ones are where `theta` prescribes them. Hence
 
-    K du/dtheta = -df_int/dtheta |_u           on the free components
-    dR/dtheta = df_int/dtheta |_u + K du/dtheta    on the constrained ones, of the reactions `R`
+    dr/dtheta = dr/dtheta |_u + K du/dtheta = 0        on the free components
+    dR/dtheta = dr/dtheta |_u + K du/dtheta            on the constrained ones, of the reactions `R`
 
-`df_int/dtheta` at fixed `u` is a five-point difference of the internal forces in `theta`. Forces are smooth in the
-parameters of every law (linear in the moduli), so with a step of `epsilon^(1/5)` it is exact to some 1e-12 in double
-precision, and no law has to know its derivatives.
+The whole derivative is one five-point difference along the way `(theta + d h e_k, u + d h du_k)`
+(`warpbrain.simulation.beside`), and `du_k` is corrected with the tangent that is stored until nothing is left of it
+(`warpbrain.simulation.refinement`): once where the stored tangent is the true one.
+
+A constraint that is met by augmentation (contact) is met beside `theta` too: the multipliers there are augmented along
+the same way, and all is balanced again, until nothing changes.
 
 Every parameter is one more right-hand side of one matrix, and conjugate gradients solve for all of them at once
 (`warpbrain.kernels.block_linear`). SciPy's sparse LU takes 1.1 s for its factors on the phantom's 4187 nodes (2-core
@@ -17,7 +20,7 @@ CPU, 2026-11), longer than two parameters take so to 1e-10; it has no device, an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,17 +29,22 @@ from numpy.typing import ArrayLike, NDArray
 from warpbrain.errors import SolveError
 from warpbrain.kernels.block_linear import BlockConjugateGradient
 from warpbrain.kernels.linear import LinearResult
+from warpbrain.simulation.beside import Beside, ModelOf
 from warpbrain.simulation.equilibrium import Equilibrium
-from warpbrain.simulation.model import Material
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.refinement import lengths, refine
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
 
-#: What a vector of parameters means: the material of each tissue, by label.
-MaterialsOf = Callable[[Floats], Mapping[int, Material]]
-
-#: Weights of the values at -2, -1, 1 and 2 steps in the derivative; its error is `h^4 f^(5) / 30`.
-_STENCIL = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
+#: Of each correction but the first: it is not exact anyway.
+_ROUGH = 1e-3
+#: Rounding errors in the forces of a law.
+ROUNDINGS = 20.0
+#: Of what a parameter puts out of balance: what constraints that are met again may leave.
+_MET = 1e-8
+#: How often constraints are met again.
+_AUGMENTATIONS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +54,7 @@ class Sensitivities:
     Attributes
     ----------
     u : (p, n, 3) array
-        Of the displacement [m per unit of the parameter]; zero on constrained components.
+        Of the displacement [m per unit of the parameter]; on constrained components, of what is prescribed.
     reactions : (p, n, 3) array
         Of what holds the constrained components [N per unit]; zero elsewhere.
     cg_iterations : tuple of p ints
@@ -64,30 +72,34 @@ class SensitivitySolver:
     ----------
     system : System
     tolerance : float
-        Relative, of the linear solves; in single precision it is no smaller than rounding allows.
+        Relative: what may be left of the forces that a parameter puts out of balance. No smaller than rounding allows.
     max_cg : int
-        Iterations of one of them.
+        Iterations of a linear solve.
     """
 
     def __init__(self, system: System, tolerance: float = 1e-10, max_cg: int = 10_000) -> None:
         self.system = system
-        self._step = system.precision.epsilon**0.2
         self._tolerance = max(tolerance, 20.0 * system.precision.epsilon)
         self._max_cg = max_cg
         self._solvers: dict[int, BlockConjugateGradient] = {}
 
-    def solve(self, u: ArrayLike, materials: MaterialsOf, theta: ArrayLike) -> Sensitivities:
+    def solve(self, u: ArrayLike, models: ModelOf, theta: ArrayLike, scales: ArrayLike | None = None) -> Sensitivities:
         """Derivatives by each parameter.
 
-        The system has the materials of `theta` and the displacement `u` when this returns.
+        The system has the model of `theta` and the displacement `u` when this returns. What its terms remember is that
+        of the equilibrium, which must be the last that was solved for in it if a term has augmented its constraints.
 
         Parameters
         ----------
         u : (n, 3) array
-            Displacement [m], in equilibrium under the materials of `theta`.
-        materials : callable
-            From parameters (p,) to materials by tissue label; smooth, and defined a little around `theta`.
+            Displacement [m], in equilibrium under the model of `theta` at full load.
+        models : callable
+            From parameters (p,) to a model that differs from the system's in numbers only; smooth, and defined a little
+            around `theta`.
         theta : (p,) array
+        scales : (p,) array, optional
+            By how much each must change to change much, as `warpbrain.physics.continuous.scales_of` says; by default
+            its size, or 1 if that is less or nothing.
 
         Raises
         ------
@@ -98,70 +110,136 @@ class SensitivitySolver:
         system = self.system
         if any(term.coupled for term in system.terms):
             raise SolveError("sensitivity: fluid flows in this step, and only a steady state has derivatives yet")
-        point = np.asarray(theta, dtype=np.float64)
-        constrained = system.model.constrained
-        system.u.assign(np.asarray(u, dtype=np.float64))
-        at_fixed_u = [self._force_derivative(materials, point, k) for k in range(len(point))]
-        system.set_materials(materials(point))
+        system.set_load()
+        state = np.array(u, dtype=np.float64)
+        beside = Beside(system, models, theta, scales)
+        system.u.assign(state)
         system.evaluate_tangents()
         system.assemble(k=1.0, m=0.0)
-        if not len(point):
+        if not len(beside):
             none = np.zeros((0, system.size, 3))
             return Sensitivities(none, none, ())
-        solver = self._solver(len(point))
-        solver.prepare()
-        solved = solver.solve([np.where(constrained, 0.0, -force) for force in at_fixed_u])
-        results = solver.results()
-        for k, linear in enumerate(results):
-            _require_solved(linear, k)
-        moved = np.where(constrained, 0.0, solved)
-        reactions = [
-            np.where(constrained, force + system.stiffness_times(du), 0.0)
-            for force, du in zip(at_fixed_u, moved, strict=True)
-        ]
-        return Sensitivities(moved, np.array(reactions), tuple(linear.iterations for linear in results))
+        corrections = Corrections(self._solver(len(beside)), system, self._tolerance)
+        with beside.away():
+            moved, left = self._balance(beside, state, corrections)
+        constrained = system.model.constrained
+        return Sensitivities(moved, np.where(constrained, -left, 0.0), corrections.cg_iterations)
+
+    def _balance(self, beside: Beside, state: Floats, corrections: Corrections) -> tuple[Floats, Floats]:
+        """Derivatives of the displacement, and what is out of balance then on every component."""
+        system = self.system
+        free = ~system.model.constrained
+        loaded = [beside.by_loads(k, math.inf) for k in range(len(beside))]
+        start = np.array([beside.by_prescribed(k) for k in range(len(beside))])
+
+        def left_of(k: int, moved: Floats) -> Floats:
+            return loaded[k] - self._by_path(beside, k, state, moved)
+
+        left = np.array([left_of(k, moved) for k, moved in enumerate(start)])
+        # differences are exact to the rounding of forces over the step
+        noise = ROUNDINGS * system.precision.epsilon * system.size_of_forces() / beside.steps
+        goals = 2.0 * self._tolerance * lengths(left, free) + noise
+        # a skull's distance has fewer digits than forces have
+        met = 2.0 * goals + _MET * lengths(left, free)
+        moved = start
+        for _ in range(_AUGMENTATIONS):
+            moved, left = refine(left_of, corrections.correct, moved, left, goals, free)
+            if not beside.remembers:
+                return moved, left
+            self._meet_constraints(beside, state, moved)
+            left = np.array([left_of(k, along) for k, along in enumerate(moved)])
+            if np.all(lengths(left, free) <= met):
+                return moved, left
+        raise SolveError(f"sensitivities: contacts are not met after {_AUGMENTATIONS} augmentations")
+
+    def _meet_constraints(self, beside: Beside, state: Floats, moved: Floats) -> None:
+        """Augment beside `theta` along the way, by as much more than in the state itself as belongs to the way."""
+        system = self.system
+
+        def augment(offset: float, along: Floats) -> None:
+            system.u.assign(state + offset * along)
+            for term in system.terms:
+                term.augment(system.u)
+
+        beside.remember(lambda k, offset: augment(offset, moved[k]))
+        with beside.here():
+            before = system.remembered()
+            augment(0.0, moved[0])
+            after = system.remembered()
+        beside.shift_memory(after, before)
+
+    def _by_path(self, beside: Beside, k: int, state: Floats, moved: Floats) -> Floats:
+        """Derivative of the internal forces (n, 3) by parameter k along the way that the state takes with it."""
+        system = self.system
+
+        def internal(offset: float, _: Model) -> Floats:
+            system.u.assign(state + offset * moved)
+            system.evaluate_forces()
+            system.gather_forces()
+            return system.internal.numpy().astype(np.float64)
+
+        return beside.derivative(k, internal)
 
     def _solver(self, count: int) -> BlockConjugateGradient:
         if count not in self._solvers:
-            system = self.system
-            self._solvers[count] = BlockConjugateGradient(
-                system.matrix,
-                system.diagonal,
-                count,
-                system.precision,
-                tolerance=self._tolerance,
-                max_iterations=self._max_cg,
-            )
+            self._solvers[count] = block_solver(self.system, count, self._tolerance, self._max_cg)
         return self._solvers[count]
 
-    def _force_derivative(self, materials: MaterialsOf, theta: Floats, k: int) -> Floats:
-        """`df_int/dtheta_k` at fixed `u`, shape (n, 3)."""
-        system = self.system
-        # one over a small exponent of Ogden's law is a modulus: a step must not come near to its sign
-        step = self._step * min(1.0, abs(theta[k])) if theta[k] else self._step
-        total = np.zeros((system.size, 3))
-        for distance, weight in _STENCIL.items():
-            beside = theta.copy()
-            beside[k] += distance * step
-            system.set_materials(materials(beside))
-            system.evaluate_forces()
-            system.gather_forces()
-            total += weight * system.internal.numpy()
-        return total / step
+
+class Corrections:
+    """Solves with the system's matrix as it is now, and counts what they take.
+
+    Parameters
+    ----------
+    solver : BlockConjugateGradient
+    system : System
+    tolerance : float
+        Of the first solve; later ones are rough.
+    """
+
+    def __init__(self, solver: BlockConjugateGradient, system: System, tolerance: float) -> None:
+        self._solver, self._constrained = solver, system.model.constrained
+        self._tolerance, self._rough = tolerance, max(tolerance, _ROUGH)
+        self._first = True
+        self.cg_iterations: tuple[int, ...] = ()
+        solver.prepare()
+
+    def correct(self, left: Floats) -> Floats:
+        """Solve for p right-hand sides (p, n, 3); zero on constrained components."""
+        solved = self._solver.solve(list(left), self._tolerance if self._first else self._rough)
+        results = self._solver.results()
+        for k, linear in enumerate(results):
+            _require_solved(linear, k)
+        before = self.cg_iterations or (0,) * len(results)
+        self.cg_iterations = tuple(n + linear.iterations for n, linear in zip(before, results, strict=True))
+        self._first = False
+        return np.where(self._constrained, 0.0, solved)
+
+
+def block_solver(system: System, count: int, tolerance: float, max_cg: int) -> BlockConjugateGradient:
+    """A solver for a system's matrix and several right-hand sides."""
+    return BlockConjugateGradient(
+        system.matrix, system.diagonal, count, system.precision, tolerance=tolerance, max_iterations=max_cg
+    )
 
 
 def sensitivities(
-    system: System, equilibrium: Equilibrium, materials: MaterialsOf, theta: ArrayLike, tolerance: float = 1e-10
+    system: System,
+    equilibrium: Equilibrium,
+    models: ModelOf,
+    theta: ArrayLike,
+    scales: ArrayLike | None = None,
+    tolerance: float = 1e-10,
 ) -> Sensitivities:
-    """Derivatives of an equilibrium by parameters of its laws; see `SensitivitySolver`."""
-    return SensitivitySolver(system, tolerance).solve(equilibrium.u, materials, theta)
+    """Derivatives of an equilibrium by parameters; see `SensitivitySolver`."""
+    return SensitivitySolver(system, tolerance).solve(equilibrium.u, models, theta, scales)
 
 
 def _require_solved(linear: LinearResult, parameter: int) -> None:
     if linear.indefinite:
         raise SolveError(
             f"sensitivity to parameter {parameter}: the tangent stiffness is indefinite (curvature "
-            f"{linear.curvature:.2e} N/m): the equilibrium is unstable, and does not change smoothly with its laws"
+            f"{linear.curvature:.2e} N/m): the equilibrium is unstable, and does not change smoothly with what it is of"
         )
     if not linear.converged:
         raise SolveError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,9 +21,11 @@ from warpbrain.kernels.quadratic import quadratic_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.quality import EDGES
+from warpbrain.physics.continuous import differ_in_numbers_only
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.grown import grown
 from warpbrain.physics.mechanism import Following, Growing, Weakening
+from warpbrain.physics.term import Term
 from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, averaged_terms, own_modulus
 from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
 from warpbrain.simulation.model import Material, Model
@@ -118,7 +120,10 @@ class System:
         self.elements = len(model.mesh.tetrahedra)
         self._kernels = assembly_kernels(self.precision)
         self._place_mesh()
-        self.terms = [m.bind(self) for m in model.mechanisms if isinstance(m, Following)]
+        self._following: list[Term] = [m.bind(self) for m in model.mechanisms if isinstance(m, Following)]
+        self.terms = [*self._following]
+        self._time_step = math.inf
+        self._acting: tuple[float, float] = (1.0, math.inf)
         self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
         self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
         # of what alters elements, as they are now; None: not known yet
@@ -154,7 +159,8 @@ class System:
             self.stencils = self.quadratic.elements
             self.element_nodes = self._array(self.stencils, int)
         self.inverse_edges = self._array(self.shape_gradients, p.mat33)
-        self.volume = self._array(mesh.volumes, p.scalar)
+        self._volumes = mesh.volumes
+        self.volume = self._array(self._volumes, p.scalar)
         self.mass = self._array(self.model.node_masses, p.scalar)
 
     def _place_pattern(self) -> None:
@@ -219,28 +225,108 @@ class System:
         return parameters
 
     def set_materials(self, materials: Mapping[int, Material]) -> None:
-        """Other parameters for the same laws, in the same arrays: nothing is pre-processed again.
+        """Other parameters of the laws, as by `set_model`.
 
         Parameters
         ----------
         materials : mapping of int to Material
-            By tissue label; each of the law (of Ogden's, with as many terms) and formulation that the tissue has.
+            By tissue label.
 
         Raises
         ------
         InputError
-            If a tissue has no material, or one of another law, formulation or number of parameters.
+            As from `set_model`, and if a tissue has no material.
         """
-        model = replace(self.model, materials=dict(materials))
+        self.set_model(replace(self.model, materials=dict(materials)))
+
+    def set_model(self, model: Model, made: dict[int, Term] | None = None) -> None:
+        """Other values of parameters in the same arrays: nothing is pre-processed again.
+
+        A captured graph sees them. A mechanism's term is made anew from its mechanism and its arrays are copied into
+        those that are there; what it remembers stays. Of loads and prescribed displacements nothing is kept here: they
+        are asked of the model.
+
+        Parameters
+        ----------
+        model : Model
+            Of the same mesh, with each tissue's law (of Ogden's, with as many terms) and formulation as it is, the
+            same mechanisms with other numbers, and any loads and prescribed displacements of the components that are
+            constrained already. Sets that a mechanism acts on are pre-processed: others need another system.
+        made : dict of int to Term, optional
+            Terms of mechanisms by the `id` of these, which the caller keeps. What is not there yet is added, so that
+            who goes to and fro between models makes each term once.
+
+        Raises
+        ------
+        InputError
+            If a tissue has another law, formulation or number of parameters, or a mechanism is another one, or
+            something that has no parameters is. The system is then as it was.
+        """
+        before = self.model
+        self._require_alike(model)
+        # terms ask their body for its moduli
+        self.model = model
+        others: dict[int, Term] = {}
+        try:
+            changed = self._changed(before, model)
+            made = {} if made is None else made
+            for place, mechanism in changed.items():
+                if id(mechanism) not in made:
+                    made[id(mechanism)] = mechanism.bind(self)
+                others[place] = made[id(mechanism)]
+            for place, other in others.items():
+                if not self._following[place].fits(other):
+                    raise InputError(
+                        f"mechanism {changed[place]}: acts on other nodes, or has more numbers, than before"
+                    )
+        except InputError:
+            self.model = before
+            raise
+        for place, term in enumerate(self._following):
+            if place in others:
+                others[place].set_time_step(self._time_step)
+                term.adopt(others[place])
+            term.take_moduli()
+        if list(before.mechanisms) != list(model.mechanisms):
+            self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
+            self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
+            self._scales = None if self._growing or self._weakening or model.emptying else self._scales
+            self._act()
+        self._write_materials()
+
+    def _require_alike(self, model: Model) -> None:
+        """Raise `InputError` if a model needs pre-processing of its own."""
+        before = self.model
+        for name in ("mesh", "elements", "density", "damping"):
+            if getattr(before, name) is not getattr(model, name) and getattr(before, name) != getattr(model, name):
+                raise InputError(f"model: another {name} than the one that was pre-processed")
+        if before.constrained is not model.constrained and np.any(before.constrained != model.constrained):
+            raise InputError("model: other components are constrained than those that were pre-processed")
         for label in np.unique(model.mesh.tissue).tolist():
-            old, new = self.model.materials[label], model.materials[label]
+            old, new = before.materials[label], model.materials[label]
             if _code(old) != _code(new):
                 raise InputError(
                     f"materials: tissue {label} has {new.law!r}, {new.formulation}: expected other parameters of "
                     f"{old.law!r}, {old.formulation}"
                 )
-        self.model = model
-        for group, ((law_type, _), members) in zip(self.groups, self._grouped(model).items(), strict=True):
+        if len(before.mechanisms) != len(model.mechanisms):
+            raise InputError(
+                f"mechanisms: found {len(model.mechanisms)}, expected other numbers of those {len(before.mechanisms)} "
+                "that were pre-processed"
+            )
+        for was, now in zip(before.mechanisms, model.mechanisms, strict=True):
+            if was != now and not differ_in_numbers_only(was, now):
+                raise InputError(f"mechanisms: {now}: expected other numbers of {was}")
+
+    @staticmethod
+    def _changed(before: Model, after: Model) -> dict[int, Following]:
+        """Mechanisms that are terms and have other parameters, by the number of the term."""
+        pairs = zip(before.mechanisms, after.mechanisms, strict=True)
+        following = [(was, now) for was, now in pairs if isinstance(now, Following)]
+        return {place: now for place, (was, now) in enumerate(following) if was is not now and was != now}
+
+    def _write_materials(self) -> None:
+        for group, ((law_type, _), members) in zip(self.groups, self._grouped(self.model).items(), strict=True):
             group.parameters.assign(self._parameters(law_type, members))
             for term in group.averaged:
                 term.set_elements(self._parameters(law_type, members, averaged_modulus), self._weight)
@@ -310,6 +396,15 @@ class System:
         self._launch(
             self._kernels.gather_forces, self.size, self.corner_first, self.corners, self._flat_forces, self.internal
         )
+
+    def size_of_forces(self) -> float:
+        """Norm [N] of what rounding is relative to.
+
+        All forces before they are summed, and moduli, of which forces are differences where little is strained.
+        """
+        stiffest = float(np.max(self.shear_moduli + np.abs(self.volumetric_moduli)))
+        summed = float(np.linalg.norm(self._flat_forces.numpy().astype(np.float64)))
+        return summed + stiffest * self.model.mesh.volume ** (2.0 / 3.0)
 
     def assemble(self, k: float, m: float, coupling: float | None = None) -> None:
         """`matrix = k K + m M` from the element blocks, constrained rows and columns replaced by the identity.
@@ -450,13 +545,20 @@ class System:
 
     def set_load(self, share: float = 1.0, time: float = math.inf) -> None:
         """Let terms act with a share of what they do at a time [s]; by default in full, long after every ramp."""
+        self._acting = share, time
+        if self._act():
+            self._write_materials()
+
+    def _act(self) -> bool:
+        """Let everything act as much as was last said; whether the parameters of elements are others now."""
+        share, time = self._acting
         for term in self.terms:
             term.set_scale(share * term.factor(time))
         growing, weakening, emptying = self._growing, self._weakening, self.model.emptying
         scales = tuple(share * mechanism.factor(time) for mechanism in (*growing, *weakening))
         scales += tuple(share * mechanism.factor(time) for mechanism in emptying)
         if scales == self._scales:
-            return
+            return False
         self._scales = scales
         mesh = self.model.mesh
         self._weight = np.ones(self.elements)
@@ -466,12 +568,39 @@ class System:
             left = self.model.remaining_share(scales[len(growing) + len(weakening) :])
             self.mass.assign(self.model.node_masses * left)
         # a kernel multiplies all that an element does by its volume
-        self.volume.assign((PART if self._averages else 1.0) * self._weight * mesh.volumes)
+        self.volume.assign((PART if self._averages else 1.0) * self._weight * self._volumes)
         change = np.ones(self.elements)
         for larger, scale in zip(growing, scales, strict=False):
             change *= 1.0 + larger.growth(mesh, scale)
         self._growth_stretch = np.cbrt(change)
-        self.set_materials(self.model.materials)
+        return True
+
+    # -- what terms remember --------------------------------------------------------------------------------------
+
+    def set_time_step(self, h: float) -> None:
+        """Tell terms how long the coming steps are [s]; infinite in an equilibrium."""
+        self._time_step = h
+        for term in self.terms:
+            term.set_time_step(h)
+
+    def advance(self) -> None:
+        """Let terms keep what they need of a step that ended at `u`."""
+        for term in self.terms:
+            term.advance(self.u)
+
+    def forget(self) -> None:
+        """Let terms forget: the body is at rest in its reference shape, and always was."""
+        for term in self.terms:
+            term.forget()
+
+    def remembered(self) -> list[tuple[wp.array, ...]]:
+        """A copy of what each term remembers."""
+        return [term.remembered() for term in self.terms]
+
+    def recall(self, remembered: Sequence[tuple[wp.array, ...]]) -> None:
+        """Let terms remember that instead."""
+        for term, own in zip(self.terms, remembered, strict=True):
+            term.recall(own)
 
     def forces_without_potential(self) -> Floats:
         """Sum of the forces [N], shape (n, 3), at `u` of the terms that have no potential."""

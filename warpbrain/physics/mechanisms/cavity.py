@@ -79,12 +79,14 @@ class Cavity(Mechanism):
         default=1e-4,
         above=0.0,
         below=1.0,
+        method=True,
     )
     kind: ClassVar[str] = "cavity"
     quadratic: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue is taken out little by little, and the walls of the cavity move in."
     example: ClassVar[str] = "cavity:elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("inclusion", "swelling")
+    switches: ClassVar[bool] = True
 
     def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
         """See `warpbrain.physics.mechanism.Weakening`."""

@@ -71,7 +71,7 @@ class Contact(Mechanism):
         source="diagnosis design, M4",
     )
     penalty: float = parameter(
-        "Stiffness of the contact, relative to that of a layer of elements.", default=50.0, above=0.0
+        "Stiffness of the contact, relative to that of a layer of elements.", default=50.0, above=0.0, method=True
     )
     surface: ClosedSurface | None = parameter(  # noqa: RUF009  (a field, as the others)
         "Closed surface of triangles that the nodes stay inside of: a .stl, .ply, .obj, .vtp or .vtu.",
@@ -84,6 +84,7 @@ class Contact(Mechanism):
     example: ClassVar[str] = "contact:nodes=side,state=lifting"
     confused_with: ClassVar[tuple[str, ...]] = ("traction", "gravity")
     needs: ClassVar[tuple[str, ...]] = ("points near the surface",)
+    switches: ClassVar[bool] = True
     several: ClassVar[bool] = True
 
     def check(self, mesh: TetMesh) -> None:
@@ -128,6 +129,9 @@ class Contact(Mechanism):
 class ContactTerm(Term):
     """`Contact` on a device; a stencil is a node."""
 
+    memory = ("_found", "_pressing", "_directions")
+    shapes = ("_field",)
+
     def __init__(self, body: Body, contact: Contact) -> None:
         members = np.flatnonzero(body.mesh.node_sets[contact.nodes])
         super().__init__(body, members[:, None], contact.factor)
@@ -145,8 +149,9 @@ class ContactTerm(Term):
         # a node at the rim of the set touches with what is in the set; one without a face there with all it has
         area = node_areas(body.mesh.points, own[shared.all(axis=1)])[members]
         area = np.where(area > 0.0, area, node_areas(body.mesh.points, own)[members])
-        modulus = body.shear_moduli.max() + body.volumetric_moduli.max()
-        self.stiffness = contact.penalty * modulus / float(np.sqrt(np.median(area)))
+        self._size = float(np.sqrt(np.median(area)))
+        self._numbers = wp.zeros(2, dtype=precision.scalar, device=device)
+        self.take_moduli()
         self._area = self.array(area, precision.scalar)
         self._nodes = self.array(members, int)
         self._movable = body.movable[members]
@@ -167,12 +172,17 @@ class ContactTerm(Term):
         # a wall is there, however little of the load is
         super().set_scale(1.0)
 
+    def take_moduli(self) -> None:
+        modulus = self.body.shear_moduli.max() + self.body.volumetric_moduli.max()
+        self.stiffness = self.mechanism.penalty * modulus / self._size
+        self._numbers.assign([self.stiffness, self.mechanism.friction])
+
     def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
         scalar = self.body.precision.scalar
         inputs = [
             self._nodes, self._points, self._area, self._start, self._field.coefficients, self._field.origin,
-            scalar(self._field.spacing), STATES.index(self.mechanism.state), scalar(self.stiffness),
-            scalar(self.mechanism.friction), self._found, self._pressing, self._directions, u, *outputs,
+            scalar(self._field.spacing), STATES.index(self.mechanism.state), self._numbers,
+            self._found, self._pressing, self._directions, u, *outputs,
         ]  # fmt: skip
         wp.launch(kernel, dim=len(self.stencils), inputs=inputs, device=self.body.device)
 
@@ -211,7 +221,7 @@ class ContactTerm(Term):
         return bool(np.abs(pressure - found).max() > _NEAR * self.stiffness)
 
     def advance(self, u: wp.array) -> None:
-        if self.mechanism.friction > 0.0:
+        if self.mechanism.friction != 0.0:
             self._press(u, self.stiffness * self.gaps(u) + self.pressures())
 
     def _press(self, u: wp.array, pressure: NDArray[np.float64]) -> None:
@@ -256,8 +266,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         origin: vec3,
         spacing: scalar,
         state: int,
-        k: scalar,
-        friction: scalar,
+        numbers: wp.array[scalar],
         found: wp.array[scalar],
         pressing: wp.array[scalar],
         directions: wp.array[vec3],
@@ -265,6 +274,8 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         out: wp.array2d[vec3],
     ):
         t = wp.tid()
+        k = numbers[0]
+        friction = numbers[1]
         d = u[nodes[t]]
         if state == 0:
             out[t, 0] = area[t] * k * d
@@ -287,8 +298,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         origin: vec3,
         spacing: scalar,
         state: int,
-        k: scalar,
-        friction: scalar,
+        numbers: wp.array[scalar],
         found: wp.array[scalar],
         pressing: wp.array[scalar],
         directions: wp.array[vec3],
@@ -296,6 +306,8 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         out: wp.array2d[mat33],
     ):
         t = wp.tid()
+        k = numbers[0]
+        friction = numbers[1]
         one = wp.identity(n=3, dtype=scalar)
         if state == 0:
             out[t, 0] = area[t] * k * one
@@ -307,7 +319,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         # what just touches counts as pressed: a first step that went through the wall would find no way back
         if state == 1 or pressure >= scalar(0.0):
             K = k * wp.outer(slope, slope) + pressure * H
-        if friction > scalar(0.0):
+        if friction != scalar(0.0):
             n = directions[t]
             s = d - wp.dot(d, n) * n
             size = wp.sqrt(wp.dot(s, s) + slip * slip)
@@ -324,8 +336,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         origin: vec3,
         spacing: scalar,
         state: int,
-        k: scalar,
-        friction: scalar,
+        numbers: wp.array[scalar],
         found: wp.array[scalar],
         pressing: wp.array[scalar],
         directions: wp.array[vec3],
@@ -334,6 +345,8 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         gaps: wp.array[scalar],
     ):
         t = wp.tid()
+        k = numbers[0]
+        friction = numbers[1]
         d = u[nodes[t]]
         if state == 0:
             gaps[t] = wp.length(d)

@@ -58,6 +58,7 @@ class Falx(Mechanism):
     sentence: ClassVar[str] = "A stiff membrane, such as the falx, holds the tissue on both sides of it."
     example: ClassVar[str] = "falx:nodes=falx"
     confused_with: ClassVar[tuple[str, ...]] = ("inclusion", "contact")
+    switches: ClassVar[bool] = True
     several: ClassVar[bool] = True
 
     def check(self, mesh: TetMesh) -> None:

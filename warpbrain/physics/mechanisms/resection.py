@@ -25,6 +25,7 @@ class Resection(Mechanism):
 
     elements: str = parameter("Element set that was taken out.", default="resection", kind="element set")
     kind: ClassVar[str] = "resection"
+    switches: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue was taken out, and what it held moves into the cavity."
     example: ClassVar[str] = "resection:elements=ball"
 

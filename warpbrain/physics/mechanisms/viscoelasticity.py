@@ -82,12 +82,15 @@ class Viscoelasticity(Mechanism):
 class ViscoelasticTerm(Term):
     """`Viscoelasticity` on a device, with its memory."""
 
+    memory = ("_q", "_S")
+
     def __init__(self, body: Body, mechanism: Viscoelasticity) -> None:
         super().__init__(body, body.tetrahedra, mechanism.factor)
         self.mechanism = mechanism
         scalar, mat33 = body.precision.scalar, body.precision.mat33
         count, branches = len(self.stencils), len(mechanism.times)
-        self._weights = self.array(np.stack([body.mesh.volumes, body.shear_moduli], axis=1), scalar)
+        self._weights = wp.zeros((count, 2), dtype=scalar, device=body.device)
+        self.take_moduli()
         self._decay = wp.zeros(branches, dtype=scalar, device=body.device)
         self._response = wp.zeros(branches, dtype=scalar, device=body.device)
         self._q = wp.zeros((count, branches), dtype=mat33, device=body.device)
@@ -100,6 +103,9 @@ class ViscoelasticTerm(Term):
         times = np.array(self.mechanism.times)
         self._decay.assign(np.exp(-h / times))
         self._response.assign(np.array(self.mechanism.moduli) * np.exp(-0.5 * h / times))
+
+    def take_moduli(self) -> None:
+        self._weights.assign(np.stack([self.body.mesh.volumes, self.body.shear_moduli], axis=1))
 
     def forget(self) -> None:
         self._q.zero_()

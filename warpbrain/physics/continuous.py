@@ -1,0 +1,159 @@
+"""Numbers that a mechanism can be differentiated by, each by its place, and the same mechanism with other ones.
+
+A `parameter` of a mechanism is one such number if its kind is a number, and several if it is a position, a vector or
+numbers. A number that is none (no ball, so no radius) is left out, and so is a setting of the method (`Says.method`).
+What switches from one thing to another has no derivative: see `warpbrain.physics.switching`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.errors import InputError
+from warpbrain.physics.mechanism import Mechanism, Says
+
+Floats = NDArray[np.float64]
+
+#: Kinds of parameters that are numbers, and those of which the components are.
+_ONE, _SEVERAL = ("number",), ("position", "vector", "numbers")
+#: Over what length [m] something changes that depends on where it is, at most.
+_LENGTH = 0.01
+#: Over what angle [rad] something changes that depends on a direction, at most.
+_TURN = 0.05
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Continuous:
+    """A number of a mechanism.
+
+    Attributes
+    ----------
+    kind : str
+        Of the mechanism.
+    key : str
+        Name of the parameter.
+    component : int or None
+        Of a position, a vector or numbers.
+    says : Says
+    """
+
+    kind: str
+    key: str
+    component: int | None
+    says: Says
+
+    @property
+    def name(self) -> str:
+        """For people: mechanism, parameter and component."""
+        if self.component is None:
+            return f"{self.kind} {self.key}"
+        part = f"{self.component + 1}" if self.says.kind == "numbers" else _AXES[self.component]
+        return f"{self.kind} {self.key} {part}"
+
+    def value(self, mechanism: Mechanism) -> float:
+        """What it is [SI]."""
+        found: Any = getattr(mechanism, self.key)
+        return float(found if self.component is None else found[self.component])
+
+    def scale(self, mechanism: Mechanism) -> float:
+        """By how much it must change to change much [SI]: what a step of a difference is relative to.
+
+        Its own size, or what is expected of it where it is zero; the size of the whole of a vector, or a small part of
+        it where only the direction counts, since a fluid's surface turns with it; at most 1 cm of a length, which
+        regions, patches and fluid levels are as smooth as; and no more than the distance to a limit.
+        A limit that a value may lie on is written a little beyond it, and formulas go on there.
+        """
+        says, value = self.says, self.value(mechanism)
+        whole = getattr(mechanism, self.key)
+        length = says.kind == "position" or says.unit == "mm"
+        if says.kind == "position":
+            return _LENGTH
+        size = abs(value)
+        if says.kind == "vector":
+            size = (1.0 if says.unit else _TURN) * float(np.linalg.norm(whole))
+        expected = says.expectation
+        if size == 0.0 and expected is not None:
+            size = 0.5 * abs(expected.quantile(0.84) - expected.quantile(0.16)) * says.si
+        size = size or says.si
+        if length:
+            size = min(size, _LENGTH)
+        for limit in (says.above, says.below):
+            distance = abs(value - limit * says.si)
+            if math.isfinite(limit) and distance > 1e-9 * size:
+                size = min(size, distance)
+        return size
+
+
+def continuous(mechanism: Mechanism) -> tuple[Continuous, ...]:
+    """Every number that a mechanism can be differentiated by, in the order of its fields."""
+    found: list[Continuous] = []
+    for key, says in mechanism.parameters().items():
+        value: Any = getattr(mechanism, key)
+        if value is None or says.method:
+            continue
+        if says.kind in _ONE:
+            found.append(Continuous(mechanism.kind, key, None, says))
+        elif says.kind in _SEVERAL:
+            found += [Continuous(mechanism.kind, key, component, says) for component in range(len(value))]
+    return tuple(found)
+
+
+def numbers_of(mechanisms: Sequence[Mechanism]) -> Floats:
+    """The numbers of mechanisms, one after the other, shape (p,) [SI]."""
+    return np.array([place.value(mechanism) for mechanism in mechanisms for place in continuous(mechanism)])
+
+
+def scales_of(mechanisms: Sequence[Mechanism]) -> Floats:
+    """The scale of each of these numbers, shape (p,); see `Continuous.scale`."""
+    return np.array([place.scale(mechanism) for mechanism in mechanisms for place in continuous(mechanism)])
+
+
+def with_numbers(mechanisms: Sequence[Mechanism], numbers: ArrayLike) -> tuple[Mechanism, ...]:
+    """The same mechanisms with other numbers.
+
+    Parameters
+    ----------
+    mechanisms : sequence of Mechanism
+    numbers : (p,) array
+        In the order of `numbers_of` [SI].
+
+    Raises
+    ------
+    InputError
+        If there are more or fewer numbers than the mechanisms have, or a mechanism refuses them.
+    """
+    given = np.asarray(numbers, dtype=np.float64)
+    places = [continuous(mechanism) for mechanism in mechanisms]
+    count = sum(map(len, places))
+    if given.shape != (count,):
+        raise InputError(f"mechanisms: found {given.size} numbers, expected {count}")
+    made, at = [], 0
+    for mechanism, own in zip(mechanisms, places, strict=True):
+        values: dict[str, Any] = {}
+        for place, number in zip(own, given[at : at + len(own)].tolist(), strict=True):
+            if place.component is None:
+                values[place.key] = number
+            else:
+                values[place.key] = (*values.get(place.key, ()), number)
+        at += len(own)
+        made.append(replace(mechanism, **values) if own else mechanism)
+    return tuple(made)
+
+
+def differ_in_numbers_only(one: Mechanism, other: Mechanism) -> bool:
+    """Whether two mechanisms are the same but for numbers, settings of the method and the ramp."""
+    if type(one) is not type(other):
+        return False
+    settings = {key: getattr(one, key) for key, says in one.parameters().items() if says.method}
+    places = [continuous(mechanism) for mechanism in (one, other)]
+    if places[0] != places[1]:
+        return False
+    [as_one], [alike] = (with_numbers([mechanism], numbers_of([one])) for mechanism in (one, other))
+    return replace(alike, ramp=one.ramp, **settings) == as_one

@@ -1,0 +1,34 @@
+"""A model in which mechanisms act, from one in which they do not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from warpbrain.physics.load import Load
+from warpbrain.physics.mechanism import Mechanism, Removing, Substituting
+from warpbrain.simulation.model import Material, Model
+
+
+def with_mechanisms(model: Model, mechanisms: Sequence[Mechanism]) -> Model:
+    """The model with mechanisms that act too.
+
+    Those that are loads go to the loads, those that say another law or compressibility change the materials, in their
+    order, and all others act in the system. With other numbers of the same mechanisms (`with_numbers`) the model is one
+    that `System.set_model` takes.
+
+    Parameters
+    ----------
+    model : Model
+        If tissue is removed, of what is left.
+    mechanisms : sequence of Mechanism
+    """
+    loads = [m for m in mechanisms if isinstance(m, Load)]
+    materials = dict(model.materials)
+    for substituting in (m for m in mechanisms if isinstance(m, Substituting)):
+        materials = {
+            label: Material(*substituting.substitute(label, m.law, m.poisson, m.formulation))
+            for label, m in materials.items()
+        }
+    acting = [m for m in mechanisms if not isinstance(m, Removing | Load)]
+    return replace(model, materials=materials, loads=(*loads, *model.loads), mechanisms=(*acting, *model.mechanisms))

@@ -1,0 +1,198 @@
+"""How a motion changes with its parameters: the derivatives of each step of backward Euler, forward in time.
+
+A step (`warpbrain.simulation.dynamics`) ends with nothing left of
+
+    r = (1 + h m_d) M v - M v0 + c K(u*) v - h (f_ext - f_int(u*)) = 0
+
+on the free components, where the linearised step has `u* = u0` and `c = h k_d + h^2`, and the implicit one
+`u* = u0 + h v` and `c = h k_d`. Its whole derivative is one five-point difference along the way of the parameter, the
+start of the step, the velocity at its end, and what terms with a memory remember there: a history beside each
+parameter, advanced along the way after each step (`warpbrain.simulation.beside`). So mechanisms that need times or
+rates are differentiated without knowing it. What is left is corrected with the matrix of the step.
+
+Steps of many seconds are a series of states that are all but at rest, as recordings over minutes have them: inertia and
+damping vanish beside the stiffness.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.errors import InputError
+from warpbrain.kernels.block_linear import BlockConjugateGradient
+from warpbrain.simulation.beside import Beside, ModelOf
+from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.refinement import lengths, refine
+from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, block_solver
+
+Floats = NDArray[np.float64]
+
+
+class MotionSensitivity:
+    """Steps a simulator, and the derivatives of its motion with it.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        As it is now is where all begins: its state does not depend on the parameters.
+    models : callable
+        From parameters (p,) to a model that differs from the system's in numbers only.
+    theta : (p,) array
+        The simulator goes on with the model of these.
+    scales : (p,) array, optional
+        By how much each must change to change much; see `warpbrain.simulation.beside`.
+    tolerance : float
+        Relative: what may be left of what a parameter puts out of balance in a step.
+    max_cg : int
+        Iterations of a linear solve.
+
+    Attributes
+    ----------
+    u, v : (p, n, 3) array
+        Derivatives of displacement [m per unit of the parameter] and velocity [m/s per unit]; zero on constrained
+        components, which move as they are told to whatever the parameters are.
+    """
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        models: ModelOf,
+        theta: ArrayLike,
+        scales: ArrayLike | None = None,
+        tolerance: float = 1e-10,
+        max_cg: int = 10_000,
+    ) -> None:
+        self.simulator = simulator
+        system = simulator.system
+        self._tolerance = max(tolerance, 20.0 * system.precision.epsilon)
+        # a step that was taken stands: terms keep what they need of it
+        simulator.set_time_step(simulator.time_step)
+        self._beside = Beside(system, models, theta, scales)
+        count = len(self._beside)
+        self._solver: BlockConjugateGradient | None = None
+        if count:
+            self._solver = block_solver(system, count, self._tolerance, max_cg)
+        self.u, self.v = (np.zeros((count, system.size, 3)) for _ in range(2))
+
+    def step(self) -> None:
+        """Advance motion and derivatives by one time step, which then stands: the simulator cannot go back.
+
+        Raises
+        ------
+        SolveError
+            If the step has no derivative, or a linear solve does not converge.
+        """
+        simulator, system, beside = self.simulator, self.simulator.system, self._beside
+        u_start, v_start = _host(system.u), _host(simulator.v)
+        simulator.step()
+        if self._solver is None:
+            return
+        u_end = _host(system.u)
+        with beside.away():
+            self.v = self._by_parameters(self._solver, u_start, v_start, u_end)
+            self.u = self.u + simulator.time_step * self.v
+            if beside.remembers:
+                beside.remember(lambda k, offset: self._advance(u_end + offset * self.u[k]))
+
+    def _advance(self, u: Floats) -> None:
+        system = self.simulator.system
+        system.u.assign(u)
+        system.advance()
+
+    def _by_parameters(self, solver: BlockConjugateGradient, u_start: Floats, v_start: Floats, u_end: Floats) -> Floats:
+        """Derivatives (p, n, 3) of the velocity at the end of the step."""
+        simulator, system, beside = self.simulator, self.simulator.system, self._beside
+        h, damping = simulator.time_step, system.model.damping
+        v_end = _host(simulator.v)
+        linearised = simulator.newton == 1
+        share = h * damping.stiffness + (h * h if linearised else 0.0)
+        loaded = [h * beside.by_loads(k, simulator.time) for k in range(len(beside))]
+
+        def unbalanced(start: Floats, v_before: Floats, v: Floats) -> Floats:
+            """`r` but for the loads, where the step begins at a displacement and a velocity."""
+            system.u.assign(start if linearised else start + h * v)
+            system.evaluate_tangents()
+            system.gather_forces()
+            inertia = _host(system.mass)[:, None] * ((1.0 + h * damping.mass) * v - v_before)
+            return inertia + share * system.stiffness_times(v) + h * _host(system.internal)
+
+        def along(k: int, dv: Floats) -> Floats:
+            def look(offset: float, _: Model) -> Floats:
+                return unbalanced(u_start + offset * self.u[k], v_start + offset * self.v[k], v_end + offset * dv)
+
+            return beside.derivative(k, look)
+
+        def left_of(k: int, dv: Floats) -> Floats:
+            return loaded[k] - along(k, dv)
+
+        with beside.here():
+            system.u.assign(u_start if linearised else u_end)
+            system.evaluate_tangents()
+            system.assemble(k=h * damping.stiffness + h * h, m=1.0 + h * damping.mass)
+            inertia = float(np.linalg.norm(_host(system.mass)[:, None] * v_end))
+        corrections = Corrections(solver, system, self._tolerance)
+        start = np.zeros_like(self.v)
+        left = np.array([left_of(k, dv) for k, dv in enumerate(start)])
+        free = ~system.model.constrained
+        # differences are exact to the rounding of what is summed over the step of a parameter
+        rounding = ROUNDINGS * system.precision.epsilon * (h * system.size_of_forces() + inertia)
+        goals = 2.0 * self._tolerance * lengths(left, free) + rounding / beside.steps
+        return refine(left_of, corrections.correct, start, left, goals, free)[0]
+
+
+def follow(
+    simulator: Simulator, models: ModelOf, theta: ArrayLike, times: Sequence[float], scales: ArrayLike | None = None
+) -> Floats:
+    """Derivatives of the displacement at times of a motion.
+
+    Prescribed displacements without a history of their own are reached evenly over the whole.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        At a time before the first; it is at the last afterwards. Its time step is shortened so that a whole number of
+        equal steps leads from each time to the next.
+    models, theta, scales
+        See `MotionSensitivity`.
+    times : sequence of float
+        [s]
+
+    Returns
+    -------
+    (t, p, n, 3) array
+        [m per unit of the parameter]
+
+    Raises
+    ------
+    InputError
+        If the times do not increase.
+    SolveError
+        If a step fails, or has no derivative.
+    """
+    ends = [simulator.time, *map(float, times)]
+    if not times or not all(a < b for a, b in itertools.pairwise(ends)):
+        raise InputError(f"times = {list(times)}: expected times that increase, after {simulator.time:g} s")
+    longest, begin = simulator.time_step, simulator.time
+    found = []
+    derivatives = MotionSensitivity(simulator, models, theta, scales)
+    for start, end in itertools.pairwise(ends):
+        steps = max(1, math.ceil((end - start) / longest * (1.0 - 1e-9)))
+        simulator.set_time_step((end - start) / steps)
+        for _ in range(steps):
+            due = simulator.time + simulator.time_step
+            simulator.prescribe(simulator.system.model.prescribed_at(due, (due - begin) / (ends[-1] - begin)))
+            derivatives.step()
+            simulator.check()
+        found.append(derivatives.u)
+    return np.array(found)
+
+
+def _host(values: wp.array) -> Floats:
+    return values.numpy().astype(np.float64)
