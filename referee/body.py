@@ -1,0 +1,112 @@
+"""The body that the referee deforms: quadratic tetrahedra (FElupe's) on a mesh that is not the case's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from referee.faces import Faces
+from referee.pattern import Pattern
+from warpbrain.mesh import TetMesh, boundary_faces
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+#: Corners of each edge in the order in which FElupe (as VTK) numbers the middles.
+SIDES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A mesh with the middles of its edges.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        Corners [m], tetrahedra, tissues and sets of nodes.
+    """
+
+    mesh: TetMesh
+
+    @cached_property
+    def edges(self) -> Ints:
+        """Corners of each edge, shape (k, 2), the lower number first."""
+        return np.unique(self._sides.reshape(-1, 2), axis=0)
+
+    @property
+    def _sides(self) -> Ints:
+        return np.sort(self.mesh.tetrahedra[:, SIDES].astype(np.int64), axis=2)
+
+    @cached_property
+    def points(self) -> Floats:
+        """Corners, then middles of edges [m], shape (n, 3)."""
+        corners = self.mesh.points
+        return np.concatenate([corners, corners[self.edges].mean(axis=1)])
+
+    @cached_property
+    def cells(self) -> Ints:
+        """Nodes of each tetrahedron, shape (m, 10)."""
+        return np.concatenate([self.mesh.tetrahedra, self.middles(self._sides)], axis=1)
+
+    def middles(self, pairs: Ints) -> Ints:
+        """Numbers of the nodes between pairs of corners (..., 2)."""
+        count = len(self.mesh.points)
+        pairs = np.sort(pairs.astype(np.int64), axis=-1)
+        keys = self.edges @ [count, 1]
+        return count + np.searchsorted(keys, pairs @ [count, 1])
+
+    @cached_property
+    def region(self) -> tuple[Floats, Floats, Floats]:
+        """Gradients (m, q, 10, 3) [1/m], volumes (m, q) [m3] and places (m, q, 3) [m] of the quadrature points."""
+        import felupe
+
+        region = felupe.RegionQuadraticTetra(felupe.Mesh(self.points, self.cells, "tetra10"))
+        gradients = np.ascontiguousarray(np.transpose(region.dhdX, (3, 2, 0, 1)))
+        volumes = np.ascontiguousarray(region.dV.T)
+        shapes = region.h[..., 0] if region.h.ndim == 3 else region.h
+        return gradients, volumes, np.einsum("aq,eai->eqi", shapes, self.points[self.cells])
+
+    @cached_property
+    def shapes(self) -> Floats:
+        """Shape functions (10, q) at the quadrature points."""
+        import felupe
+
+        region = felupe.RegionQuadraticTetra(felupe.Mesh(self.points, self.cells, "tetra10"), grad=False)
+        return region.h[..., 0] if region.h.ndim == 3 else region.h
+
+    @cached_property
+    def pattern(self) -> Pattern:
+        """Where the entries of a matrix of the body go."""
+        return Pattern.of(self.cells, len(self.points))
+
+    @cached_property
+    def outer(self) -> Faces:
+        """The whole surface."""
+        return self._faces(boundary_faces(self.mesh.tetrahedra).astype(np.int64))
+
+    def faces(self, members: Bools) -> Faces:
+        """Faces of the surface of which all corners are members (c,)."""
+        triangles = self.outer.nodes[:, :3]
+        return self._faces(triangles[members[triangles].all(axis=1)])
+
+    def _faces(self, triangles: Ints) -> Faces:
+        sides = triangles[:, [[0, 1], [1, 2], [2, 0]]]
+        return Faces(self.points, np.concatenate([triangles, self.middles(sides)], axis=1))
+
+    def nodes(self, name: str) -> Bools:
+        """Members (n,) of a set: its corners, and middles on the surface between two of them."""
+        corners = self.mesh.node_sets[name]
+        members = np.zeros(len(self.points), dtype=bool)
+        members[: len(corners)] = corners
+        within = self.outer.nodes[:, 3:][corners[self.outer.nodes[:, [[0, 1], [1, 2], [2, 0]]]].all(axis=2)]
+        members[within] = True
+        return members
+
+    @cached_property
+    def centroids(self) -> Floats:
+        """Middles of the tetrahedra [m], shape (m, 3)."""
+        return self.mesh.points[self.mesh.tetrahedra].mean(axis=1)

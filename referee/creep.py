@@ -1,0 +1,68 @@
+"""Tissue under a held load that gives way with time: a Prony series on the isochoric stress, in quasi-static steps.
+
+Each branch follows the isochoric second Piola-Kirchhoff stress ``S`` of the law (Simo and Hughes, Computational
+Inelasticity, section 10.3)
+
+    q_i(t + h) = exp(-h/tau_i) q_i(t) + beta_i exp(-h/(2 tau_i)) (S(t + h) - S(t))
+
+so that a step is an equilibrium of a law whose isochoric part is stiffer by ``sum_i beta_i exp(-h/(2 tau_i))`` under a
+stress that is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from referee.equilibrium import Balance, balance
+from referee.multigrid import Coarse
+from referee.problem import Problem
+
+Floats = NDArray[np.float64]
+
+
+def creep(
+    problem: Problem,
+    branches: Sequence[tuple[float, float]],
+    times: Sequence[float],
+    start: Floats | None = None,
+    coarse: Coarse | None = None,
+) -> list[Balance]:
+    """Equilibria at times [s] after a load was put on at once.
+
+    Parameters
+    ----------
+    problem : Problem
+        With what is left of the stiffness in the end.
+    branches : sequence of (beta, tau)
+        Modulus relative to the law's, and relaxation time [s].
+    times : sequence of float
+        Increasing, above zero; each is reached in one step from the one before.
+    start : (n, 3) array, optional
+        Where to begin [m].
+    coarse : Coarse, optional
+    """
+    stress = np.zeros(problem.body.region[2].shape + (3,))
+    found = [balance(replace(problem, factor=1.0 + sum(beta for beta, _ in branches)), start, coarse)]
+    elastic = _second(problem, found[0].u)
+    stresses = [beta * elastic for beta, _ in branches]
+    before = 0.0
+    for time in times:
+        step = time - before
+        whole = [np.exp(-step / tau) for _, tau in branches]
+        half = [beta * np.exp(-0.5 * step / tau) for beta, tau in branches]
+        kept = [w * q - h * elastic for w, h, q in zip(whole, half, stresses, strict=True)]
+        given = sum(kept, stress if problem.stress is None else problem.stress)
+        now = replace(problem, factor=1.0 + sum(half), stress=given)
+        found.append(balance(now, found[-1].u, coarse))
+        elastic = _second(problem, found[-1].u)
+        stresses = [k + h * elastic for k, h in zip(kept, half, strict=True)]
+        before = time
+    return found[1:]
+
+
+def _second(problem: Problem, u: Floats) -> Floats:
+    return problem.response(problem.gradient(u)).second()

@@ -1,0 +1,205 @@
+"""Effects drawn at random: where they are and what they are like, not yet how large."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from referee.body import Body
+from referee.effects import (
+    Asymmetry,
+    Contact,
+    Effect,
+    Gravity,
+    Inclusion,
+    PreStress,
+    Pressure,
+    Swelling,
+    Tether,
+    Traction,
+    Viscoelasticity,
+    Wire,
+)
+from referee.effects.effect import Place, unit
+from referee.setting import DOWN, Setting
+
+Floats = NDArray[np.float64]
+Random = np.random.Generator
+
+#: Sizes are drawn such that effects stand out by between these, evenly in their logarithm.
+WANTED = (2.5, 32.0)
+#: Largest angle [rad] between where gravity points and where the case says.
+_TILTED = np.deg2rad(8.0)
+#: How far a local effect is from what is held [m].
+_AWAY = 0.03
+
+
+def wanted(random: Random, least: float = WANTED[0]) -> float:
+    """How much an effect shall stand out."""
+    return float(np.exp(random.uniform(np.log(least), np.log(WANTED[1]))))
+
+
+def draw_effect(random: Random, kind: str, setting: Setting) -> Effect:
+    """An effect of a kind, at a middling size."""
+    return _KINDS[kind](random, setting)
+
+
+def _gravity(random: Random, setting: Setting) -> Effect:
+    down = np.array(DOWN)
+    side = unit(np.cross(down, random.normal(size=3)))
+    angle = random.uniform(0.0, _TILTED)
+    points = setting.body.points
+    return Gravity(
+        size=0.03,
+        direction=_place(np.cos(angle) * down + np.sin(angle) * side),
+        declared=DOWN,
+        height=float(np.ptp(points @ down)),
+    )
+
+
+def _pressure(random: Random, setting: Setting) -> Effect:
+    return Pressure(size=60.0, sign=_sign(random))
+
+
+def _traction(random: Random, setting: Setting) -> Effect:
+    centre, normal = _surface(random, setting.body)
+    aslant = unit(-normal + 0.6 * unit(random.normal(size=3)))
+    pushes = 1.0 if random.random() < 0.7 else -1.0
+    radius = float(random.uniform(0.009, 0.016))
+    return Traction(size=500.0, centre=centre, radius=radius, direction=_place(pushes * aslant))
+
+
+def _contact(random: Random, setting: Setting) -> Effect:
+    body = setting.body
+    nodes = np.flatnonzero(body.nodes("side"))
+    centre = _place(body.points[random.choice(nodes)])
+    return Contact(size=0.03, centre=centre, lifts=bool(random.random() < 0.5))
+
+
+def _swelling(random: Random, setting: Setting) -> Effect:
+    centre = _inside(random, setting.body) if random.random() < 0.5 else None
+    return Swelling(size=0.03, sign=_sign(random), centre=centre, radius=float(random.uniform(0.012, 0.022)))
+
+
+def _inclusion(random: Random, setting: Setting) -> Effect:
+    # below the cap, where the declared load strains the tissue
+    body = setting.body
+    cap = body.points[body.nodes("superior")].mean(axis=0)
+    near = body.centroids[np.linalg.norm(body.centroids - cap, axis=1) < 0.05]
+    centre = _place(near[random.integers(len(near))])
+    return Inclusion(size=0.6, sign=_sign(random), centre=centre, radius=float(random.uniform(0.014, 0.024)))
+
+
+def _asymmetry(random: Random, setting: Setting) -> Effect:
+    return Asymmetry(size=float(random.uniform(8.0, 26.0)))
+
+
+def _viscoelasticity(random: Random, setting: Setting) -> Effect:
+    first = setting.times[0] * np.exp(random.uniform(0.0, np.log(8.0)))
+    return Viscoelasticity(size=0.5, times=(float(first), float(5.0 * first)))
+
+
+def _tether(random: Random, setting: Setting) -> Effect:
+    centre, normal = _surface(random, setting.body)
+    anchor = np.asarray(centre) + 0.03 * unit(normal + 0.8 * unit(random.normal(size=3)))
+    return Tether(size=0.1, centre=centre, radius=float(random.uniform(0.008, 0.014)), anchor=_place(anchor))
+
+
+def _pre_stress(random: Random, setting: Setting) -> Effect:
+    normal = unit(random.normal(size=3))
+    axis = unit(np.cross(normal, random.normal(size=3)))
+    thickness = float(random.uniform(0.015, 0.03))
+    return PreStress(
+        size=100.0,
+        centre=_inside(random, setting.body),
+        normal=_place(normal),
+        thickness=thickness,
+        axis=_place(axis),
+    )
+
+
+def _wire(random: Random, setting: Setting) -> Effect:
+    here, there = (_surface(random, setting.body)[0] for _ in range(2))
+    while np.linalg.norm(np.subtract(here, there)) < 0.05:
+        there = _surface(random, setting.body)[0]
+    return Wire(size=0.1, centre=here, other=there, radius=float(random.uniform(0.008, 0.014)))
+
+
+_KINDS: dict[str, Callable[[Random, Setting], Effect]] = {
+    "gravity": _gravity,
+    "pressure": _pressure,
+    "traction": _traction,
+    "contact": _contact,
+    "swelling": _swelling,
+    "inclusion": _inclusion,
+    "asymmetry": _asymmetry,
+    "viscoelasticity": _viscoelasticity,
+    "tether": _tether,
+    "pre-stress": _pre_stress,
+    "wire": _wire,
+}
+#: Names of the tool's mechanisms that truths may have.
+MECHANISMS = tuple(_KINDS)[:8]
+#: Effects that the tool has no name for.
+OUTSIDE = tuple(_KINDS)[8:]
+
+
+def _trap_registration(random: Random, setting: Setting) -> Setting:
+    shift = 0.005 * unit(random.normal(size=3))
+    turn = np.deg2rad(2.5) * unit(random.normal(size=3))
+    return replace(setting, shift=_place(shift), turn=_place(turn))
+
+
+_TRAPS: dict[str, Callable[[Random, Setting], Setting]] = {
+    "registration": _trap_registration,
+    "mispaired": lambda random, setting: replace(setting, mispaired=0.12),
+    "noise": lambda random, setting: replace(setting, noise=3.0, declares_sigma=True),
+    "stiffness": lambda random, setting: replace(setting, field_sd=0.6, field_length=0.02),
+    "coarse": lambda random, setting: replace(setting, mesh="phantom-coarse"),
+    "segmentation": lambda random, setting: replace(setting, bent=float(random.uniform(0.001, 0.002))),
+}
+#: Cases in which something is wrong that is no physics.
+TRAPS = tuple(_TRAPS)
+
+
+def trapped(random: Random, trap: str, setting: Setting) -> Setting:
+    """The setting with something wrong that is no physics."""
+    return _TRAPS[trap](random, setting)
+
+
+def _sign(random: Random) -> int:
+    return 1 if random.random() < 0.5 else -1
+
+
+def _place(vector: Floats) -> Place:
+    x, y, z = (float(value) for value in vector)
+    return x, y, z
+
+
+def _free(body: Body, points: Floats) -> NDArray[np.bool_]:
+    """Which points are away from what is held."""
+    held = body.points[body.nodes("fixed") | body.nodes("side")]
+    return np.array([np.linalg.norm(held - point, axis=1).min() > _AWAY for point in points])
+
+
+def _surface(random: Random, body: Body) -> tuple[Place, Floats]:
+    """A point of the outer surface and its outward normal."""
+    other = body.nodes("ventricle") | body.nodes("superior")
+    nodes = np.setdiff1d(np.unique(body.outer.nodes[:, :3]), np.flatnonzero(other))
+    nodes = nodes[_free(body, body.points[nodes])]
+    node = int(random.choice(nodes))
+    normals = body.outer.spread(body.outer.vectors(body.points))
+    around = np.linalg.norm(body.points - body.points[node], axis=1) < 0.01
+    return _place(body.points[node]), unit(normals[around].sum(axis=0))
+
+
+def _inside(random: Random, body: Body) -> Place:
+    """A point well within the tissue."""
+    places = body.centroids[random.permutation(len(body.centroids))[:400]]
+    surface = body.points[np.unique(body.outer.nodes[:, :3])]
+    depth = np.array([np.linalg.norm(surface - place, axis=1).min() for place in places])
+    deep = places[(depth > 0.006) & _free(body, places)]
+    return _place(deep[0])

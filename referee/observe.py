@@ -1,0 +1,112 @@
+"""What is recorded of a truth: badly registered, with noise that neighbours share, and with mistakes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from referee.truth import Truth
+from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Points on the moved wall of the ventricles, and error of a force relative to it.
+SURFACE_POINTS, FORCE_ERROR = 150, 0.02
+#: Gross errors are as long as this [m].
+GROSS = (0.002, 0.004)
+#: Name of the declared load.
+CAP = "superior cap"
+
+
+def recordings(truth: Truth) -> tuple[Recording, ...]:
+    """Everything that the case folder gets."""
+    setting = truth.setting
+    fitted = _points(truth, "points", "fit", truth.sensors.fitted, mistakes=True)
+    checked = _points(truth, "check", "check", truth.sensors.checked, mistakes=False)
+    made: list[Recording] = [fitted]
+    if setting.surface and not setting.times:
+        made.append(_surface(truth))
+    if setting.total is None:
+        made.append(_force(truth))
+    return (*made, checked)
+
+
+def _sigma(truth: Truth) -> float | None:
+    return truth.setting.sigma if truth.setting.declares_sigma else None
+
+
+def _middle(truth: Truth) -> Floats:
+    points = truth.setting.body.points
+    return 0.5 * (points.min(axis=0) + points.max(axis=0))
+
+
+def seen(truth: Truth, nodes: Ints, salt: int) -> Floats:
+    """Displacement (times, k, 3) [m] of nodes as it is recorded, before mistakes; `salt` tells noises apart."""
+    setting = truth.setting
+    points = setting.body.points[nodes]
+    out = []
+    for k, u in enumerate(truth.u):
+        blur = replace(setting.blur, seed=(setting.seed + 1000 * salt + k) % 2**31)
+        out.append(blur.misaligned(points, u[nodes], _middle(truth)) + blur.noise(points))
+    return np.stack(out)
+
+
+def _points(truth: Truth, name: str, role: str, nodes: Ints, mistakes: bool) -> PointsRecording:
+    setting = truth.setting
+    random = np.random.default_rng([setting.seed, 2])
+    points = setting.body.points[nodes]
+    moved = seen(truth, nodes, 1 if mistakes else 2)
+    if mistakes:
+        wrong = random.random(moved.shape[:2]) < setting.gross
+        errors = random.normal(size=moved.shape)
+        errors *= (random.uniform(*GROSS, size=wrong.shape) / np.linalg.norm(errors, axis=2))[..., None]
+        moved = moved + wrong[..., None] * errors
+        for k in random.permutation(len(nodes))[: round(0.5 * setting.mispaired * len(nodes))]:
+            # with its nearest neighbour
+            other = np.argsort(np.linalg.norm(points - points[k], axis=1))[1]
+            ends = points[[k, other]] + moved[:, [k, other]]
+            moved[:, [k, other]] = ends[:, ::-1] - points[[k, other]]
+    times = np.repeat(setting.times, len(nodes)) if setting.times else None
+    ids = tuple(f"{name[0].upper()}{k + 1:03d}" for k in range(len(nodes)))
+    return PointsRecording(
+        name=name,
+        file="",
+        role=role,
+        sigma=_sigma(truth),
+        points=np.tile(points, (len(moved), 1)),
+        displacement=moved.reshape(-1, 3),
+        time=times,
+        ids=ids * len(moved),
+        outside="nearest",
+    )
+
+
+def _surface(truth: Truth) -> SurfaceRecording:
+    setting = truth.setting
+    random = np.random.default_rng([setting.seed, 3])
+    faces = setting.body.faces(setting.body.mesh.node_sets["ventricle"])
+    areas = faces.areas.sum(axis=1)
+    chosen = random.choice(len(areas), size=SURFACE_POINTS, p=areas / areas.sum())
+    r = np.sort(random.random((SURFACE_POINTS, 2)), axis=1)
+    b = np.stack([r[:, 0], r[:, 1] - r[:, 0], 1.0 - r[:, 1]], axis=1)
+    shapes = np.concatenate([b * (2.0 * b - 1.0), 4.0 * b * np.roll(b, -1, axis=1)], axis=1)
+    nodes = faces.nodes[chosen]
+    points = np.einsum("pa,pai->pi", shapes, setting.body.points[nodes])
+    u = np.einsum("pa,pai->pi", shapes, truth.u[-1][nodes])
+    blur = replace(setting.blur, seed=(setting.seed + 5000) % 2**31)
+    moved = points + blur.misaligned(points, u, _middle(truth)) + blur.noise(points)
+    return SurfaceRecording(
+        name="ventricle wall", file="", role="fit", sigma=_sigma(truth), points=moved, nodes="ventricle"
+    )
+
+
+def _force(truth: Truth) -> ForceRecording:
+    random = np.random.default_rng([truth.setting.seed, 4])
+    error = FORCE_ERROR * float(np.linalg.norm(truth.force))
+    force = truth.force + error * truth.setting.noise * random.normal(size=3)
+    return ForceRecording(
+        name="force", file="", role="fit", sigma=error, boundary=CAP, time=np.array([1.0]), force=force[None]
+    )

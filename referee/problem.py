@@ -1,0 +1,102 @@
+"""What acts on a body: forces that must balance, and how they change with displacement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_matrix
+
+from referee.body import Body
+from referee.law import Law, Response, respond
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+#: Forces (n, 3) [N] at a displacement (n, 3) [m].
+Load = Callable[[Floats], Floats]
+
+
+class Inverted(Exception):
+    """An element has turned inside out."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Problem:
+    """A body at rest under loads.
+
+    Parameters
+    ----------
+    body : Body
+    law : Law
+    mu, bulk, growth : (m, 1) array
+        See `referee.law.respond`.
+    held : (n, 3) bool array
+        What does not move freely; `value` (n, 3) [m] is where it is.
+    loads : tuple of Load
+        Their derivatives are left to Newton's method, which converges a little more slowly for it.
+    springs : callable or None
+        Stiffness (n, 3, 3) [N/m] at a displacement (n, 3) that ties each node to where it was.
+    stress : (m, q, 3, 3) array or None
+        Second Piola-Kirchhoff stress [Pa] beside that of the law.
+    factor : float
+        On the isochoric stress of the law.
+    """
+
+    body: Body
+    law: Law
+    mu: Floats
+    bulk: Floats
+    growth: Floats
+    held: Bools
+    value: Floats
+    loads: tuple[Load, ...] = ()
+    springs: Callable[[Floats], Floats] | None = None
+    stress: Floats | None = None
+    factor: float = 1.0
+
+    def gradient(self, u: Floats) -> Floats:
+        """Deformation gradients (m, q, 3, 3); `Inverted` if one is not a deformation."""
+        G = self.body.region[0]
+        F = np.swapaxes(u[self.body.cells], 1, 2)[:, None] @ G + np.eye(3)
+        if np.linalg.det(F).min() <= 0.0:
+            raise Inverted
+        return F
+
+    def response(self, F: Floats) -> Response:
+        """Of the law."""
+        return respond(self.law, F, self.mu, self.bulk, self.growth)
+
+    def residual(self, u: Floats, F: Floats, response: Response) -> Floats:
+        """Internal minus external forces (n, 3) [N]."""
+        P = response.stress(self.factor)
+        if self.stress is not None:
+            P = P + F @ self.stress
+        G, volumes, _ = self.body.region
+        inner = (G @ np.swapaxes(P * volumes[..., None, None], -1, -2)).sum(axis=1)
+        out = np.zeros_like(u)
+        for k in range(3):
+            out[:, k] = np.bincount(self.body.cells.ravel(), inner[..., k].ravel(), minlength=len(u))
+        for load in self.loads:
+            out -= load(u)
+        if self.springs is not None:
+            out += (self.springs(u) @ u[..., None])[..., 0]
+        return out
+
+    def tangent(self, u: Floats, response: Response) -> bsr_matrix:
+        """Derivative of the residual, without that of the loads."""
+        A = response.tangent(self.factor)
+        if self.stress is not None:
+            # delta_ik S_JL
+            for i in range(3):
+                A[..., 3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += self.stress
+        G, volumes, _ = self.body.region
+        cells, q = A.shape[:2]
+        # (i J, k L) -> (J, i k L)
+        A = (A * volumes[..., None, None]).reshape(cells, q, 3, 3, 3, 3).transpose(0, 1, 3, 2, 4, 5)
+        local = np.zeros((cells, 90, 10))
+        for k in range(q):
+            left = G[:, k] @ np.ascontiguousarray(A[:, k]).reshape(cells, 3, 27)
+            local += left.reshape(cells, 90, 3) @ np.swapaxes(G[:, k], 1, 2)
+        return self.body.pattern.matrix(local.reshape(cells, 10, 3, 3, 10), self.springs and self.springs(u))

@@ -1,0 +1,226 @@
+"""Everything of a case but its effects: tissue, known load, how it is observed; drawn at random."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from concealed.observing import SIGMA, Blur
+from referee.body import Body
+from referee.fields import random_field
+from referee.geometry import declared_case, true_body
+from referee.law import Demiray, Law, Ogden
+from referee.problem import Problem
+from warpbrain.mesh import TetMesh
+
+Floats = NDArray[np.float64]
+Random = np.random.Generator
+
+#: Where every case says that down is: the patient lies on the back.
+DOWN = (0.0, -1.0, 0.0)
+#: Noise that neighbours share, in parts of the noise of each alone, and over which distance [m].
+SHARED, SHARED_LENGTH = 0.4, 0.025
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """What is true of a case beside its effects.
+
+    Parameters
+    ----------
+    geometry : str
+        One of `referee.geometry.NAMES`.
+    law : {"ogden", "demiray"}
+    shape : tuple of float
+        Share of the first term and both exponents, or Demiray's exponent.
+    mu : tuple of float
+        Shear modulus of each tissue [Pa], in order of label.
+    poisson : float
+    field_sd, field_length, field_seed
+        Of the logarithm of stiffness, beside the mean of each tissue [m].
+    total : (x, y, z) or None
+        Declared force on the superior cap [N].
+    moved : (x, y, z) or None
+        Or its declared displacement [m].
+    sigma : float
+        Of one component of a point [m], and whether the case declares it.
+    noise : float
+        Factor on all noise, which nobody declares.
+    gross : float
+        Share of points with gross errors.
+    shift, turn : (x, y, z)
+        Error of registration [m] and [rad].
+    points, checks : int
+        How many points are recorded to be fitted, and apart to be compared with.
+    surface : bool
+        Whether the moved wall of the ventricles is recorded too.
+    times : tuple of float
+        When points are recorded [s]; empty: no time is told.
+    bent : float
+        How far the true surface is from the declared one [m], root mean square.
+    mispaired : float
+        Share of points that have the end of another.
+    mesh : str
+        The mesh that the case declares.
+    seed : int
+        Of noise and of where is recorded.
+    """
+
+    geometry: str
+    law: str
+    shape: tuple[float, ...]
+    mu: tuple[float, ...]
+    poisson: float
+    field_sd: float
+    field_length: float
+    field_seed: int
+    total: tuple[float, float, float] | None
+    moved: tuple[float, float, float] | None
+    sigma: float
+    declares_sigma: bool
+    noise: float
+    gross: float
+    shift: tuple[float, float, float]
+    turn: tuple[float, float, float]
+    points: int
+    checks: int
+    surface: bool
+    times: tuple[float, ...]
+    seed: int
+    bent: float = 0.0
+    mispaired: float = 0.0
+    mesh: str = ""
+
+    @cached_property
+    def body(self) -> Body:
+        """The true body."""
+        body = true_body(self.geometry)
+        if self.bent == 0.0:
+            return body
+        # in each direction a part of the whole
+        away = self.bent / np.sqrt(3.0) * random_field(body.mesh.points, 0.03, self.seed + 1, 3)
+        mesh = body.mesh
+        return Body(TetMesh(mesh.points + away, mesh.tetrahedra, mesh.tissue, dict(mesh.node_sets)))
+
+    @property
+    def true_law(self) -> Law:
+        """Of the tissue."""
+        if self.law == "demiray":
+            return Demiray(*self.shape)
+        share, *exponents = self.shape
+        return Ogden((share, 1.0 - share), tuple(exponents))
+
+    @property
+    def blur(self) -> Blur:
+        """How observation goes wrong."""
+        return Blur(
+            noise_scale=self.noise * self.sigma / SIGMA,
+            shared_sigma=SHARED * SIGMA,
+            shared_length=SHARED_LENGTH,
+            shift=self.shift,
+            rotation=self.turn,
+            seed=self.seed,
+        )
+
+    def problem(self) -> Problem:
+        """The body under what the case declares."""
+        body = self.body
+        labels = np.unique(body.mesh.tissue)
+        mean = np.asarray(self.mu)[np.searchsorted(labels, body.mesh.tissue)]
+        mu = (mean * np.exp(self.field_sd * random_field(body.centroids, self.field_length, self.field_seed)[:, 0]))[
+            :, None
+        ]
+        held = body.nodes("fixed") | body.nodes("side")
+        value = np.zeros_like(body.points)
+        loads = ()
+        if self.total is not None:
+            force = cap_force(body, np.asarray(self.total))
+            loads = (lambda u: force,)
+        else:
+            cap = body.nodes("superior") & ~held
+            value[cap] = np.asarray(self.moved)
+            held = held | cap
+        return Problem(
+            body=body,
+            law=self.true_law,
+            mu=mu,
+            bulk=mu * 2.0 * (1.0 + self.poisson) / (3.0 * (1.0 - 2.0 * self.poisson)),
+            growth=np.zeros_like(mu),
+            held=np.repeat(held[:, None], 3, axis=1),
+            value=value,
+            loads=loads,
+        )
+
+    def told(self) -> dict[str, Any]:
+        """Everything of it, for the label."""
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
+
+
+def cap_force(body: Body, total: Floats) -> Floats:
+    """Nodal forces [N] of a force on the superior cap, linear between its nodes, of which each has an equal share."""
+    cap = body.mesh.node_sets["superior"]
+    outer = body.outer
+    triangles = outer.nodes[:, :3]
+    areas = np.bincount(triangles.ravel(), np.repeat(outer.areas.sum(axis=1) / 3.0, 3), minlength=len(cap))
+    density = np.where(cap, 1.0 / cap.sum() / np.where(areas > 0.0, areas, 1.0), 0.0)
+    return outer.spread((outer.linear(density) * outer.areas)[..., None] * total)
+
+
+def draw_setting(random: Random, geometry: str, timed: bool) -> Setting:
+    """Draw what is true of a case beside its effects.
+
+    Parameters
+    ----------
+    random : numpy Generator
+    geometry : str
+    timed : bool
+        Whether points must be recorded at several times; otherwise some cases are too.
+    """
+    if random.random() < 0.5:
+        law, shape = "demiray", (float(random.uniform(0.3, 2.0)),)
+    else:
+        law, shape = "ogden", (float(random.uniform(0.4, 0.7)), *map(float, random.uniform([2.0, -3.0], [5.0, -1.0])))
+    force = timed or random.random() < 0.7
+    tilt = random.normal(size=2) * 0.25
+    pressed = np.array([*tilt, -1.0])
+    amount = random.uniform(1.6, 3.0) if force else random.uniform(0.004, 0.007)
+    load = tuple(float(x) for x in amount * pressed)
+    declared = [tissue.known_law.shear_modulus for _, tissue in sorted(declared_case(geometry).tissues.items())]
+    mu = np.array(declared) * np.exp(0.25 * random.normal() + 0.12 * random.normal(size=len(declared)))
+    return Setting(
+        geometry=geometry,
+        mesh=geometry,
+        law=law,
+        shape=shape,
+        mu=tuple(map(float, mu)),
+        poisson=float(random.uniform(0.46, 0.48)),
+        field_sd=float(random.uniform(0.08, 0.16)),
+        field_length=float(random.choice([random.uniform(0.012, 0.018), random.uniform(0.045, 0.07)])),
+        field_seed=int(random.integers(2**31)),
+        total=load if force else None,
+        moved=None if force else load,
+        sigma=float(np.round(random.uniform(0.25e-3, 0.45e-3), 6)),
+        declares_sigma=bool(random.random() < 0.8),
+        noise=float(random.uniform(0.8, 1.25)),
+        gross=0.04,
+        shift=_within(random, 0.7e-3),
+        turn=_within(random, np.deg2rad(0.7)),
+        points=int(random.integers(50, 111)),
+        checks=30,
+        surface=bool(random.random() < 0.6),
+        times=_times(random) if timed or (force and random.random() < 0.25) else (),
+        seed=int(random.integers(2**31)),
+    )
+
+
+def _within(random: Random, size: float) -> tuple[float, float, float]:
+    return tuple(float(x) for x in size / np.sqrt(3.0) * random.normal(size=3))
+
+
+def _times(random: Random) -> tuple[float, ...]:
+    first = random.uniform(0.5, 2.0)
+    return tuple(float(np.round(first * factor, 2)) for factor in (1.0, 5.0, 25.0))
