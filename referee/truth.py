@@ -126,7 +126,7 @@ def _settle(
             acting = effect.act(acting)
     coarse = base.linear.coarse if (acting.held == base.linear.held).all() else None
     if branches:
-        return creep(acting, branches, times, coarse=coarse)
+        return creep(acting, branches, times, base.u, coarse)
     start = base.u + sum(moves)
     try:
         return [balance(acting, start, coarse)]

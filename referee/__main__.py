@@ -1,0 +1,90 @@
+"""The referee: ``python -m referee make|run|score``; ``mesh`` makes its meshes anew. See docs/referee.md."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from warpbrain.errors import InputError
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m referee", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    make = commands.add_parser("make", help="make a set of cases and seal what is true of them")
+    make.add_argument("--set", required=True, choices=("development", "calibration", "scored"), dest="which")
+    make.add_argument("--count", type=int, help="how many; 18, 80 or 120 if absent")
+    make.add_argument("--out", type=Path, required=True)
+    make.add_argument("--geometry", nargs="+", help="bodies, in turn; phantom 0529 or, for the scored set, phantom 0603")
+    make.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes")
+    make.add_argument("--seed", default="1", help="any text, such as the hash of the commit that froze the tool")
+    run = commands.add_parser("run", help="let the tool diagnose every case, as a user would")
+    run.add_argument("--cases", type=Path, required=True)
+    run.add_argument("--out", type=Path, required=True)
+    run.add_argument("--device", help="given to the tool")
+    run.add_argument("--workers", type=int, default=1, help="processes")
+    run.add_argument("--tool-args", default="", help='more for the tool, such as "--ablation no-nuisances"')
+    score = commands.add_parser("score", help="open the labels and compare")
+    score.add_argument("--cases", type=Path, required=True)
+    score.add_argument("--labels", type=Path, required=True)
+    score.add_argument("--commitments", type=Path, help="the published hashes; commitments.txt beside the labels if absent")
+    score.add_argument("--diagnoses", type=Path, required=True, help="where run wrote")
+    score.add_argument("--out", type=Path, required=True)
+    score.add_argument("--no-baselines", action="store_true", help="leave the baselines out")
+    commands.add_parser("mesh", help="make the meshes of truths anew, with MMG")
+    return parser
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry point; 2 if something that was given is wrong."""
+    given = _parser().parse_args(arguments)
+    try:
+        return _COMMANDS[given.command](given)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+
+
+def _make(given: argparse.Namespace) -> int:
+    from referee.geometry import NAMES
+    from referee.make import make_set
+    from referee.plan import SETS
+
+    geometries = given.geometry or (["phantom", "phantom", "0603" if given.which == "scored" else "0529"])
+    for name in geometries:
+        if name not in NAMES:
+            raise InputError(f"--geometry {name}: expected one of {', '.join(NAMES)}")
+    count = SETS[given.which] if given.count is None else given.count
+    if count < 1 or given.workers < 1:
+        raise InputError("--count and --workers: expected 1 or more")
+    make_set(given.which, count, given.out, geometries, given.workers, given.seed)
+    return 0
+
+
+def _run(given: argparse.Namespace) -> int:
+    from referee.run import run_all
+
+    return run_all(given.cases, given.out, given.device, given.workers, given.tool_args.split())
+
+
+def _score(given: argparse.Namespace) -> int:
+    from referee.score import score_all
+
+    commitments = given.commitments or given.labels / "commitments.txt"
+    print(score_all(given.cases, given.labels, commitments, given.diagnoses, given.out, not given.no_baselines))
+    return 0
+
+
+def _mesh(given: argparse.Namespace) -> int:
+    from referee.meshing import make_meshes
+
+    make_meshes()
+    return 0
+
+
+_COMMANDS = {"make": _make, "run": _run, "score": _score, "mesh": _mesh}
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,148 @@
+"""What the tool said of a case: its `diagnosis.json`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from warpbrain.errors import InputError
+
+#: Every verdict there is.
+VERDICTS = ("nothing missing", "named", "group", "named + rest", "unknown", "not physics", "cannot say")
+#: Those that claim that physics is missing.
+ALARMS = ("named", "group", "named + rest", "unknown")
+#: Those that say which.
+NAMING = ("named", "group", "named + rest")
+_UNITS = {"": 1.0, "1": 1.0, "%": 0.01, "mm": 1e-3, "m": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N": 1.0, "s": 1.0}
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A candidate.
+
+    Attributes
+    ----------
+    name : str
+    probability : float
+    detectability : float or None
+        At its typical size.
+    """
+
+    name: str
+    probability: float
+    detectability: float | None
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What the tool said.
+
+    Attributes
+    ----------
+    verdict : str
+        One of `VERDICTS`.
+    names : tuple of str
+        What it names: several if it says that several act.
+    probability : float or None
+        Of what it names.
+    group : tuple of str
+        What it cannot tell apart.
+    ranking : tuple of Ranked
+        Best first.
+    parameters : dict of str to (value, sd)
+        In SI units; sd is None if there is none.
+    centre : (x, y, z) or None
+        [m]
+    heldout : dict of str to float
+        Error at what was not fitted [m]: declared, refitted, explained, as far as it is told.
+    """
+
+    verdict: str
+    names: tuple[str, ...]
+    probability: float | None
+    group: tuple[str, ...]
+    ranking: tuple[Ranked, ...]
+    parameters: dict[str, tuple[float, float | None]]
+    centre: tuple[float, float, float] | None
+    heldout: dict[str, float]
+
+    @property
+    def alarm(self) -> bool:
+        """Whether it claims that physics is missing."""
+        return self.verdict in ALARMS
+
+    @property
+    def spoken(self) -> bool:
+        """Whether it says one name, not a group."""
+        return self.verdict in ("named", "named + rest") and bool(self.names)
+
+    @property
+    def said(self) -> set[str]:
+        """Every name that it gives."""
+        return {*self.names, *self.group} if self.verdict in NAMING else set()
+
+    @property
+    def first(self) -> str:
+        """The best candidate; nothing if it says that nothing is missing."""
+        if self.verdict == "nothing missing" or not self.ranking:
+            return ""
+        return self.ranking[0].name
+
+
+def read_diagnosis(file: Path) -> Diagnosis:
+    """Read a `diagnosis.json`; `InputError` naming file and key if it is not one."""
+    try:
+        data: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{file}: {error}") from None
+    try:
+        return _diagnosis(data)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"{file}: {type(error).__name__} {error}: not what a diagnosis says") from None
+
+
+def _diagnosis(data: dict[str, Any]) -> Diagnosis:
+    verdict = " + ".join(part.strip() for part in data["verdict"].lower().replace("_", " ").split("+"))
+    if verdict not in VERDICTS:
+        raise ValueError(f"verdict '{data['verdict']}'")
+    mechanism = data.get("mechanism") or []
+    names = [mechanism] if isinstance(mechanism, str) else mechanism
+    where = data.get("where") or {}
+    centre = where.get("centre_m")
+    return Diagnosis(
+        verdict=verdict,
+        names=tuple(part.strip() for name in names for part in name.split("+")),
+        probability=data.get("probability"),
+        group=tuple(data.get("group") or ()),
+        ranking=tuple(
+            Ranked(row["mechanism"], float(row["probability"]), row.get("detectability")) for row in data["ranking"]
+        ),
+        parameters={name: _parameter(said) for name, said in (data.get("parameters") or {}).items()},
+        centre=None if centre is None else (float(centre[0]), float(centre[1]), float(centre[2])),
+        heldout=_heldout(data.get("fit") or {}),
+    )
+
+
+def _parameter(said: dict[str, Any]) -> tuple[float, float | None]:
+    si = _UNITS[said.get("unit") or ""]
+    value, sd = said["value"], said.get("sd")
+    # of several branches the sum counts
+    value = sum(value) if isinstance(value, list) else value
+    if isinstance(sd, list):
+        sd = sum(s**2 for s in sd) ** 0.5
+    return si * float(value), None if sd is None else si * float(sd)
+
+
+def _heldout(fit: dict[str, Any]) -> dict[str, float]:
+    """Error at what was not fitted, told by stage or by quantity."""
+    found = {}
+    for stage in ("declared", "refitted", "explained"):
+        by_stage, by_quantity = fit.get(stage), fit.get("heldout_rmse_m")
+        value = by_stage.get("heldout_rmse_m") if isinstance(by_stage, dict) else None
+        if value is None and isinstance(by_quantity, dict):
+            value = by_quantity.get(stage)
+        if value is not None:
+            found[stage] = float(value)
+    return found

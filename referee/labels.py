@@ -1,0 +1,123 @@
+"""Labels: what is true of a case, sealed apart from its folder until the tool has spoken."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from concealed.sealing import fingerprint, open_sealed, read_sealed, sealed, write_sealed
+from referee.observe import seen
+from referee.plan import Planned
+from referee.truth import Truth
+from warpbrain.errors import InputError
+
+#: What a folder of labels has: sealed truths, and the list of their hashes, which is published.
+COMMITMENTS = "commitments.txt"
+
+
+def label_of(name: str, plan: Planned, truth: Truth, attempts: list[str]) -> dict[str, Any]:
+    """Everything that is true of a case.
+
+    Parameters
+    ----------
+    name : str
+    plan : Planned
+    truth : Truth
+    attempts : list of str
+        Why earlier draws of this case were given up.
+    """
+    fitted, checked = truth.sensors.fitted, truth.sensors.checked
+    points = truth.setting.body.points
+    clean = truth.effect(fitted)
+    noise = seen(truth, checked, 2) - _registered(truth, checked)
+    effects = []
+    for effect, d in zip(truth.effects, truth.d, strict=True):
+        effects.append({**effect.told(), "detectability": _number(d)})
+    return {
+        "case": name,
+        "kind": plan.kind,
+        "names": list(plan.names),
+        "effects": effects,
+        "detectability": _number(truth.whole),
+        "rms_effect_m": _number(np.sqrt((clean**2).sum(axis=2).mean())),
+        "rms_declared_m": _number(np.sqrt((truth.declared[fitted] ** 2).sum(axis=1).mean())),
+        "setting": truth.setting.told(),
+        "points_m": _array(points[fitted]),
+        "clean_effect_m": _array(clean),
+        "check_points_m": _array(points[checked]),
+        "check_displacement_m": _array(truth.u[:, checked]),
+        "check_noise_m": _number(np.sqrt((noise**2).sum(axis=2).mean())),
+        "forces_left": _number(truth.left),
+        "attempts": attempts,
+    }
+
+
+def _registered(truth: Truth, nodes: NDArray[np.int64]) -> NDArray[np.float64]:
+    points = truth.setting.body.points
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return np.stack([truth.setting.blur.misaligned(points[nodes], u[nodes], middle) for u in truth.u])
+
+
+def _number(value: Any) -> float:
+    return float(f"{float(value):.6g}")
+
+
+def _array(values: NDArray[np.float64]) -> list[Any]:
+    """To a tenth of a micrometre."""
+    return np.round(values, 7).tolist()
+
+
+def seal(folder: Path, label: dict[str, Any]) -> str:
+    """Write a label, and return its hash."""
+    data = sealed(label)
+    write_sealed(folder / f"{label['case']}.json.gz", data)
+    return fingerprint(data)
+
+
+def write_commitments(folder: Path) -> None:
+    """List the hashes of all labels of a folder."""
+    lines = [f"{fingerprint(read_sealed(file))}  {file.name[: -len('.json.gz')]}\n" for file in _files(folder)]
+    (folder / COMMITMENTS).write_text("".join(lines), encoding="ascii")
+
+
+def open_labels(folder: Path, commitments: Path) -> dict[str, dict[str, Any]]:
+    """Labels by name of case, each of which has the hash that was published.
+
+    Parameters
+    ----------
+    folder : Path
+        Of sealed labels.
+    commitments : Path
+        The list of hashes that was published.
+
+    Raises
+    ------
+    InputError
+        If a label is missing, was not committed to, or is not the one whose hash was published.
+    """
+    published = {}
+    for line in commitments.read_text(encoding="ascii").splitlines():
+        digest, name = line.split()
+        published[name] = digest
+    labels = {}
+    for file in _files(folder):
+        name = file.name[: -len(".json.gz")]
+        data = read_sealed(file)
+        if name not in published:
+            raise InputError(f"{file}: {commitments} has no hash of '{name}'")
+        if fingerprint(data) != published[name]:
+            raise InputError(f"{file}: its hash is {fingerprint(data)}, {commitments} says {published[name]}")
+        labels[name] = open_sealed(data)
+        if labels[name]["case"] != name:
+            raise InputError(f"{file}: is the label of '{labels[name]['case']}'")
+    missing = sorted(set(published) - set(labels))
+    if missing:
+        raise InputError(f"{folder}: no label of {', '.join(missing)}, whose hashes are in {commitments}")
+    return labels
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(folder.glob("*.json.gz"))

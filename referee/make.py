@@ -1,0 +1,111 @@
+"""Makes a set of cases over processes: folders for the tool, sealed labels apart from them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from referee.draw import draw_effect, trapped, wanted
+from referee.equilibrium import NoTruth
+from referee.folder import write_folder
+from referee.labels import label_of, seal, write_commitments
+from referee.plan import BOTH, Planned, planned
+from referee.setting import draw_setting
+from referee.truth import Truth, solve_truth
+
+#: Rooms of a set.
+CASES, LABELS = "cases", "labels"
+#: Draws of a case at most.
+ATTEMPTS = 12
+
+
+def seed_of(text: str) -> int:
+    """Number of a seed that is any text, such as the hash of the commit that froze the tool."""
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:6], "big")
+
+
+def make_set(which: str, count: int, out: Path, geometries: Sequence[str], workers: int, seed: str) -> list[str]:
+    """Make a set; cases that are there already are kept, so that an interrupted set is finished by the same command.
+
+    Parameters
+    ----------
+    which : str
+    count : int
+    out : Path
+        Gets `cases` for the tool and `labels` for the referee.
+    geometries : sequence of str
+    workers : int
+        Processes.
+    seed : str
+
+    Returns
+    -------
+    list of str
+        One line for each case that was made.
+    """
+    number = seed_of(f"{which} {seed}")
+    plans = planned(which, count, geometries, number)
+    names = [f"{which[:3]}-{k + 1:03d}" for k in range(count)]
+    missing = [k for k, name in enumerate(names) if not (out / LABELS / f"{name}.json.gz").exists()]
+    lines = []
+    # a fresh process knows nothing of the threads of this one
+    with ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"), initializer=_single) as pool:
+        jobs = [pool.submit(make_case, out, names[k], plans[k], [number, k]) for k in missing]
+        for job in as_completed(jobs):
+            lines.append(job.result())
+            print(f"{len(lines)} of {len(missing)}: {lines[-1]}", flush=True)
+    write_commitments(out / LABELS)
+    shutil.copy(out / LABELS / "commitments.txt", out / "commitments.txt")
+    return lines
+
+
+def _single() -> None:
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
+
+
+def make_case(out: Path, name: str, plan: Planned, seed: Sequence[int]) -> str:
+    """Make one case; a draw without a truth that converges is counted, and drawn again.
+
+    Returns
+    -------
+    str
+        How it went, without what is true of it.
+    """
+    started = time.perf_counter()
+    given_up: list[str] = []
+    for attempt in range(ATTEMPTS):
+        try:
+            truth = _draw(plan, [*seed, attempt])
+            break
+        except NoTruth as reason:
+            given_up.append(str(reason))
+    else:
+        raise NoTruth(f"{name}: no truth in {ATTEMPTS} draws: {'; '.join(given_up)}")
+    folder = out / CASES / name
+    # half a folder of an interrupted making
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    write_folder(folder, name, truth)
+    seal(out / LABELS, label_of(name, plan, truth, given_up))
+    return f"{name} in {time.perf_counter() - started:.0f} s, {len(given_up)} draws given up"
+
+
+def _draw(plan: Planned, seed: Sequence[int]) -> Truth:
+    random = np.random.default_rng(list(seed))
+    setting = draw_setting(random, plan.geometry, timed="viscoelasticity" in plan.names)
+    if plan.kind == "trap":
+        setting = trapped(random, plan.names[0], setting)
+    if plan.kind in ("none", "trap"):
+        return solve_truth(setting, (), ())
+    effects = [draw_effect(random, name, setting) for name in plan.names]
+    least = {"least": BOTH} if plan.kind == "two" else {}
+    return solve_truth(setting, effects, [wanted(random, **least) for _ in effects])

@@ -1,0 +1,100 @@
+"""Which cases a set has."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from referee.draw import MECHANISMS, OUTSIDE, TRAPS
+
+#: Sets, and how many cases each has if nobody says.
+SETS = {"development": 18, "calibration": 80, "scored": 120}
+#: Least detectability of each of two effects at once.
+BOTH = 5.0
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A case before anything is drawn.
+
+    Attributes
+    ----------
+    kind : {"none", "effect", "two", "outside", "trap"}
+    names : tuple of str
+        Of effects, or of the trap.
+    geometry : str
+    """
+
+    kind: str
+    names: tuple[str, ...]
+    geometry: str
+
+
+def planned(which: str, count: int, geometries: Sequence[str], seed: int) -> list[Planned]:
+    """The cases of a set, in an order that says nothing.
+
+    Parameters
+    ----------
+    which : str
+        A name in `SETS`.
+    count : int
+        The scored set of 120 has 24 cases of which nothing is missing, 9 of each mechanism, 12 of two at once, 6 outside
+        the dictionary and 6 traps, and any other number has the same shares; of calibration half has nothing missing
+        and half a mechanism; development takes one of everything in turn.
+    geometries : sequence of str
+        In turn.
+    seed : int
+        Of the order, and of which two act at once.
+    """
+    random = np.random.default_rng([seed, count])
+    pairs = list(itertools.combinations(MECHANISMS, 2))
+    two = [pairs[k] for k in random.permutation(len(pairs))]
+    if which == "calibration":
+        turn = itertools.chain.from_iterable((("none", ()), ("effect", (name,))) for name in itertools.cycle(MECHANISMS))
+        chosen = list(itertools.islice(turn, count))
+    elif which == "development":
+        chosen = _development(count, two)
+    else:
+        chosen = _scored(count, two)
+    # each kind meets every geometry
+    of_kind: dict[tuple[str, ...], int] = {}
+    cases = []
+    for kind, names in chosen:
+        key = (kind, *names) if kind == "effect" else (kind,)
+        turn_of = of_kind.get(key, len(of_kind))
+        of_kind[key] = turn_of + 1
+        geometry = geometries[turn_of % len(geometries)]
+        if names == ("coarse",):
+            geometry = "phantom"
+        cases.append(Planned(kind, names, geometry))
+    return [cases[k] for k in random.permutation(len(cases))]
+
+
+Chosen = list[tuple[str, tuple[str, ...]]]
+
+
+def _development(count: int, two: list[tuple[str, str]]) -> Chosen:
+    once: Chosen = [("none", ())]
+    once += [("effect", (name,)) for name in MECHANISMS[:4]] + [("none", ())]
+    once += [("effect", (name,)) for name in MECHANISMS[4:]] + [("none", ()), ("two", two[0])]
+    once += [("outside", (OUTSIDE[0],)), ("trap", (TRAPS[0],)), ("effect", ("inclusion",)), ("effect", ("contact",))]
+    once += [("outside", (OUTSIDE[1],)), ("trap", (TRAPS[4],))]
+    return [once[k % len(once)] for k in range(count)]
+
+
+def _scored(count: int, two: list[tuple[str, str]]) -> Chosen:
+    shares = {"none": 24, "two": 12, "outside": 6, "trap": 6}
+    rows: Chosen = []
+    for kind, share in shares.items():
+        names: list[tuple[str, ...]] = {
+            "none": [()],
+            "two": list(two),
+            "outside": [(name,) for name in OUTSIDE],
+            "trap": [(name,) for name in TRAPS],
+        }[kind]
+        rows += [(kind, names[k % len(names)]) for k in range(round(share * count / 120))]
+    rest = count - len(rows)
+    return rows + [("effect", (MECHANISMS[k % len(MECHANISMS)],)) for k in range(rest)]
