@@ -1,0 +1,88 @@
+"""Pictures of scores."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from referee.intervals import share
+from referee.outcomes import Outcome
+from referee.scores import BINS, bin_name
+
+#: Okabe and Ito's blue, vermilion and grey.
+BLUE, VERMILION, GREY = "#0072B2", "#D55E00", "#777777"
+
+
+def draw_figures(
+    folder: Path,
+    confused: tuple[list[str], list[str], list[list[int]]],
+    calibrated: Mapping[str, Any],
+    outcomes: Sequence[Outcome],
+) -> None:
+    """Write `confusion.png`, `reliability.png` and `accuracy.png`."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    _confusion(folder / "confusion.png", *confused)
+    _reliability(folder / "reliability.png", calibrated["rows"])
+    _accuracy(folder / "accuracy.png", [o for o in outcomes if o.kind == "effect"])
+
+
+def _confusion(file: Path, rows: list[str], columns: list[str], table: list[list[int]]) -> None:
+    from matplotlib import pyplot as plt
+
+    counts = np.array(table, dtype=float)
+    parts = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
+    figure, axes = plt.subplots(figsize=(2.6 + 0.5 * len(columns), 1.8 + 0.32 * len(rows)), layout="constrained")
+    axes.imshow(parts, cmap="Blues", vmin=0.0, vmax=1.2, aspect="auto")
+    for i, j in np.argwhere(counts > 0):
+        axes.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", color="white" if parts[i, j] > 0.6 else "black")
+    axes.set_xticks(range(len(columns)), columns, rotation=45, ha="right")
+    axes.set_yticks(range(len(rows)), rows)
+    axes.set(xlabel="said", ylabel="true", title="Cases; darker: larger part of the row")
+    figure.savefig(file, dpi=150)
+    plt.close(figure)
+
+
+def _reliability(file: Path, rows: Sequence[Sequence[float]]) -> None:
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(4.2, 4.0), layout="constrained")
+    axes.plot([0, 1], [0, 1], color=GREY, linestyle=":", label="as stated")
+    for p, right, count in rows:
+        low, high = share([True] * round(right * count) + [False] * round((1 - right) * count)).interval
+        axes.errorbar(p, right, [[right - low], [high - right]], fmt="o", color=BLUE, capsize=3)
+        axes.annotate(f"{count:.0f}", (p, right), textcoords="offset points", xytext=(7, -11))
+    axes.set(xlim=(0, 1.05), ylim=(0, 1.05), xlabel="stated probability of the name", ylabel="share that is right")
+    axes.set_title("Spoken names: how many, with 95 % intervals", fontsize=10)
+    axes.legend(loc="upper left", frameon=False)
+    figure.savefig(file, dpi=150)
+    plt.close(figure)
+
+
+def _accuracy(file: Path, effects: Sequence[Outcome]) -> None:
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
+    series = (
+        ("best candidate right", lambda o: o.top, BLUE, "o", -0.12),
+        ("right name or group spoken", lambda o: o.held, VERMILION, "s", 0.12),
+    )
+    for name, test, colour, marker, aside in series:
+        for k, (low, high) in enumerate(BINS):
+            found = share(test(o) for o in effects if low <= o.d < high)
+            if found.value is None:
+                continue
+            ends = [[found.value - found.interval[0]], [found.interval[1] - found.value]]
+            label = name if k == len(BINS) - 1 else None
+            axes.errorbar(k + aside, found.value, ends, fmt=marker, color=colour, capsize=3, label=label)
+    counts = [sum(low <= o.d < high for o in effects) for low, high in BINS]
+    ticks = [f"{bin_name(low, high)}\n({count})" for (low, high), count in zip(BINS, counts, strict=True)]
+    axes.set_xticks(range(len(BINS)), ticks)
+    axes.set(ylim=(0, 1.05), xlabel="detectability of the effect (cases)", ylabel="share, with 95 % interval")
+    axes.legend(loc="lower right", frameon=False)
+    figure.savefig(file, dpi=150)
+    plt.close(figure)

@@ -1,0 +1,123 @@
+"""The scores of the diagnosis: shares with exact intervals, each with its bar."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from referee.diagnoses import NAMING
+from referee.intervals import Share, share
+from referee.outcomes import Outcome
+
+#: Bins of detectability.
+BINS = ((0.0, 3.0), (3.0, 5.0), (5.0, 8.0), (8.0, np.inf))
+#: What is visible, and what is plainly so.
+VISIBLE, PLAIN = 5.0, 8.0
+#: Bars: false alarms and traps at most, all others at least.
+BARS = {
+    "false alarms": 0.05,
+    "traps named as physics": 0.05,
+    "right name or group holding it, d >= 8": 0.95,
+    "right name alone, d >= 8": 0.85,
+    "spoken names right": 0.95,
+    "centre within 10 mm": 0.5,
+    "unknown found": 0.6,
+    "both of two named": 0.6,
+}
+#: A centre is found if it is nearer than this [m].
+NEAR = 0.010
+
+
+def bin_name(low: float, high: float) -> str:
+    """A bin for people."""
+    return f"d >= {low:g}" if np.isinf(high) else f"d < {high:g}" if low == 0.0 else f"{low:g} <= d < {high:g}"
+
+
+def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
+    """Every share that is scored, by name."""
+    of = {kind: [o for o in outcomes if o.kind == kind] for kind in ("none", "effect", "two", "outside", "trap")}
+    effects = of["effect"]
+    plain = [o for o in effects if o.d >= PLAIN]
+    found = {
+        "false alarms": share(o.said.alarm for o in of["none"]),
+        "traps named as physics": share(o.said.verdict in NAMING for o in of["trap"]),
+        "traps said to be unknown physics": share(o.said.verdict == "unknown" for o in of["trap"]),
+    }
+    for low, high in BINS:
+        found[f"best candidate right, {bin_name(low, high)}"] = share(o.top for o in effects if low <= o.d < high)
+    by_tool = [(o, o.d_of_tool) for o in effects]
+    for low, high in BINS:
+        within = (o.top for o, d in by_tool if d is not None and low <= d < high)
+        found[f"best candidate right, tool's own {bin_name(low, high)}"] = share(within)
+    found |= {
+        "right name or group holding it, d >= 8": share(o.held for o in plain),
+        "right name alone, d >= 8": share(o.named for o in plain),
+        "spoken names right": share(o.named for o in outcomes if o.said.spoken),
+        "centre within 10 mm": share(e < NEAR for o in effects if o.d >= VISIBLE and (e := o.centre_error) is not None),
+        "amount within 2 sd": share(a[1] for o in effects if (a := o.amount) is not None and a[1] is not None),
+        "unknown found": share(o.said.verdict in ("unknown", "named + rest") for o in of["outside"] if o.d >= VISIBLE),
+        "both of two named": share(set(o.label["names"]) <= o.said.said for o in of["two"]),
+        "one of two named": share(o.held for o in of["two"]),
+    }
+    return found
+
+
+def calibration(outcomes: Sequence[Outcome], bins: int = 5) -> dict[str, Any]:
+    """Reliability of the probabilities of names that are spoken, and their expected calibration error.
+
+    Returns
+    -------
+    dict
+        `ece` (None if no name was spoken) and `rows` of (mean probability, share that is right, count).
+    """
+    spoken = [(o.said.probability, o.named) for o in outcomes if o.said.spoken and o.said.probability is not None]
+    if not spoken:
+        return {"ece": None, "rows": []}
+    p, right = (np.array(column, dtype=float) for column in zip(*spoken, strict=True))
+    place = np.minimum((p * bins).astype(int), bins - 1)
+    rows = [(float(p[place == k].mean()), float(right[place == k].mean()), int((place == k).sum())) for k in range(bins) if (place == k).any()]
+    return {"ece": sum(abs(q - r) * n for q, r, n in rows) / len(p), "rows": [list(row) for row in rows]}
+
+
+def amounts(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """Medians of what is measured: centre error, error of amounts, held-out error that is gone."""
+    effects = [o for o in outcomes if o.kind == "effect" and o.d >= VISIBLE]
+    centres = [e for o in effects if (e := o.centre_error) is not None]
+    errors = [a[0] for o in effects if (a := o.amount) is not None]
+    cuts = [c for o in effects if o.held and (c := o.cut) is not None]
+    return {
+        "centre error [m]": _median(centres),
+        "relative error of amount": _median(errors),
+        "held-out error above noise that is gone": _median(cuts),
+    }
+
+
+def _median(values: Sequence[float]) -> dict[str, Any]:
+    if not values:
+        return {"median": None, "of": 0}
+    low, middle, high = np.percentile(values, [25, 50, 75])
+    return {"median": float(middle), "quartiles": [float(low), float(high)], "of": len(values)}
+
+
+def confusion(outcomes: Sequence[Outcome]) -> tuple[list[str], list[str], list[list[int]]]:
+    """Rows (what is true), columns (what is said) and counts."""
+    rows = sorted({_true(o) for o in outcomes}, key=lambda name: (name != "nothing", name))
+    columns = sorted({_told(o) for o in outcomes}, key=lambda name: (name != "nothing", name))
+    table = [[sum(_true(o) == row and _told(o) == column for o in outcomes) for column in columns] for row in rows]
+    return rows, columns, table
+
+
+def _true(outcome: Outcome) -> str:
+    names = {"none": "nothing", "two": "two at once", "trap": f"trap: {outcome.truth}"}
+    return names.get(outcome.kind, outcome.truth)
+
+
+def _told(outcome: Outcome) -> str:
+    said = outcome.said
+    if said.spoken:
+        return " + ".join(sorted(said.names))
+    return {"nothing missing": "nothing", "group": "right group" if outcome.held else "wrong group"}.get(
+        said.verdict, said.verdict
+    )
