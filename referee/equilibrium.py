@@ -13,7 +13,7 @@ from referee.problem import Inverted, Problem
 Floats = NDArray[np.float64]
 
 #: Forces balance when what is left of them is smaller than this part of the forces that act.
-BALANCED = 1e-6
+BALANCED = 1e-5
 _STEPS = 30
 _HALVINGS = 6
 
@@ -86,10 +86,15 @@ def _newton(problem: Problem, u: Floats, F: Floats, coarse: Coarse | None) -> Ba
     free = ~problem.held
     response = problem.response(F)
     r = problem.residual(u, F, response)
-    size = float(np.linalg.norm(r[free]))
+    size = first = float(np.linalg.norm(r[free]))
     last = np.inf
     for step in range(_STEPS):
-        acting = max(float(np.linalg.norm(r[problem.held])), sum(float(np.linalg.norm(f(u))) for f in problem.loads))
+        # tissue that grows freely has neither reactions nor loads, but did not balance at first
+        acting = max(
+            float(np.linalg.norm(r[problem.held])),
+            sum(float(np.linalg.norm(load(u))) for load in problem.loads),
+            1e-3 * first,
+        )
         if step and size <= BALANCED * acting:
             return Balance(u, linear, size / acting, step)
         matrix = problem.tangent(u, response)

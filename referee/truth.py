@@ -87,13 +87,15 @@ def solve_truth(setting: Setting, effects: Sequence[Effect], wanted: Sequence[fl
     points = problem.body.points[nodes]
 
     def seen(move: Floats) -> float:
-        return detectability(points, np.atleast_3d(move.reshape(-1, len(nodes), 3)), stiffness, setting.sigma)
+        # what does not change with time is seen at each of them
+        often = max(1, len(setting.times)) // len(move)
+        return detectability(points, np.repeat(move, often, axis=0), stiffness, setting.sigma)
 
     sized, moves, ds = [], [], []
     for effect, target in zip(effects, wanted, strict=True):
         for _ in range(2):
             move = _first_order(effect.act(problem), base)
-            d = seen(move[nodes])
+            d = seen(move[None, nodes])
             fresh = effect.resized(effect.size * (target / d) ** (1.0 / effect.power))
             if effect.power == 1.0 or abs(d / target - 1.0) < 0.2:
                 move, d = move * fresh.size / effect.size, d * fresh.size / effect.size

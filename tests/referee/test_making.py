@@ -1,0 +1,102 @@
+"""A case of every class on a small body: its folder reads back, and says nothing of what acts in it."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from concealed.sealing import open_sealed, read_sealed
+from referee import make
+from referee.draw import MECHANISMS, OUTSIDE, TRAPS
+from referee.labels import label_of
+from referee.plan import Planned, planned
+from warpbrain.cases.reading import read_case
+from warpbrain.physics.mechanisms import mechanisms
+
+CLASSES = [
+    Planned("none", (), "phantom"),
+    *(Planned("effect", (name,), "phantom") for name in MECHANISMS),
+    Planned("two", ("pressure", "inclusion"), "phantom"),
+    *(Planned("outside", (name,), "phantom") for name in OUTSIDE),
+    *(Planned("trap", (name,), "phantom") for name in TRAPS),
+]
+
+
+@pytest.mark.parametrize("plan", CLASSES, ids=lambda plan: "-".join((plan.kind, *plan.names)))
+def test_a_case_of_every_class(plan, small, tmp_path):
+    make.make_case(tmp_path, "case-001", plan, [7, 1])
+    case = read_case(tmp_path / "cases" / "case-001")
+    assert not case.mechanisms
+    assert [boundary.name for boundary in case.boundaries] == ["skull base", "side", "superior cap"]
+    assert {r.role for r in case.recordings} == {"fit", "check"}
+    label = open_sealed(read_sealed(tmp_path / "labels" / "case-001.json.gz"))
+    assert label["kind"] == plan.kind and tuple(label["names"]) == plan.names
+    assert label["forces_left"] < 1e-4
+    assert len(label["effects"]) == (0 if plan.kind in ("none", "trap") else len(plan.names))
+    if label["effects"]:
+        assert 1.0 <= label["detectability"] <= 45.0
+        assert label["rms_effect_m"] > 0.0
+    else:
+        assert label["detectability"] == 0.0 and label["rms_effect_m"] == 0.0
+    if "viscoelasticity" in plan.names:
+        assert len(np.unique(case.recordings[0].time)) == 3
+        # tissue that creeps is stiffer at first
+        assert np.linalg.norm(label["clean_effect_m"][0]) > np.linalg.norm(label["clean_effect_m"][-1])
+
+
+def test_recordings_are_the_truth_within_noise(small, tmp_path):
+    make.make_case(tmp_path, "case-001", CLASSES[0], [7, 2])
+    label = open_sealed(read_sealed(tmp_path / "labels" / "case-001.json.gz"))
+    check = next(r for r in read_case(tmp_path / "cases" / "case-001").recordings if r.role == "check")
+    true = np.array(label["check_displacement_m"]).reshape(-1, 3)
+    off = np.sqrt(((check.displacement - true) ** 2).sum(axis=1).mean())
+    # noise of half a millimetre or so, and errors of registration about as large
+    assert 0.5 * label["check_noise_m"] < off < 5e-3
+    np.testing.assert_allclose(check.points, np.tile(label["check_points_m"], (len(true) // 10, 1)), atol=1e-6)
+
+
+def test_the_same_seed_makes_the_same_truth(small):
+    truths = [make._draw(CLASSES[2], [3, 4, 0]) for _ in range(2)]
+    labels = [label_of("x", CLASSES[2], truth, []) for truth in truths]
+    assert labels[0] == labels[1]
+
+
+def test_effects_have_the_tools_names():
+    assert set(MECHANISMS) <= set(mechanisms())
+    for name in MECHANISMS:
+        parameter = next(c for c in _classes() if c.kind == name).parameter
+        assert parameter == "" or parameter in mechanisms()[name].parameters()
+    assert not set(OUTSIDE) & set(mechanisms())
+
+
+def _classes():
+    from referee import effects
+
+    return [getattr(effects, name) for name in effects.__all__ if name != "Effect"]
+
+
+def test_the_scored_set_is_what_was_announced():
+    cases = planned("scored", 120, ["phantom", "0603"], 1)
+    assert Counter(case.kind for case in cases) == {"none": 24, "effect": 72, "two": 12, "outside": 6, "trap": 6}
+    each = Counter(case.names[0] for case in cases if case.kind == "effect")
+    assert each == dict.fromkeys(MECHANISMS, 9)
+    assert {case.names[0] for case in cases if case.kind == "trap"} == set(TRAPS)
+    assert {case.names[0] for case in cases if case.kind == "outside"} == set(OUTSIDE)
+
+
+def test_calibration_is_half_without_effects():
+    assert Counter(case.kind for case in planned("calibration", 80, ["phantom"], 1)) == {"none": 40, "effect": 40}
+
+
+def test_a_seed_is_any_text():
+    assert make.seed_of("a commit") == make.seed_of("a commit") != make.seed_of("another")
+
+
+def test_a_case_that_never_converges_is_reported(small, tmp_path, monkeypatch):
+    def fails(*_):
+        raise make.NoTruth("no balance")
+
+    monkeypatch.setattr(make, "solve_truth", fails)
+    with pytest.raises(make.NoTruth, match="12 draws"):
+        make.make_case(tmp_path, "case-001", CLASSES[0], [7, 1])
+    assert not (tmp_path / "cases").exists()

@@ -1,0 +1,103 @@
+"""The referee's own mechanics, against differences, closed forms and FElupe."""
+
+import felupe
+import numpy as np
+import pytest
+from shapes import cube
+
+from referee.body import Body
+from referee.creep import creep
+from referee.equilibrium import balance
+from referee.law import Demiray, Ogden, respond
+from referee.problem import Problem
+from warpbrain.mesh import TetMesh
+
+LAWS = [Ogden((0.6, 0.4), (3.0, -8.0)), Ogden((1.0,), (-20.0,)), Demiray(1.5)]
+
+
+def problem_of(body, law, held, value, nu=0.45, mu=1000.0, **more):
+    mu = np.full((len(body.cells), 1), mu)
+    bulk = mu * 2.0 * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu))
+    growth = more.pop("growth", np.zeros_like(mu))
+    return Problem(body=body, law=law, mu=mu, bulk=bulk, growth=growth, held=held, value=value, **more)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_tangent_is_the_derivative_of_stress(law):
+    random = np.random.default_rng(0)
+    F = np.eye(3) + 0.1 * random.normal(size=(4, 1, 3, 3))
+    # equal stretches have limits of their own
+    F[0], F[1] = np.eye(3), np.diag([1.1, 1.1, 0.9])
+    mu, bulk, growth = (np.full((4, 1), value) for value in (1.3, 9.0, 0.05))
+    tangent = respond(law, F, mu, bulk, growth).tangent(1.4)
+    step = 1e-6
+    for k in range(9):
+        move = np.zeros(9)
+        move[k] = step
+        ends = [respond(law, F + s * move.reshape(3, 3), mu, bulk, growth).stress(1.4) for s in (1, -1)]
+        difference = (ends[0] - ends[1]).reshape(4, 1, 9) / (2.0 * step)
+        np.testing.assert_allclose(tangent[..., k], difference, atol=2e-7 * np.abs(tangent).max())
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_slopes_are_those_of_the_energy(law):
+    e = np.array([0.1, -0.05, -0.05])
+    first, second = law.slopes(e)
+    for k, move in enumerate(1e-5 * np.eye(3)):
+        assert first[k] == pytest.approx((law.energy(e + move) - law.energy(e - move)) / 2e-5, rel=1e-7)
+        np.testing.assert_allclose(second[k], (law.slopes(e + move)[0] - law.slopes(e - move)[0]) / 2e-5, rtol=1e-6)
+
+
+def test_growth_alone_is_free_of_stress():
+    mu, bulk, growth = np.array([[2.0]]), np.array([[30.0]]), np.array([[0.2]])
+    F = np.exp(0.2 / 3.0) * np.eye(3)[None, None]
+    assert np.abs(respond(LAWS[0], F, mu, bulk, growth).stress()).max() < 1e-13
+
+
+def test_stress_forces_and_tangent_are_felupes():
+    # one term of exponent 2 is the isochoric neo-Hookean law, which FElupe writes in other variables
+    mesh = cube(2)
+    body = Body(TetMesh(mesh.points, mesh.tetrahedra, np.ones(len(mesh.tetrahedra), dtype=np.int32)))
+    u = 0.05 * np.random.default_rng(1).normal(size=body.points.shape)
+    u *= np.sin(3.0 * body.points[:, [1, 2, 0]])
+    none = np.zeros(u.shape, dtype=bool)
+    problem = problem_of(body, Ogden((1.0,), (2.0,)), none, np.zeros_like(u), nu=-1.0, mu=3.0)
+    response = problem.response(F := problem.gradient(u))
+    whole = felupe.Mesh(body.points, body.cells, "tetra10")
+    field = felupe.FieldContainer([felupe.Field(felupe.RegionQuadraticTetra(whole), dim=3)])
+    field[0].values[:] = u
+    solid = felupe.SolidBody(felupe.NeoHooke(mu=3.0, bulk=0.0), field)
+    forces = solid.assemble.vector(field).toarray().reshape(-1, 3)
+    np.testing.assert_allclose(problem.residual(u, F, response), forces, atol=1e-10)
+    tangent = solid.assemble.matrix(field).toarray()
+    np.testing.assert_allclose(problem.tangent(u, response).toarray(), tangent, atol=1e-8)
+
+
+def bar():
+    """A unit cube that slides on three of its faces."""
+    mesh = cube(1)
+    body = Body(TetMesh(mesh.points, mesh.tetrahedra, np.ones(len(mesh.tetrahedra), dtype=np.int32)))
+    return body, body.points == 0.0
+
+
+def test_growth_that_is_free_swells_by_itself():
+    body, held = bar()
+    growth = np.full((len(body.cells), 1), np.log(1.1))
+    force = np.zeros_like(body.points)
+    found = balance(problem_of(body, LAWS[0], held, np.zeros_like(force), growth=growth, loads=(lambda u: force,)))
+    # a cube of 1 with a volume of 1.1
+    np.testing.assert_allclose(found.u, body.points * (1.1 ** (1 / 3) - 1.0), atol=1e-5)
+
+
+def test_creep_goes_from_the_stiff_answer_to_the_soft_one():
+    body, held = bar()
+    top = body.faces(body.mesh.points[:, 2] == 1.0)
+    force = top.spread((-100.0 * top.areas)[..., None] * np.array([0.0, 0.0, 1.0]))
+    problem = problem_of(body, LAWS[0], held, np.zeros_like(force), loads=(lambda u: force,))
+    end = balance(problem).u[:, 2].min()
+    times = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 64.0]
+    found = [b.u[:, 2].min() for b in creep(problem, [(1.0, 1.0)], times)]
+    # a solid of equal branches creeps in twice the time it relaxes in: u = end (1 - exp(-t/2) / 2), nearly linear here
+    assert found[0] > found[3] > found[-1]
+    assert found[-1] == pytest.approx(end, rel=1e-3)
+    assert found[3] / end == pytest.approx(1.0 - 0.5 * np.exp(-1.0), abs=0.03)

@@ -1,0 +1,48 @@
+"""The tool is run as a user would, once for each case."""
+
+import sys
+
+import pytest
+
+from referee import run
+from warpbrain.errors import InputError
+
+
+@pytest.fixture
+def cases(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / "cases" / name).mkdir(parents=True)
+        (tmp_path / "cases" / name / "case.toml").write_text("")
+    (tmp_path / "cases" / "secret.txt").write_text("")
+    return tmp_path / "cases"
+
+
+def test_runs_are_listed_and_resumed(cases, tmp_path, monkeypatch):
+    calls = []
+
+    def runs(command, cwd, **_):
+        from pathlib import Path
+        from subprocess import CompletedProcess
+
+        calls.append(command)
+        # nothing but the case folder lies there
+        assert [path.name for path in Path(cwd).iterdir()] == [Path(command[command.index("--case") + 1]).name]
+        return CompletedProcess(command, 1 if command[5].endswith("b") else 0, "said", "")
+
+    monkeypatch.setattr(run, "_commit", lambda: "c0ffee")
+    monkeypatch.setattr(run.subprocess, "run", runs)
+    out = tmp_path / "out"
+    assert run.run_all(cases, out, "cpu", 2, ["--ablation", "no-nuisances"]) == 1
+    assert calls[0][:4] == [sys.executable, "-m", "warpbrain", "diagnose"]
+    assert calls[0][-4:] == ["--device", "cpu", "--ablation", "no-nuisances"]
+    rows = {row["case"]: row for row in run.read_runs(out)}
+    assert rows["a"]["status"] == "0" and rows["b"]["status"] == "1"
+    assert rows["a"]["commit"] == "c0ffee" and rows["a"]["arguments"].endswith("no-nuisances")
+    assert (out / "a.log").read_text() == "said"
+    run.run_all(cases, out, None, 1, [])
+    assert len(calls) == 2
+
+
+def test_a_folder_without_cases_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"no folder in it has a case\.toml"):
+        run.run_all(tmp_path, tmp_path / "out", None, 1, [])

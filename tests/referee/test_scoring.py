@@ -1,0 +1,118 @@
+"""Scores of diagnoses written by hand, whose answers are known."""
+
+import json
+
+import numpy as np
+import pytest
+from said import diagnosis, label, outcome, sealed_labels
+from scipy.stats import binom, binomtest
+
+from referee.__main__ import main
+from referee.diagnoses import read_diagnosis
+from referee.intervals import Share
+from referee.scores import amounts, calibration, confusion, shares
+from warpbrain.errors import InputError
+
+
+@pytest.mark.parametrize(("hits", "of"), [(0, 24), (1, 24), (23, 24), (24, 24), (5, 9)])
+def test_intervals_are_exact(hits, of):
+    low, high = Share(hits, of).interval
+    exact = binomtest(hits, of).proportion_ci(method="exact")
+    assert (low, high) == pytest.approx((exact.low, exact.high))
+    if 0 < hits < of:
+        # by definition: as few, and as many, are just plausible at the ends
+        assert binom.sf(hits - 1, of, low) == pytest.approx(0.025)
+        assert binom.cdf(hits, of, high) == pytest.approx(0.025)
+
+
+@pytest.fixture
+def outcomes(tmp_path):
+    where = {"centre_m": [0.0, 0.0, 0.006], "radius_m": 0.01}
+    value = {"amount": {"value": 5.0, "sd": 1.0, "unit": "%"}}
+    fit = {"declared": {"heldout_rmse_m": 5e-4}, "explained": {"heldout_rmse_m": 3e-4}}
+    swollen = {"where_m": [0.0, 0.0, 0.0], "amount": 0.04, "parameter": "amount", "size": 0.04}
+    pairs = [
+        (label("n1"), diagnosis()),
+        (label("n2"), diagnosis("named", "gravity", 0.9)),
+        (label("n3"), diagnosis("cannot say")),
+        (
+            label("s1", "effect", ("swelling",), 12.0, **swollen),
+            diagnosis("named", "swelling", 0.95, where=where, parameters=value, fit=fit),
+        ),
+        (label("g1", "effect", ("gravity",), 9.0), diagnosis("group", "gravity", 0.5, group=["gravity", "pressure"])),
+        (label("p1", "effect", ("pressure",), 6.0), diagnosis("Named", "swelling", 0.9)),
+        (label("p2", "effect", ("pressure",), 2.0), diagnosis()),
+        (label("o1", "outside", ("tether",), 9.0), diagnosis("unknown")),
+        (label("o2", "outside", ("pre-stress",), 9.0, also=["residual-stress"]), diagnosis("named", "residual-stress", 1.0)),
+        (label("t1", "trap", ("noise",)), diagnosis("not physics")),
+        (label("t2", "trap", ("coarse",)), diagnosis("named+rest", "pressure", 0.9)),
+        (label("2a", "two", ("gravity", "swelling"), 9.0), diagnosis("named", ["gravity", "swelling"], 0.9)),
+        (label("2b", "two", ("gravity", "pressure"), 9.0), diagnosis("named + rest", "gravity", 0.9)),
+    ]
+    return [outcome(tmp_path, true, said) for true, said in pairs]
+
+
+def test_shares(outcomes):
+    found = {name: (value.hits, value.of) for name, value in shares(outcomes).items()}
+    assert found["false alarms"] == (1, 3)
+    assert found["traps named as physics"] == (1, 2)
+    assert found["best candidate right, d >= 8"] == (2, 2)
+    assert found["best candidate right, 5 <= d < 8"] == (0, 1)
+    assert found["best candidate right, d < 3"] == (0, 1)
+    assert found["right name or group holding it, d >= 8"] == (2, 2)
+    assert found["right name alone, d >= 8"] == (1, 2)
+    # right: s1, o2, 2a, 2b; wrong: n2, p1, t2
+    assert found["spoken names right"] == (4, 7)
+    assert found["centre within 10 mm"] == (1, 1)
+    assert found["amount within 2 sd"] == (1, 1)
+    assert found["unknown found"] == (1, 2)
+    assert found["both of two named"] == (1, 2)
+    assert found["one of two named"] == (2, 2)
+
+
+def test_what_is_measured(outcomes):
+    found = amounts(outcomes)
+    assert found["centre error [m]"]["median"] == pytest.approx(0.006)
+    assert found["relative error of amount"]["median"] == pytest.approx(0.25)
+    # all that was above the noise is gone
+    assert found["held-out error above noise that is gone"]["median"] == pytest.approx(1.0)
+
+
+def test_calibration_by_hand(outcomes):
+    found = calibration(outcomes)
+    p = [0.9, 0.95, 0.9, 1.0, 0.9, 0.9, 0.9]
+    right = [0, 1, 0, 1, 0, 1, 1]
+    assert found["rows"] == [[pytest.approx(np.mean(p)), pytest.approx(np.mean(right)), 7]]
+    assert found["ece"] == pytest.approx(np.mean(p) - np.mean(right))
+
+
+def test_confusion_counts_every_case_once(outcomes):
+    rows, columns, table = confusion(outcomes)
+    assert np.sum(table) == len(outcomes)
+    assert table[rows.index("nothing")][columns.index("nothing")] == 1
+    assert table[rows.index("gravity")][columns.index("right group")] == 1
+
+
+def test_what_is_no_diagnosis_is_refused(tmp_path):
+    file = tmp_path / "diagnosis.json"
+    file.write_text(json.dumps(diagnosis("perhaps")))
+    with pytest.raises(InputError, match="perhaps"):
+        read_diagnosis(file)
+    file.write_text("{}")
+    with pytest.raises(InputError, match="verdict"):
+        read_diagnosis(file)
+
+
+def test_the_command_scores_and_refuses(tmp_path, outcomes, capsys):
+    labels = tmp_path / "labels"
+    sealed_labels(labels, *(dict(o.label) for o in outcomes), label("never"))
+    words = ["score", "--cases", tmp_path, "--labels", labels, "--diagnoses", tmp_path, "--out", tmp_path / "out"]
+    assert main([*map(str, words), "--no-baselines"]) == 0
+    told = json.loads((tmp_path / "out" / "score.json").read_text())
+    assert told["without_diagnosis"] == ["never"]
+    assert told["shares"]["false alarms"]["hits"] == 1
+    assert "| false alarms | 1 of 3 = 33 % (1 to 91) | <= 5 % | NOT met |" in capsys.readouterr().out
+    for name in ("confusion", "reliability", "accuracy"):
+        assert (tmp_path / "out" / f"{name}.png").stat().st_size > 5000
+    (labels / "commitments.txt").write_text("0" * 64 + "  n1\n")
+    assert main([*map(str, words), "--no-baselines"]) == 2
