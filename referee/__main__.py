@@ -17,7 +17,9 @@ def _parser() -> argparse.ArgumentParser:
     make.add_argument("--set", required=True, choices=("development", "calibration", "scored"), dest="which")
     make.add_argument("--count", type=int, help="how many; 18, 80 or 120 if absent")
     make.add_argument("--out", type=Path, required=True)
-    make.add_argument("--geometry", nargs="+", help="bodies, in turn; phantom 0529 or, for the scored set, phantom 0603")
+    make.add_argument(
+        "--geometry", nargs="+", help="bodies, in turn; phantom 0529 or, for the scored set, phantom 0603"
+    )
     make.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes")
     make.add_argument("--seed", default="1", help="any text, such as the hash of the commit that froze the tool")
     run = commands.add_parser("run", help="let the tool diagnose every case, as a user would")
@@ -29,7 +31,9 @@ def _parser() -> argparse.ArgumentParser:
     score = commands.add_parser("score", help="open the labels and compare")
     score.add_argument("--cases", type=Path, required=True)
     score.add_argument("--labels", type=Path, required=True)
-    score.add_argument("--commitments", type=Path, help="the published hashes; commitments.txt beside the labels if absent")
+    score.add_argument(
+        "--commitments", type=Path, help="the published hashes; commitments.txt beside the labels if absent"
+    )
     score.add_argument("--diagnoses", type=Path, required=True, help="where run wrote")
     score.add_argument("--out", type=Path, required=True)
     score.add_argument("--no-baselines", action="store_true", help="leave the baselines out")

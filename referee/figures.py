@@ -39,7 +39,9 @@ def _confusion(file: Path, rows: list[str], columns: list[str], table: list[list
     figure, axes = plt.subplots(figsize=(2.6 + 0.5 * len(columns), 1.8 + 0.32 * len(rows)), layout="constrained")
     axes.imshow(parts, cmap="Blues", vmin=0.0, vmax=1.2, aspect="auto")
     for i, j in np.argwhere(counts > 0):
-        axes.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", color="white" if parts[i, j] > 0.6 else "black")
+        axes.text(
+            j, i, f"{counts[i, j]:.0f}", ha="center", va="center", color="white" if parts[i, j] > 0.6 else "black"
+        )
     axes.set_xticks(range(len(columns)), columns, rotation=45, ha="right")
     axes.set_yticks(range(len(rows)), rows)
     axes.set(xlabel="said", ylabel="true", title="Cases; darker: larger part of the row")

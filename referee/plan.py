@@ -53,7 +53,9 @@ def planned(which: str, count: int, geometries: Sequence[str], seed: int) -> lis
     pairs = list(itertools.combinations(MECHANISMS, 2))
     two = [pairs[k] for k in random.permutation(len(pairs))]
     if which == "calibration":
-        turn = itertools.chain.from_iterable((("none", ()), ("effect", (name,))) for name in itertools.cycle(MECHANISMS))
+        turn = itertools.chain.from_iterable(
+            (("none", ()), ("effect", (name,))) for name in itertools.cycle(MECHANISMS)
+        )
         chosen = list(itertools.islice(turn, count))
     elif which == "development":
         chosen = _development(count, two)

@@ -77,7 +77,11 @@ def calibration(outcomes: Sequence[Outcome], bins: int = 5) -> dict[str, Any]:
         return {"ece": None, "rows": []}
     p, right = (np.array(column, dtype=float) for column in zip(*spoken, strict=True))
     place = np.minimum((p * bins).astype(int), bins - 1)
-    rows = [(float(p[place == k].mean()), float(right[place == k].mean()), int((place == k).sum())) for k in range(bins) if (place == k).any()]
+    rows = [
+        (float(p[place == k].mean()), float(right[place == k].mean()), int((place == k).sum()))
+        for k in range(bins)
+        if (place == k).any()
+    ]
     return {"ece": sum(abs(q - r) * n for q, r, n in rows) / len(p), "rows": [list(row) for row in rows]}
 
 

@@ -21,7 +21,9 @@ def score_text(
 ) -> str:
     """The page of scores."""
     lines = ["# Scores", ""]
-    lines += [f"{len(outcomes)} cases; {len(missing)} without a diagnosis{': ' if missing else ''}{', '.join(missing)}."]
+    lines += [
+        f"{len(outcomes)} cases; {len(missing)} without a diagnosis{': ' if missing else ''}{', '.join(missing)}."
+    ]
     lines += ["", "| score | share with 95 % interval (Clopper-Pearson) | bar | |", "|---|---|---|---|"]
     for name, value in found.items():
         bar = BARS.get(name)

@@ -2,14 +2,16 @@
 
 import json
 
+from referee.diagnoses import read_diagnosis
 from referee.labels import seal, write_commitments
 from referee.outcomes import Outcome
-from referee.diagnoses import read_diagnosis
 
 
 def label(case, kind="none", names=(), d=0.0, **effect):
     """What is true of a case."""
-    first = {"kind": names[0], "where_m": None, "also": [], "amount": None, "parameter": "", "size": 1.0} if names else {}
+    first = (
+        {"kind": names[0], "where_m": None, "also": [], "amount": None, "parameter": "", "size": 1.0} if names else {}
+    )
     return {
         "case": case,
         "kind": kind,

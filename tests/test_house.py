@@ -28,7 +28,7 @@ def imports(file: Path) -> set[str]:
             found.add(node.module)
         elif isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
-    return {name for name in found if name.split(".")[0] in ("warpbrain", "concealed")}
+    return {name for name in found if name.split(".")[0] in ("warpbrain", "concealed", "referee")}
 
 
 @pytest.mark.parametrize("floor", FLOORS)

@@ -61,9 +61,7 @@ def regression_of(case: Case) -> Regression:
     arm = recording.points - recording.points.mean(axis=0)
     rigid += [np.cross(axis, arm).ravel() / sigma for axis in np.eye(3)]
     nuisances = np.stack([*rigid, *map(seen, tissues)], axis=1)
-    candidates = [
-        (name, np.stack([seen(u) for u in columns], axis=1)) for name, columns in _displacements(model, case)
-    ]
+    candidates = [(name, np.stack([seen(u) for u in columns], axis=1)) for name, columns in _displacements(model, case)]
     if recording.time is not None and len(np.unique(recording.time)) > 1:
         base = seen(model.declared)
         for tau in np.unique(recording.time) * 2.0:

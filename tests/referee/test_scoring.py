@@ -43,7 +43,10 @@ def outcomes(tmp_path):
         (label("p1", "effect", ("pressure",), 6.0), diagnosis("Named", "swelling", 0.9)),
         (label("p2", "effect", ("pressure",), 2.0), diagnosis()),
         (label("o1", "outside", ("tether",), 9.0), diagnosis("unknown")),
-        (label("o2", "outside", ("pre-stress",), 9.0, also=["residual-stress"]), diagnosis("named", "residual-stress", 1.0)),
+        (
+            label("o2", "outside", ("pre-stress",), 9.0, also=["residual-stress"]),
+            diagnosis("named", "residual-stress", 1.0),
+        ),
         (label("t1", "trap", ("noise",)), diagnosis("not physics")),
         (label("t2", "trap", ("coarse",)), diagnosis("named+rest", "pressure", 0.9)),
         (label("2a", "two", ("gravity", "swelling"), 9.0), diagnosis("named", ["gravity", "swelling"], 0.9)),
