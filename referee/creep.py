@@ -45,7 +45,7 @@ def creep(
         Where to begin [m].
     coarse : Coarse, optional
     """
-    stress = np.zeros(problem.body.region[2].shape + (3,))
+    stress = np.zeros((*problem.body.region[2].shape, 3))
     found = [balance(replace(problem, factor=1.0 + sum(beta for beta, _ in branches)), start, coarse)]
     elastic = _second(problem, found[0].u)
     stresses = [beta * elastic for beta, _ in branches]

@@ -89,14 +89,6 @@ def _newton(problem: Problem, u: Floats, F: Floats, coarse: Coarse | None) -> Ba
     size = first = float(np.linalg.norm(r[free]))
     last = np.inf
     for step in range(_STEPS):
-        # tissue that grows freely has neither reactions nor loads, but did not balance at first
-        acting = max(
-            float(np.linalg.norm(r[problem.held])),
-            sum(float(np.linalg.norm(load(u))) for load in problem.loads),
-            1e-3 * first,
-        )
-        if step and size <= BALANCED * acting:
-            return Balance(u, linear, size / acting, step)
         matrix = problem.tangent(u, response)
         coarse = coarse or Coarse(problem.body, matrix, problem.held)
         linear = Linear(matrix, problem.held, coarse)
@@ -120,4 +112,12 @@ def _newton(problem: Problem, u: Floats, F: Floats, coarse: Coarse | None) -> Ba
         else:
             raise NoTruth("no step brings forces nearer to balance")
         u, r = u + move, fresh
+        # tissue that grows freely has neither reactions nor loads, but did not balance at first
+        acting = max(
+            float(np.linalg.norm(r[problem.held])),
+            sum(float(np.linalg.norm(load(u))) for load in problem.loads),
+            1e-3 * first,
+        )
+        if size <= BALANCED * acting:
+            return Balance(u, linear, size / acting, step + 1)
     raise NoTruth(f"forces do not balance in {_STEPS} steps: {size:.1e} N are left")

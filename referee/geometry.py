@@ -40,8 +40,8 @@ def declared_mesh(name: str) -> TetMesh:
         fresh = np.array([tuple(face) not in whole for face in np.sort(nodes[faces], axis=1).tolist()])
         cavity = np.zeros(len(mesh.points), dtype=bool)
         cavity[faces[fresh]] = True
-        sets = {key: members for key, members in mesh.node_sets.items() if key != "resection"}
-        mesh = replace(mesh, node_sets={**sets, "cavity": cavity}, element_sets={})
+        others = {key: members for key, members in mesh.node_sets.items() if key != "resection"}
+        mesh = replace(mesh, node_sets={**others, "cavity": cavity}, element_sets={})
     sets = mesh.node_sets
     skull = sets["surface"] & ~sets["fixed"] & ~sets["ventricle"] & ~sets["superior"]
     if "cavity" in sets:

@@ -36,7 +36,7 @@ def _remeshed(mesh: TetMesh, options: dict[str, float]) -> tuple[NDArray[np.floa
     points, tetrahedra, labels = made
     distance, nearest = cKDTree(mesh.points).query(points / 1000.0)
     sets = {name: members[nearest] for name, members in mesh.node_sets.items()}
-    return distance, TetMesh(points / 1000.0, tetrahedra, labels, sets)
+    return distance, TetMesh(points / 1000.0, tetrahedra.astype(np.int32), labels.astype(np.int32), sets)
 
 
 def other_inside(mesh: TetMesh) -> TetMesh:

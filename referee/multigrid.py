@@ -106,7 +106,7 @@ class Linear:
         return x + self._smooth(r - self._times(x))
 
     def solve(self, right: Floats, close: float) -> Floats:
-        """Solution (3 n,) to a relative residual; `NotSolved` if there is none in `_MOST` steps or no positive matrix."""
+        """Solution (3 n,) to a relative residual; `NotSolved` if none is reached or the matrix is not positive."""
         r = self._free * right
         x = np.zeros_like(r)
         target = close * np.linalg.norm(r)

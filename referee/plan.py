@@ -41,9 +41,9 @@ def planned(which: str, count: int, geometries: Sequence[str], seed: int) -> lis
     which : str
         A name in `SETS`.
     count : int
-        The scored set of 120 has 24 cases of which nothing is missing, 9 of each mechanism, 12 of two at once, 6 outside
-        the dictionary and 6 traps, and any other number has the same shares; of calibration half has nothing missing
-        and half a mechanism; development takes one of everything in turn.
+        The scored set of 120 has 24 cases in which nothing is missing, 9 of each mechanism, 12 of two at once, 6
+        outside the dictionary and 6 traps, and any other number has the same shares; of calibration half has nothing
+        missing and half a mechanism; development takes one of everything in turn.
     geometries : sequence of str
         In turn.
     seed : int
@@ -89,14 +89,15 @@ def _development(count: int, two: list[tuple[str, str]]) -> Chosen:
 
 def _scored(count: int, two: list[tuple[str, str]]) -> Chosen:
     shares = {"none": 24, "two": 12, "outside": 6, "trap": 6}
+    of_kind: dict[str, list[tuple[str, ...]]] = {
+        "none": [()],
+        "two": list(two),
+        "outside": [(name,) for name in OUTSIDE],
+        "trap": [(name,) for name in TRAPS],
+    }
     rows: Chosen = []
     for kind, share in shares.items():
-        names: list[tuple[str, ...]] = {
-            "none": [()],
-            "two": list(two),
-            "outside": [(name,) for name in OUTSIDE],
-            "trap": [(name,) for name in TRAPS],
-        }[kind]
+        names = of_kind[kind]
         rows += [(kind, names[k % len(names)]) for k in range(round(share * count / 120))]
     rest = count - len(rows)
     return rows + [("effect", (MECHANISMS[k % len(MECHANISMS)],)) for k in range(rest)]

@@ -14,7 +14,7 @@ from referee.body import Body
 from referee.fields import random_field
 from referee.geometry import declared_case, true_body
 from referee.law import Demiray, Law, Ogden
-from referee.problem import Problem
+from referee.problem import Load, Problem
 from warpbrain.mesh import TetMesh
 
 Floats = NDArray[np.float64]
@@ -136,7 +136,7 @@ class Setting:
         ]
         held = body.nodes("fixed") | body.nodes("side")
         value = np.zeros_like(body.points)
-        loads = ()
+        loads: tuple[Load, ...] = ()
         if self.total is not None:
             force = cap_force(body, np.asarray(self.total))
             loads = (lambda u: force,)
@@ -180,6 +180,7 @@ def draw_setting(random: Random, geometry: str, timed: bool) -> Setting:
     timed : bool
         Whether points must be recorded at several times; otherwise some cases are too.
     """
+    shape: tuple[float, ...]
     if random.random() < 0.5:
         law, shape = "demiray", (float(random.uniform(0.3, 2.0)),)
     else:
@@ -188,7 +189,7 @@ def draw_setting(random: Random, geometry: str, timed: bool) -> Setting:
     tilt = random.normal(size=2) * 0.25
     pressed = np.array([*tilt, -1.0])
     amount = random.uniform(1.6, 3.0) if force else random.uniform(0.004, 0.007)
-    load = tuple(float(x) for x in amount * pressed)
+    load = _triple(amount * pressed)
     declared = [tissue.known_law.shear_modulus for _, tissue in sorted(declared_case(geometry).tissues.items())]
     mu = np.array(declared) * np.exp(0.25 * random.normal() + 0.12 * random.normal(size=len(declared)))
     return Setting(
@@ -218,7 +219,12 @@ def draw_setting(random: Random, geometry: str, timed: bool) -> Setting:
 
 
 def _within(random: Random, size: float) -> tuple[float, float, float]:
-    return tuple(float(x) for x in size / np.sqrt(3.0) * random.normal(size=3))
+    return _triple(size / np.sqrt(3.0) * random.normal(size=3))
+
+
+def _triple(vector: Floats) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in vector)
+    return x, y, z
 
 
 def _times(random: Random) -> tuple[float, ...]:

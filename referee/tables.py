@@ -44,8 +44,8 @@ def score_text(
             lines.append(f"| {method} | {' | '.join(str(row[name]) for name in names)} |")
     rows, columns, table = confused
     lines += ["", f"| true \\ said | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
-    for row, counts in zip(rows, table, strict=True):
-        lines.append(f"| {row} | {' | '.join(str(count) if count else '' for count in counts)} |")
+    for true, counts in zip(rows, table, strict=True):
+        lines.append(f"| {true} | {' | '.join(str(count) if count else '' for count in counts)} |")
     lines += ["", "| case | true | d | effect at points [mm] | said | best candidate |", "|---|---|---|---|---|---|"]
     for o in outcomes:
         said = " + ".join(o.said.names) or ", ".join(o.said.group)

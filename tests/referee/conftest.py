@@ -21,7 +21,7 @@ def small_mesh() -> TetMesh:
     mesh = cube(5)
     points = 0.13 * mesh.points
     middle = points[mesh.tetrahedra].mean(axis=1)
-    left, nodes, _ = TetMesh(points, mesh.tetrahedra, np.ones(len(middle), dtype=np.int32)).without(
+    left, _, _ = TetMesh(points, mesh.tetrahedra, np.ones(len(middle), dtype=np.int32)).without(
         (np.abs(middle - 0.065) < 0.012).all(axis=1)
     )
     points = left.points

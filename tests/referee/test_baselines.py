@@ -37,4 +37,6 @@ def test_a_case_becomes_a_regression(small, tmp_path):
     found = regression_of(read_case(tmp_path / "cases" / "case-001"))
     assert found.nuisances.shape == (len(found.y), 8)
     assert {name for name, _ in found.candidates} >= {"gravity", "pressure", "traction", "swelling", "contact"}
-    assert all(np.isfinite(columns).all() and columns.any() for _, columns in found.candidates)
+    assert all(np.isfinite(columns).all() for _, columns in found.candidates)
+    # the highest level of fluid may leave no element of so coarse a mesh dry
+    assert {name for name, columns in found.candidates if columns.any()} == {name for name, _ in found.candidates}
