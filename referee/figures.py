@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +69,7 @@ def _accuracy(file: Path, effects: Sequence[Outcome]) -> None:
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
-    series = (
+    series: tuple[tuple[str, Callable[[Outcome], bool], str, str, float], ...] = (
         ("best candidate right", lambda o: o.top, BLUE, "o", -0.12),
         ("right name or group spoken", lambda o: o.held, VERMILION, "s", 0.12),
     )

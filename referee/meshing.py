@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,10 +69,13 @@ def make_meshes(folder: Path = MESHES) -> None:
 
 def _write(file: Path, mesh: TetMesh) -> None:
     # nanometres in whole numbers are a third smaller than doubles
+    sets: dict[str, Any] = {
+        f"set_{name}": np.flatnonzero(members).astype(np.uint16) for name, members in mesh.node_sets.items()
+    }
     np.savez_compressed(
         file,
         points=np.round(1e9 * mesh.points).astype(np.int32),
         tetrahedra=mesh.tetrahedra.astype(np.uint16),
         tissue=mesh.tissue.astype(np.uint8),
-        **{f"set_{name}": np.flatnonzero(members).astype(np.uint16) for name, members in mesh.node_sets.items()},
+        **sets,
     )

@@ -98,15 +98,21 @@ class Elastic:
         value = self.held[1]
         return value + self.fast(self.load - self.matrix @ value)
 
+    def _gathered(self, local: Floats) -> Floats:
+        forces: Floats = np.bincount(self.dofs.ravel(), local.ravel(), minlength=3 * len(self.mesh.points)).astype(
+            float
+        )
+        return forces
+
     def inner(self, weight: Floats) -> Floats:
         """Internal forces (3 n,) [N] of the declared state in elements with weights (m,)."""
         local = (self.local @ self.declared[self.dofs][..., None])[..., 0] * weight[:, None]
-        return np.bincount(self.dofs.ravel(), local.ravel(), minlength=len(self.declared))
+        return self._gathered(local)
 
     def stress(self, P: Floats) -> Floats:
         """Forces (3 n,) [N] that a stress (m, 3, 3) [Pa] exerts on nodes."""
         local = -self.volumes[:, None, None] * (self.gradients @ np.swapaxes(P, 1, 2))
-        return np.bincount(self.dofs.ravel(), local.ravel(), minlength=len(self.declared))
+        return self._gathered(local)
 
 
 class Solver:
