@@ -90,7 +90,7 @@ def _inclusion(random: Random, setting: Setting) -> Effect:
     cap = body.points[body.nodes("superior")].mean(axis=0)
     near = body.centroids[np.linalg.norm(body.centroids - cap, axis=1) < 0.05]
     centre = _place(near[random.integers(len(near))])
-    return Inclusion(size=0.6, sign=_sign(random), centre=centre, radius=float(random.uniform(0.014, 0.024)))
+    return Inclusion(size=0.6, sign=_sign(random), centre=centre, radius=float(random.uniform(0.018, 0.028)))
 
 
 def _asymmetry(random: Random, setting: Setting) -> Effect:

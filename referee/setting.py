@@ -204,7 +204,7 @@ def draw_setting(random: Random, geometry: str, timed: bool) -> Setting:
         field_seed=int(random.integers(2**31)),
         total=load if force else None,
         moved=None if force else load,
-        sigma=float(np.round(random.uniform(0.25e-3, 0.45e-3), 6)),
+        sigma=float(np.round(random.uniform(0.15e-3, 0.30e-3), 6)),
         declares_sigma=bool(random.random() < 0.8),
         noise=float(random.uniform(0.8, 1.25)),
         gross=0.04,
