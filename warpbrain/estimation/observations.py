@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,13 +41,20 @@ class Residuals:
         Of points 3 components [m]; of a surface the signed distance [m]; of a force those recorded [N].
     rigid : (n, d, 6) array
         Derivatives of what was recorded by a rigid motion of it (`registration`).
-    derivative : callable
-        From derivatives of displacement and reactions (p, N, 3) to those of the values (n, d, p).
+    by_displacement, by_reactions : (n d, 3 N) SciPy CSR
+        Derivatives of what was computed by displacement and reactions.
     """
 
     values: Floats
     rigid: Floats
-    derivative: Callable[[Floats, Floats], Floats]
+    by_displacement: Any
+    by_reactions: Any
+
+    def derivative(self, du: Floats, dR: Floats) -> Floats:
+        """From derivatives of displacement and reactions (p, N, 3) to those of the values (n, d, p)."""
+        count = len(du)
+        change = self.by_displacement @ du.reshape(count, -1).T + self.by_reactions @ dR.reshape(count, -1).T
+        return -np.asarray(change).reshape(*self.values.shape, count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,6 +180,8 @@ def _observation(case: Case, recording: Recording) -> Observation:
 
 
 def _points(case: Case, recording: PointsRecording) -> Observation:
+    from scipy.sparse import csr_matrix, eye, kron
+
     mesh = case.remaining[0]
     rows = rows_at(recording)
     weights = np.ones(len(rows)) if recording.weights is None else recording.weights[rows]
@@ -180,26 +190,29 @@ def _points(case: Case, recording: PointsRecording) -> Observation:
     rows, weights = rows[weights > 0.0], weights[weights > 0.0]
     if len(rows) == 0:
         raise InputError(f"recording '{recording.name}': the weight of every point is zero")
-    matrix = locate(mesh.points, mesh.tetrahedra, recording.points[rows]).matrix(len(mesh.points))
+    count = len(mesh.points)
+    matrix = locate(mesh.points, mesh.tetrahedra, recording.points[rows]).matrix(count)
+    by_displacement = kron(matrix, eye(3), format="csr")
+    nothing = csr_matrix(by_displacement.shape)
     positions = recording.points[rows] + recording.displacement[rows]
 
-    def derivative(du: Floats, _dR: Floats) -> Floats:
-        flat = np.asarray(du).transpose(1, 2, 0).reshape(du.shape[1], -1)
-        return -np.asarray(matrix @ flat).reshape(len(rows), 3, len(du))
-
     def at(u: Floats, _reactions: Floats, centre: Floats) -> Residuals:
-        return Residuals(recording.displacement[rows] - matrix @ u, rigid_columns(positions, centre), derivative)
+        values = recording.displacement[rows] - matrix @ u
+        return Residuals(values, rigid_columns(positions, centre), by_displacement, nothing)
 
     sigma = _sigma(recording, rows, weights)
     return Observation(recording.name, recording.kind, "m", rows, sigma, weights, 3, positions, at)
 
 
 def _surface(case: Case, recording: SurfaceRecording) -> Observation:
+    from scipy.sparse import csr_matrix
+
     mesh = case.remaining[0]
     rows = rows_at(recording)
     points = recording.points[rows]
     faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
     size = float(np.ptp(mesh.points, axis=0).max())
+    shape = (len(rows), 3 * len(mesh.points))
 
     def at(u: Floats, _reactions: Floats, centre: Floats) -> Residuals:
         moved = mesh.points + u
@@ -216,12 +229,12 @@ def _surface(case: Case, recording: SurfaceRecording) -> Observation:
             apart[:, None], side[:, None] * offset / np.where(apart, closest.distance, 1.0)[:, None], normals
         )
 
-        def derivative(du: Floats, _dR: Floats) -> Floats:
-            # the closest point moves along the surface too, which does not change its distance to first order
-            return -np.einsum("nj,ni,pnij->np", directions, weights, du[:, nodes])[:, None, :]
-
+        # the closest point moves along the surface too, which does not change its distance to first order
+        shares = weights[:, :, None] * directions[:, None, :]
+        columns = 3 * nodes[:, :, None] + np.arange(3)
+        by_displacement = csr_matrix((shares.ravel(), (np.repeat(np.arange(len(rows)), 9), columns.ravel())), shape)
         rigid = np.einsum("nj,njk->nk", directions, rigid_columns(points, centre))[:, None, :]
-        return Residuals((side * closest.distance)[:, None], rigid, derivative)
+        return Residuals((side * closest.distance)[:, None], rigid, by_displacement, csr_matrix(shape))
 
     ones = np.ones(len(rows))
     sigma = _sigma(recording, rows, ones)
@@ -229,6 +242,8 @@ def _surface(case: Case, recording: SurfaceRecording) -> Observation:
 
 
 def _force(case: Case, recording: ForceRecording) -> Observation:
+    from scipy.sparse import csr_matrix
+
     nodes = case.remaining[0].node_sets[case.boundary(recording.boundary).nodes]
     rows = rows_at(recording)
     recorded = np.isfinite(recording.force[rows]).all(axis=0)
@@ -237,13 +252,17 @@ def _force(case: Case, recording: ForceRecording) -> Observation:
         raise InputError(f"recording '{recording.name}' has no component of the force, only the torque")
     force = recording.force[rows][:, recorded]
 
-    def derivative(_du: Floats, dR: Floats) -> Floats:
-        change = dR[:, nodes].sum(axis=1)[:, recorded]
-        return np.broadcast_to(-change.T, (len(rows), size, len(dR))).copy()
+    members, components = np.flatnonzero(nodes), np.flatnonzero(recorded)
+    which = np.tile(np.repeat(np.arange(size), len(members)), len(rows)) + size * np.repeat(
+        np.arange(len(rows)), size * len(members)
+    )
+    columns = np.tile((3 * members + components[:, None]).ravel(), len(rows))
+    by_reactions = csr_matrix((np.ones(len(columns)), (which, columns)), (size * len(rows), 3 * len(nodes)))
+    nothing = csr_matrix(by_reactions.shape)
 
     def at(_u: Floats, reactions: Floats, _centre: Floats) -> Residuals:
         values = force - reactions[nodes].sum(axis=0)[recorded]
-        return Residuals(values, np.zeros((len(rows), size, 6)), derivative)
+        return Residuals(values, np.zeros((len(rows), size, 6)), nothing, by_reactions)
 
     ones = np.ones(len(rows))
     sigma = _sigma(recording, rows, ones)

@@ -6,7 +6,8 @@
 3. what it does: a mechanism is also one or several of `Load` (forces that do not follow the deformation), `Following`
    (a term with forces that do), `Weakening` (softer or stiffer elements), `Emptying` (lighter ones), `Growing` (larger
    or smaller ones), `Substituting` (another law) and `Removing` (fewer elements);
-4. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), and an `example`.
+4. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), an `example`, and how it may
+   act where a case does not declare it (`proposals`).
 
 Its derivatives by its parameters are nobody's work: `warpbrain.simulation.beside` differences what it does. For that a
 `Following` one's term names the arrays of what it remembers (`Term.memory`) and takes the body's moduli in
@@ -21,7 +22,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
@@ -33,6 +34,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.ramp import Ramped
 from warpbrain.physics.term import Following
 
@@ -234,6 +236,17 @@ class Mechanism(Ramped, abc.ABC):
     def held(self, mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Nodes (k,), repeated if need be, and directions (k, 3) in which it holds them."""
         return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """How it may act where a case does not declare it.
+
+        Raises
+        ------
+        NotTestableError
+            If the data of the case cannot show it.
+        """
+        raise NotTestableError(f"needs {' and '.join(cls.needs) or 'more than is known of this case'}")
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""

@@ -429,6 +429,18 @@ class System:
             self.matrix.values,
         )
 
+    def stiffness(self) -> Any:
+        """`K` [N/m] at `u` on every component, constrained ones included, as a SciPy BSR matrix (3 n, 3 n)."""
+        from scipy.sparse import bsr_matrix
+
+        self.evaluate_tangents()
+        free, self.free = self.free, self._all_components
+        self.assemble(k=1.0, m=0.0)
+        self.free = free
+        # the values are gathered into the same array again
+        values = self.matrix.values.numpy().astype(np.float64)
+        return bsr_matrix((values, self.matrix.columns.numpy(), self.matrix.offsets.numpy()))
+
     def add_coupling(self, x: wp.array, factor: float, y: wp.array) -> None:
         """Add to `y` a factor times what of `K x` is not in blocks; constrained components are left out."""
         for term in self.terms:

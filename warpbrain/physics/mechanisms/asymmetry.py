@@ -7,6 +7,7 @@ An exponent of 2 is the neo-Hookean law; a negative one stiffens in compression.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -14,6 +15,7 @@ from warpbrain.physics.expectation import Normal
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.ogden import Ogden
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +45,14 @@ class Asymmetry(Mechanism):
         super().__post_init__()
         if self.exponent == 0.0:
             raise ParameterError("exponent", "found 0, which has no energy")
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """Another exponent than the neo-Hookean law's."""
+        situation.require_new(cls.kind)
+        if "ogden" in situation.laws:
+            raise NotTestableError("the law of a tissue has an exponent of its own, which is refitted")
+        return [Proposal.of_one(lambda a: cls(exponent=a), 2.0, 15.0, "smooth", 2.0, region="all tissue")]
 
     def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
         """See `warpbrain.physics.mechanism.Substituting`."""

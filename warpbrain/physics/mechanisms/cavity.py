@@ -13,6 +13,7 @@ A limit: what other mechanisms add to the law of these elements (fibres, residua
 Leave these elements out of its element set.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -25,6 +26,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
 
@@ -87,6 +89,14 @@ class Cavity(Mechanism):
     example: ClassVar[str] = "cavity:elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("inclusion", "swelling")
     switches: ClassVar[bool] = True
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """The element set 'resection', if it is still there."""
+        situation.require_new(cls.kind)
+        if "resection" not in situation.mesh.element_sets or not situation.mesh.element_sets["resection"].any():
+            raise NotTestableError("needs an element set 'resection' of tissue that is still there")
+        return [Proposal.of_one(lambda _share: cls(), 1.0, 0.3, "switch", region="resection")]
 
     def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
         """See `warpbrain.physics.mechanism.Weakening`."""

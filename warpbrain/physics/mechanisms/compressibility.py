@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.laws import Law
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.proposal import Proposal, Situation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +36,14 @@ class Compressibility(Mechanism):
     sentence: ClassVar[str] = "Tissue gives way under pressure more, or less, than was assumed."
     example: ClassVar[str] = "compressibility:poisson=0.35"
     confused_with: ClassVar[tuple[str, ...]] = ("drainage", "swelling")
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """Another ratio; the coefficient is `-ln(1 - 2 nu)`, in which bulk moduli are even steps."""
+        situation.require_new(cls.kind)
+        own = -math.log1p(-2.0 * situation.poisson)
+        make = lambda c: cls(poisson=-0.5 * math.expm1(-c))  # noqa: E731
+        return [Proposal.of_one(make, own, 1.2, "smooth", own, region="all tissue")]
 
     def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
         """See `warpbrain.physics.mechanism.Substituting`."""

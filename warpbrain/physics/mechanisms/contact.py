@@ -17,6 +17,7 @@ there those of the last augmentation, or of the last time step: so the friction 
 `f A p (sqrt(s^2 + d^2) - d)`, with `d` = 0.1 mm, over which it builds up.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar
@@ -33,6 +34,7 @@ from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body, Term
 
 STATES = ("fixed", "sliding", "lifting")
@@ -104,6 +106,25 @@ class Contact(Mechanism):
                 f"'{self.surface}' is {1e3 * size:.4g} mm across, the nodes that it holds {1e3 * held:.4g} mm and the "
                 f"body {1e3 * body:.4g} mm: is it in another unit?",
             )
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """What is held slides instead, or lifts off."""
+        found = [
+            Proposal.of_one(
+                lambda _share, nodes=nodes, state=state: cls(nodes=nodes, state=state),  # type: ignore[misc]
+                1.0,
+                0.3,
+                "switch",
+                releases=nodes,
+                region=nodes,
+            )
+            for nodes in situation.held
+            for state in STATES[1:]
+        ]
+        if not found:
+            raise NotTestableError("nothing is held")
+        return found
 
     def skull(self, mesh: TetMesh) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Points [m] and outward triangles of the surface it touches."""

@@ -7,6 +7,7 @@ modulus `mu`, the incompressible neo-Hookean membrane (Bonet and Wood, Nonlinear
     W = A t mu/2 (tr C + 1/det C - 3),   P = t mu F (I - C^-1 / det C)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar
@@ -21,6 +22,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.mesh.surface import all_faces
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body
 from warpbrain.physics.triangle_term import TriangleTerm
 
@@ -64,6 +66,17 @@ class Falx(Mechanism):
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)
         self.faces(mesh)
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """On node sets that are called so."""
+        names = [name for name in situation.mesh.node_sets if any(word in name for word in ("falx", "tentorium"))]
+        if not names:
+            raise NotTestableError("needs a node set 'falx' or 'tentorium' in the mesh")
+        return [
+            Proposal.of_one(lambda _share, nodes=nodes: cls(nodes=nodes), 1.0, 0.3, "switch", region=nodes)  # type: ignore[misc]
+            for nodes in names
+        ]
 
     def faces(self, mesh: TetMesh) -> NDArray[np.int32]:
         """Triangles (k, 3) of the membrane."""

@@ -6,6 +6,7 @@ with the direction `a`, dispersion `d` from 0 (all parallel) to 1/3 (none prefer
 2 (1 - 3 d) F a (x) a`, `P = k1 E exp(k2 E^2) H`. What `I1` adds beside `I4` is the scatter of the fibres.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -18,6 +19,7 @@ from warpbrain.physics.directions import element_directions, unit_vector
 from warpbrain.physics.expectation import LogNormal, Uniform
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
 
@@ -83,6 +85,7 @@ def _moduli(F: Any, g: Any, h: Any, data: wp.array2d[Any], e: int):
 
 
 _CODE = ExtraEnergy("fibres", _energy, _stress, _moduli)
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,6 +154,19 @@ class Fibres(Mechanism):
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)
         element_directions(mesh, elements_of(mesh, self.elements), self.direction, self.field)
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """Along each axis of the anatomy."""
+        return [
+            Proposal.of_one(
+                lambda k1, axis=axis: cls(direction=axis, stiffness=max(k1, 1e-9)),  # type: ignore[misc]
+                0.0,
+                500.0,
+                region=f"fibres along {name}",
+            )
+            for name, axis in zip("xyz", _AXES, strict=True)
+        ]
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
         """See `warpbrain.physics.term.Following`."""

@@ -13,7 +13,7 @@ the case's `gravity_axis` if it is not said.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -26,6 +26,7 @@ from warpbrain.physics.directions import unit_vector
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, parameter
+from warpbrain.physics.proposal import Proposal, Situation
 
 #: Standard gravity [m/s2] as used by the verification cases of this project.
 STANDARD_GRAVITY = 9.81
@@ -33,6 +34,8 @@ STANDARD_GRAVITY = 9.81
 CSF_DENSITY = 1007.0
 #: Width [m] over which the fluid's surface is smoothed, so that the load depends smoothly on its level.
 SURFACE_WIDTH = 0.003
+#: Where it is looked for: levels, standard deviation of how much of the weight acts, and of the head's pose [rad].
+_LEVELS, _SHARE, _POSE = 9, 0.1, 0.12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,6 +103,40 @@ class Gravity(Load, Mechanism):
         # counted from the whole anatomy: a resection must not move the datum
         lowest = float((-facts.mesh.points @ unit_vector("direction", known["direction"])).min())
         return cls(density=facts.density, lowest=lowest, **known)
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """Levels of the fluid, with the head's pose known to some degrees; any direction if it is not known at all."""
+        situation.require_new(cls.kind)
+        points = situation.mesh.points
+        if situation.gravity_axis is None:
+
+            def anywhere(c: NDArray[np.float64]) -> Gravity:
+                share = float(np.linalg.norm(c))
+                direction = tuple((c if share else np.array([0.0, 0.0, -1.0])).tolist())
+                return cls(direction=direction, density=CSF_DENSITY, ramp=((0.0, share),))
+
+            return [Proposal(anywhere, np.zeros(3), np.full(3, 0.5), region="all tissue")]
+        down = unit_vector("gravity_axis", situation.gravity_axis)
+        lowest = float((-points @ down).min())
+        height = float(np.ptp(points @ down))
+        across = np.linalg.svd(down[None])[2][1:]
+        found = []
+        for level in np.linspace(-0.05, 0.9, _LEVELS) * height:
+
+            def drained(c: NDArray[np.float64], level: float = float(level)) -> Gravity:
+                direction = down + c[1] * across[0] + c[2] * across[1]
+                return cls(
+                    direction=tuple(direction.tolist()),
+                    density=situation.density,
+                    csf_level=level,
+                    lowest=lowest,
+                    ramp=((0.0, float(c[0])),),
+                )
+
+            sd = np.array([_SHARE, _POSE, _POSE])
+            found.append(Proposal(drained, np.array([1.0, 0.0, 0.0]), sd, "smooth", np.array([1.0, 0.0, 0.0])))
+        return found
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""

@@ -5,6 +5,8 @@ All moduli of an element are multiplied by `exp(s w)`, `w` how much it belongs t
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -14,7 +16,11 @@ from numpy.typing import NDArray
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
+
+#: Where it is looked for: standard deviation of the logarithm of the ratio, and radii of balls [m].
+_USUAL, _RADII = 1.2, (0.012, 0.018)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +52,25 @@ class Inclusion(Mechanism):
     example: ClassVar[str] = "inclusion:ratio=10,elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("swelling",)
     several: ClassVar[bool] = True
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """Balls of two sizes throughout the tissue; the coefficient is the logarithm of the ratio."""
+        found = []
+        for site in situation.volume_sites:
+            centre = tuple(site.tolist())
+            for radius in _RADII:
+                found.append(
+                    Proposal.of_one(
+                        lambda s, centre=centre, radius=radius: cls(ratio=math.exp(s), centre=centre, radius=radius),  # type: ignore[misc]
+                        0.0,
+                        _USUAL,
+                        "smooth",
+                        centre=site,
+                        radius=radius,
+                    )
+                )
+        return found
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

@@ -11,8 +11,9 @@ Wood, Nonlinear Continuum Mechanics, 2nd ed., section 8.5)
 to Newton's method, which then converges linearly. Triangles of six nodes: `warpbrain.kernels.curved_pressure`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,6 +28,7 @@ from warpbrain.mesh.integrals import triangle_rule
 from warpbrain.mesh.soundness import open_edges
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body
 from warpbrain.physics.triangle_term import TriangleTerm
 
@@ -74,9 +76,27 @@ class Pressure(Mechanism):
             )
         return own
 
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """On every set of free faces that is not most of the surface: that would be a pressure all around."""
+        every = len(boundary_faces(situation.mesh.tetrahedra))
+        found = []
+        for nodes in situation.free:
+            part = len(cls(nodes=nodes, value=0.0).faces(situation.mesh)) / every
+            if part < 0.5:
+                make = partial(_pressing, nodes)
+                found.append(Proposal.of_one(make, 0.0, 200.0, region=nodes))
+        if not found:
+            raise NotTestableError("needs a node set with faces of the free surface, such as a ventricle's wall")
+        return found
+
     def bind(self, body: Body) -> "PressureTerm":
         """See `warpbrain.physics.term.Following`."""
         return PressureTerm(body, self)
+
+
+def _pressing(nodes: str, value: float) -> Pressure:
+    return Pressure(nodes=nodes, value=value)
 
 
 class PressureTerm(TriangleTerm):

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -15,7 +16,11 @@ from numpy.typing import NDArray
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
+
+#: Where it is looked for: standard deviation of the change everywhere and in a ball, and radii of balls [m].
+_EVERYWHERE, _SOMEWHERE, _RADII = 0.03, 0.2, (0.012, 0.018)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +56,25 @@ class Swelling(Mechanism):
     example: ClassVar[str] = "swelling:amount=20,elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("pressure", "gravity")
     several: ClassVar[bool] = True
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """All tissue, or balls of two sizes throughout it."""
+        found = [Proposal.of_one(lambda g: cls(amount=g), 0.0, _EVERYWHERE, "smooth", region="all tissue")]
+        for site in situation.volume_sites:
+            centre = tuple(site.tolist())
+            for radius in _RADII:
+                found.append(
+                    Proposal.of_one(
+                        lambda g, centre=centre, radius=radius: cls(amount=g, centre=centre, radius=radius),  # type: ignore[misc]
+                        0.0,
+                        _SOMEWHERE,
+                        "smooth",
+                        centre=site,
+                        radius=radius,
+                    )
+                )
+        return found
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

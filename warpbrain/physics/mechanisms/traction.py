@@ -7,6 +7,7 @@ on the reference surface; `t` keeps its direction (a dead load).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -17,7 +18,11 @@ from warpbrain.mesh import QuadraticMesh, TetMesh, surface_forces
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.proposal import Proposal, Situation
 
+
+#: Where it is looked for: radii [m] of patches, and standard deviation of each component [Pa].
+_RADII, _USUAL = (0.009, 0.014), 1000.0
 
 @dataclass(frozen=True, kw_only=True)
 class Traction(Load, Mechanism):
@@ -60,6 +65,19 @@ class Traction(Load, Mechanism):
         super().check(mesh)
         if not self.nodal_forces(mesh).any() and any(self.value):
             raise ParameterError("centre", "no face of the surface lies within the radius of this point")
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """Patches of two sizes all over the free surface."""
+        found = []
+        for site in situation.surface_sites:
+            for radius in _RADII:
+
+                def pulling(c: NDArray[np.float64], site: NDArray[np.float64] = site, radius: float = radius) -> Traction:
+                    return cls(centre=tuple(site.tolist()), value=tuple(c.tolist()), radius=radius)
+
+                found.append(Proposal(pulling, np.zeros(3), np.full(3, _USUAL), centre=site, radius=radius))
+        return found
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
         def traction(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,0 +1,148 @@
+"""What is looked for: every mechanism of the registry that the data of a case can show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.boundary import Fixed
+from warpbrain.cases.case import Case
+from warpbrain.diagnosis.effects import Effect, Effects
+from warpbrain.diagnosis.sensors import spread_points
+from warpbrain.errors import InputError, SolveError
+from warpbrain.mesh import boundary_faces, face_vectors
+from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
+
+Floats = NDArray[np.float64]
+
+#: About how many sites there are in the tissue, and on its surface.
+_VOLUME_SITES, _SURFACE_SITES = 350, 160
+
+
+@dataclass(frozen=True, eq=False)
+class Dictionary:
+    """Proposals by kind.
+
+    Attributes
+    ----------
+    situation : Situation
+    proposals : dict of str to tuple of Proposal
+    rejected : dict of str to str
+        Kinds that are not tried, and why.
+    """
+
+    situation: Situation
+    proposals: dict[str, tuple[Proposal, ...]]
+    rejected: dict[str, str]
+
+
+def situation_of(case: Case, instants: int = 1) -> Situation:
+    """What mechanisms may know of a case."""
+    mesh, _ = case.remaining
+    faces = boundary_faces(mesh.tetrahedra)
+    used = {boundary.nodes for boundary in case.boundaries}
+    held = tuple(
+        b.nodes for b in case.boundaries if isinstance(b, Fixed) and mesh.node_sets[b.nodes][faces].all(axis=1).any()
+    )
+    still = np.zeros(len(mesh.points), dtype=bool)
+    for nodes in held:
+        still |= mesh.node_sets[nodes]
+    free = tuple(
+        name
+        for name, members in mesh.node_sets.items()
+        if name not in used and members[faces].all(axis=1).any() and not (members & still).any()
+    )
+    open_faces = faces[~still[faces].any(axis=1)]
+    area = float(np.linalg.norm(face_vectors(mesh.points, open_faces), axis=1).sum())
+    # points a spacing apart have about 0.7 of its cube each, and 0.85 of its square
+    spacing = (mesh.volume / (0.7 * _VOLUME_SITES)) ** (1.0 / 3.0)
+    between = (area / (0.85 * _SURFACE_SITES)) ** 0.5
+    middles = mesh.points[mesh.tetrahedra].mean(axis=1)
+    on_surface = mesh.points[open_faces].mean(axis=1)
+    return Situation(
+        mesh,
+        case.gravity_axis,
+        case.density,
+        case.poisson,
+        frozenset(mechanism.kind for mechanism in case.mechanisms),
+        frozenset(tissue.model for tissue in case.tissues.values()),
+        held,
+        free,
+        instants,
+        middles[spread_points(middles, spacing)],
+        on_surface[spread_points(on_surface, between)],
+        spacing,
+    )
+
+
+def dictionary_of(case: Case, kinds: Sequence[str] | None = None) -> Dictionary:
+    """Proposals of all kinds, or of some.
+
+    Raises
+    ------
+    InputError
+        If there is no such kind.
+    """
+    known = mechanisms()
+    asked = list(known) if kinds is None else list(kinds)
+    for kind in asked:
+        if kind not in known:
+            raise InputError(f"candidates: no mechanism '{kind}': expected all, or some of {', '.join(known)}")
+    situation = situation_of(case)
+    proposals: dict[str, tuple[Proposal, ...]] = {}
+    rejected: dict[str, str] = {}
+    for kind in asked:
+        try:
+            proposals[kind] = tuple(known[kind].proposals(situation))
+        except NotTestableError as error:
+            rejected[kind] = f"not testable with these data: {error}"
+    return Dictionary(situation, proposals, rejected)
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Effects of all proposals at one state.
+
+    Attributes
+    ----------
+    kinds : tuple of str
+    effects : tuple of Effect
+    of_kind : dict of str to int array
+        Numbers of the effects of each kind.
+    rejected : dict of str to str
+    """
+
+    kinds: tuple[str, ...]
+    effects: tuple[Effect, ...]
+    of_kind: dict[str, NDArray[np.int64]]
+    rejected: dict[str, str]
+
+
+def candidates_at(
+    dictionary: Dictionary, effects: Effects, on_kind: Callable[[str], None] | None = None
+) -> Candidates:
+    """The effects of a dictionary at one state; what cannot be simulated is rejected and says why."""
+    found: list[Effect] = []
+    of_kind: dict[str, NDArray[np.int64]] = {}
+    rejected = dict(dictionary.rejected)
+    for kind, proposals in dictionary.proposals.items():
+        if on_kind is not None:
+            on_kind(kind)
+        own: list[Effect] = []
+        smooth = [proposal for proposal in proposals if proposal.follows != "switch"]
+        own.extend(effects.of(smooth))
+        for proposal in proposals:
+            if proposal.follows == "switch":
+                try:
+                    own.extend(effects.of([proposal]))
+                except (InputError, SolveError) as error:
+                    rejected[kind] = f"{proposal.region}: cannot be simulated here: {error}"
+        if own:
+            of_kind[kind] = np.arange(len(found), len(found) + len(own))
+            rejected.pop(kind, None)
+            found.extend(own)
+    return Candidates(tuple(of_kind), tuple(found), of_kind, rejected)

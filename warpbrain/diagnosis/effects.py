@@ -1,0 +1,156 @@
+"""What a mechanism would change of what is recorded, to first order: forces at the present state, times the compliance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.physics.load import Load
+from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
+from warpbrain.physics.proposal import Proposal
+from warpbrain.simulation.model import Material
+from warpbrain.simulation.system import System
+
+Floats = NDArray[np.float64]
+
+#: Part of a standard deviation by which a smooth proposal is differentiated.
+_STEP = 1e-3
+
+#: The answer of a switch: the sensors (n,) of the state with the mechanism, less those without it.
+Switched = Callable[[Mechanism, str], Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """A proposal as columns over the sensors: `mean + columns z`, `z ~ N(0, I)`.
+
+    Attributes
+    ----------
+    proposal : Proposal
+    mean : (n,) array
+        Where the coefficients are what is expected beforehand.
+    columns : (n, k) array
+        Of one standard deviation of each.
+    """
+
+    proposal: Proposal
+    mean: Floats
+    columns: Floats
+
+    def coefficients(self, z: Floats) -> Floats:
+        """The proposal's own coefficients."""
+        return self.proposal.mean + self.proposal.sd * z
+
+
+class Effects:
+    """Makes the columns of proposals at one state.
+
+    Parameters
+    ----------
+    at : Linearisation
+    switched : callable
+        See `Switched`; asked for proposals that are switches.
+    """
+
+    def __init__(self, at: Linearisation, switched: Switched) -> None:
+        self.at = at
+        self._switched = switched
+        self._internal: Floats | None = None
+
+    def of(self, proposals: Sequence[Proposal]) -> list[Effect]:
+        """Columns of each proposal, in one pass over what they have in common."""
+        asked: list[Mechanism] = []
+        for proposal in proposals:
+            asked.extend(self._points(proposal))
+        answers = self._answers(asked)
+        found, next_one = [], 0
+        for proposal in proposals:
+            count = len(self._points(proposal))
+            found.append(self._effect(proposal, answers[:, next_one : next_one + count]))
+            next_one += count
+        return found
+
+    @staticmethod
+    def _points(proposal: Proposal) -> list[Mechanism]:
+        """Mechanisms whose answers make the columns."""
+        if proposal.follows == "switch":
+            return []
+        axes = np.diag(proposal.sd)
+        if proposal.follows == "proportional":
+            return [proposal.make(axis) for axis in axes]
+        beside = [proposal.make(proposal.start + sign * _STEP * axis) for axis in axes for sign in (-1.0, 1.0)]
+        return [proposal.make(proposal.start), *beside]
+
+    def _effect(self, proposal: Proposal, answers: Floats) -> Effect:
+        if proposal.follows == "switch":
+            answer = self._switched(proposal.make(proposal.mean), proposal.releases)
+            return Effect(proposal, proposal.mean[0] * answer, proposal.sd[0] * answer[:, None])
+        if proposal.follows == "proportional":
+            return Effect(proposal, answers @ (proposal.mean / proposal.sd), answers)
+        columns = (answers[:, 2::2] - answers[:, 1::2]) / (2.0 * _STEP)
+        away = (proposal.mean - proposal.start) / proposal.sd
+        return Effect(proposal, answers[:, 0] + columns @ away, columns)
+
+    def _answers(self, mechanisms: Sequence[Mechanism]) -> Floats:
+        """What each mechanism changes at the present state, (n, count)."""
+        at, system = self.at, self.at.system
+        mesh = system.model.mesh
+        count = len(mechanisms)
+        forces = np.zeros((count, system.size, 3))
+        stiffer = np.zeros((system.elements, count))
+        larger = np.zeros((system.elements, count))
+        for number, mechanism in enumerate(mechanisms):
+            factor = mechanism.factor()
+            if isinstance(mechanism, Load):
+                forces[number] += factor * mechanism.nodal_forces(mesh)
+            if isinstance(mechanism, Following):
+                forces[number] -= self._following(mechanism)
+            if isinstance(mechanism, Substituting):
+                forces[number] -= self._substituting(mechanism)
+            if isinstance(mechanism, Weakening):
+                stiffer[:, number] = mechanism.stiffness_factor(mesh, factor) - 1.0
+            if isinstance(mechanism, Growing):
+                larger[:, number] = mechanism.growth(mesh, factor)
+        total = np.zeros((len(at.sensors), count))
+        pushed = forces.any(axis=(1, 2))
+        if pushed.any():
+            total[:, pushed] += at.answers(forces[pushed])
+        for weights, own in ((stiffer, "element_forces"), (larger, "growth_forces")):
+            altered = weights.any(axis=0)
+            if altered.any():
+                total[:, altered] += at.answers_of_elements(getattr(at, own), weights[:, altered])
+        return total
+
+    def _following(self, mechanism: Following) -> Floats:
+        """Internal forces (N, 3) of a term that is not there."""
+        import warp as wp
+
+        system = self.at.system
+        term = mechanism.bind(system)
+        count, nodes = term.stencils.shape
+        p, device = system.precision, system.device
+        blocks = wp.zeros((count, nodes * (nodes + 1) // 2), dtype=p.mat33, device=device)
+        term.place(wp.zeros((count, nodes), dtype=p.vec3, device=device), blocks)
+        term.set_scale(term.factor(np.inf))
+        system.u.assign(self.at.u)
+        term.evaluate_forces(system.u)
+        found = np.zeros((system.size, 3))
+        np.add.at(found, term.stencils, term.forces.numpy())
+        return found
+
+    def _substituting(self, mechanism: Substituting) -> Floats:
+        """What other laws add to the internal forces (N, 3)."""
+        if self._internal is None:
+            self._internal = self.at.internal_forces()
+        model = self.at.system.model
+        materials = {
+            label: Material(*mechanism.substitute(label, m.law, m.poisson, m.formulation))
+            for label, m in model.materials.items()
+        }
+        system = self.at.system
+        beside = System(replace(model, materials=materials), str(system.device), system.precision.name)
+        return self.at.internal_forces(beside) - self._internal

@@ -1,0 +1,199 @@
+"""How probable residuals are under what may have caused them: normal distributions, marginalised in closed form.
+
+    r = mean + columns z + U xi + kappa L eps,    z, xi, eps ~ N(0, I)
+
+`L` is the factor of the noise, `U` the nuisances times their standard deviations: stiffness, registration, mesh. What
+they can explain is worth nothing to a cause. `kappa` is a factor on the noise that nobody knows exactly: everything is
+averaged over a grid of it.
+
+With `W = L^-1 U = Q sqrt(D) V^T` the matrix to invert is diagonal for every `kappa`, so a cause costs a few products of
+the size of the nuisances, not of the sensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.effects import Effect
+
+Floats = NDArray[np.float64]
+
+#: Factors on the noise, and the standard deviation of their logarithm.
+KAPPAS = np.array([0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6])
+KAPPA_SD = 0.2
+
+
+def kappa_log_prior(kappas: Floats = KAPPAS, sd: float = KAPPA_SD) -> Floats:
+    """Logarithm of the weight of each factor."""
+    from scipy.special import logsumexp
+
+    found = -0.5 * (np.log(kappas) / sd) ** 2
+    return np.asarray(found - logsumexp(found))
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """Effects side by side, whitened: columns of each (its mean first), and which are whose.
+
+    Attributes
+    ----------
+    columns : (n, K) array
+        Whitened by the noise.
+    first : (v + 1,) int array
+        Where the columns of each effect begin.
+    """
+
+    columns: Floats
+    first: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.first) - 1
+
+
+class Explanation:
+    """What residuals are compared with: noise, and nuisances that may explain them first.
+
+    Parameters
+    ----------
+    factor : (n, n) array
+        `L`, lower triangular.
+    nuisances : (n, q) array
+        `U`.
+    """
+
+    def __init__(self, factor: Floats, nuisances: Floats) -> None:
+        self.factor = factor
+        self.nuisances = nuisances
+        self._W = self.whitened(nuisances)
+        values, vectors = np.linalg.eigh(self._W.T @ self._W)
+        self._D = np.maximum(values, 0.0)
+        self._WV = self._W @ vectors
+        self._log_det = 2.0 * float(np.log(np.diag(factor)).sum())
+
+    def whitened(self, rows: Floats) -> Floats:
+        """`L^-1` of rows."""
+        from scipy.linalg import solve_triangular
+
+        return np.asarray(solve_triangular(self.factor, rows, lower=True))
+
+    def with_more(self, nuisances: Floats) -> Explanation:
+        """The same with more nuisances (n, p)."""
+        return Explanation(self.factor, np.concatenate([self.nuisances, nuisances], axis=1))
+
+    @property
+    def size(self) -> int:
+        """Sensors."""
+        return len(self.factor)
+
+    def stack(self, effects: Sequence[Effect]) -> Stack:
+        """Whiten effects."""
+        counts = [1 + effect.columns.shape[1] for effect in effects]
+        if not effects:
+            return Stack(np.zeros((self.size, 0)), np.zeros(1, dtype=np.int64))
+        columns = np.concatenate([np.column_stack([effect.mean, effect.columns]) for effect in effects], axis=1)
+        return Stack(self.whitened(columns), np.concatenate([[0], np.cumsum(counts)]))
+
+    def log_none(self, residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
+        """Log density of whitened residuals (n, b) without any cause: (kappas, b)."""
+        rr, Vr = np.sum(residuals**2, axis=0), self._WV.T @ residuals
+        return np.array([self._log_base(rr, Vr, k) for k in kappas])
+
+    def _log_base(self, rr: Floats, Vr: Floats, kappa: float) -> Floats:
+        k2 = kappa**2
+        quadratic = (rr - np.sum(Vr**2 / (k2 + self._D)[:, None], axis=0)) / k2
+        log_det = self.size * np.log(k2) + float(np.log1p(self._D / k2).sum()) + self._log_det
+        return np.asarray(-0.5 * (quadratic + log_det + self.size * np.log(2.0 * np.pi)))
+
+    def log_factors(self, stack: Stack, residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
+        """Log Bayes factor of each effect against none, for whitened residuals (n, b): (kappas, v, b)."""
+        inner = Inner(self, stack, residuals)
+        return np.array([inner.log_factors(kappa) for kappa in kappas])
+
+    def precision_times(self, rows: Floats, kappa: float = 1.0) -> Floats:
+        """`S^-1` of whitened rows (n, b): what is left of them after noise and nuisances, whitened."""
+        k2 = kappa**2
+        return np.asarray((rows - self._WV @ ((self._WV.T @ rows) / (k2 + self._D)[:, None])) / k2)
+
+    def detectability(self, whitened: Floats, kappa: float = 1.0) -> float:
+        """`d = sqrt(delta^T S^-1 delta)` of a change of the sensors (n,), whitened."""
+        return float(np.sqrt(max(whitened @ self.precision_times(whitened[:, None], kappa)[:, 0], 0.0)))
+
+    def best_kappa(self, whitened: Floats) -> float:
+        """Mean of the factor on the noise after residuals (n,), whitened."""
+        from scipy.special import softmax
+
+        weights = softmax(self.log_none(whitened[:, None])[:, 0] + kappa_log_prior())
+        return float(weights @ KAPPAS)
+
+    def nuisances_given(self, whitened: Floats, kappa: float) -> Floats:
+        """Mean of the nuisances `xi` (q,) after residuals (n,), whitened."""
+        return np.asarray(self._W.T @ self.precision_times(whitened[:, None], kappa)[:, 0])
+
+    def draws(self, count: int, kappa: float, rng: np.random.Generator) -> Floats:
+        """Whitened residuals (n, count) of which nothing but noise and nuisances is the cause."""
+        noise = kappa * rng.normal(size=(self.size, count))
+        return np.asarray(noise + self._W @ rng.normal(size=(self._W.shape[1], count)))
+
+
+class Inner:
+    """Products of effects with each other and with residuals, from which the evidence at every `kappa` follows."""
+
+    def __init__(self, explanation: Explanation, stack: Stack, residuals: Floats) -> None:
+        self.explanation, self.stack = explanation, stack
+        WV = explanation._WV
+        self._D = explanation._D
+        self._VG, self._Vr = WV.T @ stack.columns, WV.T @ residuals
+        self._Gr = stack.columns.T @ residuals
+        self._residuals = residuals
+        widths = np.diff(stack.first)
+        self._families = [(int(width), np.flatnonzero(widths == width)) for width in np.unique(widths)]
+
+    @cached_property
+    def _grams(self) -> dict[int, Floats]:
+        found = {}
+        for width, members in self._families:
+            own = self._columns(self.stack.columns, members, width)
+            found[width] = np.einsum("nvi,nvj->vij", own, own, optimize=True)
+        return found
+
+    def _columns(self, rows: Floats, members: Any, width: int) -> Floats:
+        at = self.stack.first[members][:, None] + np.arange(width)
+        return np.asarray(rows[:, at])
+
+    def moments(self, kappa: float, members: Any, width: int) -> tuple[Floats, Floats]:
+        """`G^T S^-1 G` (v, w, w) and `G^T S^-1 r` (v, w, b) of effects of one width."""
+        k2 = kappa**2
+        VG = self._columns(self._VG, members, width)
+        weighted = VG / (k2 + self._D)[:, None, None]
+        GSG = (self._grams[width] - np.einsum("qvi,qvj->vij", VG, weighted, optimize=True)) / k2
+        at = self.stack.first[members][:, None] + np.arange(width)
+        GSr = (self._Gr[at] - np.einsum("qvi,qb->vib", weighted, self._Vr, optimize=True)) / k2
+        return GSG, GSr
+
+    def log_factors(self, kappa: float) -> Floats:
+        """Log Bayes factor of each effect, (v, b)."""
+        found = np.zeros((len(self.stack), self._residuals.shape[1]))
+        for width, members in self._families:
+            GSG, GSr = self.moments(kappa, members, width)
+            hh, hr = GSG[:, 0, 0], GSr[:, 0]
+            log = hr - 0.5 * hh[:, None]
+            if width > 1:
+                M = np.eye(width - 1) + GSG[:, 1:, 1:]
+                b = GSr[:, 1:] - GSG[:, 1:, :1]
+                log = log + 0.5 * np.einsum("vib,vib->vb", b, np.linalg.solve(M, b))
+                log = log - 0.5 * np.linalg.slogdet(M)[1][:, None]
+            found[members] = log
+        return found
+
+    def coefficients(self, kappa: float, number: int) -> tuple[Floats, Floats]:
+        """Mean (k,) and covariance (k, k) of the `z` of an effect after the first of the residuals."""
+        width = int(self.stack.first[number + 1] - self.stack.first[number])
+        GSG, GSr = self.moments(kappa, np.array([number]), width)
+        covariance = np.linalg.inv(np.eye(width - 1) + GSG[0, 1:, 1:])
+        return covariance @ (GSr[0, 1:, 0] - GSG[0, 1:, 0]), covariance

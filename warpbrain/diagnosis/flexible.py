@@ -1,0 +1,44 @@
+"""A force that nobody has a name for: any smooth body force, as columns over the sensors.
+
+Gaussian patches all over the body, in three directions, independent of each other: a body force with a Gaussian process
+of that length. Scaled to 1 m of mean displacement at the sensors, and cut to the modes that they see.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.diagnosis.sensors import spread_points
+
+Floats = NDArray[np.float64]
+
+#: Lengths of patches in spacings of the sites, and scales in standard deviations of the noise.
+LENGTHS, SCALES = (1.0, 2.4), (1.5, 4.0, 10.0)
+#: Part of the variance that is cut off.
+_CUT = 1e-4
+
+
+def force_patches(at: Linearisation, length: float, spacing: float | None = None) -> tuple[Floats, Floats]:
+    """Sites (s, 3) [m], and answers (n, s, 3) to a force of 1 N in each direction, spread with a Gaussian of a length."""
+    mesh = at.system.model.mesh
+    sites = mesh.points[spread_points(mesh.points, length if spacing is None else spacing, 700)]
+    apart = np.linalg.norm(mesh.points[:, None] - sites[None], axis=2)
+    weights = mesh.node_volumes[:, None] * np.exp(-0.5 * (apart / length) ** 2)
+    # a share that falls on what is held moves nothing
+    weights /= weights.sum(axis=0)
+    by_axis = at.compliance.reshape(len(at.sensors), -1, 3)
+    return sites, np.einsum("nac,as->nsc", by_axis, weights, optimize=True)
+
+
+def flexible_columns(at: Linearisation, length: float) -> Floats:
+    """Columns (n, k) of a body force of a length, of 1 m root mean square over the displacements."""
+    _, answers = force_patches(at, length)
+    columns = answers.reshape(len(answers), -1)
+    left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    total = np.cumsum(sizes**2) / np.sum(sizes**2)
+    kept = int(np.searchsorted(total, 1.0 - _CUT)) + 1
+    found = left[:, :kept] * sizes[:kept]
+    rows = at.sensors.is_displacement
+    return np.asarray(found / np.sqrt(np.mean(np.sum(found[rows] ** 2, axis=1))))

@@ -1,0 +1,206 @@
+"""What may explain residuals without any physics missing: columns over the sensors of one standard deviation each.
+
+Tissue (its prior), stiffness that varies within it, compressibility, the shape of its law, how large the known loads
+were, a rigid error of registration, and the error of the mesh. A cause is credited only with what they cannot explain.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.effects import Effects
+from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.diagnosis.sensors import Sensors, spread_points
+from warpbrain.diagnosis.states import States
+from warpbrain.estimation.discretisation import Difference, Discretisation
+from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.physics.laws import Law
+from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanisms.asymmetry import Asymmetry
+from warpbrain.physics.mechanisms.compressibility import Compressibility
+from warpbrain.physics.proposal import Proposal
+
+Floats = NDArray[np.float64]
+
+#: Standard deviations: of `-ln(1 - 2 nu)`, of an exponent of the law, of a share of I2, of the size of known loads.
+_VOLUME, _EXPONENT, _SECOND, _LOADS = 0.4, 3.0, 0.25, 0.04
+#: Of a rigid error of registration: shift [m] and turn [rad].
+_SHIFT, _TURN = 1e-3, math.radians(1.0)
+#: Error of the mesh beside what a finer one shows, as a part of the displacement, and how far [m] it is alike.
+_FRACTION, _ALIKE = 0.06, 0.02
+#: Step of a difference in `theta`.
+_STEP = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Nuisances of one kind.
+
+    Attributes
+    ----------
+    name : str
+        For people.
+    columns : (n, k) array
+        What one standard deviation of each changes of what is recorded.
+    """
+
+    name: str
+    columns: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Nuisances:
+    """All of them.
+
+    Attributes
+    ----------
+    families : tuple of Family
+        The first is the tissue's parameters, the second the stiffness field.
+    mean : (n,) array
+        What they are expected to change of what is recorded beforehand: the error of the mesh.
+    """
+
+    families: tuple[Family, ...]
+    mean: Floats
+
+    @property
+    def columns(self) -> Floats:
+        """Of all, side by side (n, q)."""
+        return np.concatenate([family.columns for family in self.families], axis=1)
+
+    def part(self, name: str) -> slice:
+        """Where the columns of a family are."""
+        at = 0
+        for family in self.families:
+            width = family.columns.shape[1]
+            if family.name == name:
+                return slice(at, at + width)
+            at += width
+        raise KeyError(name)
+
+
+def nuisances_at(
+    at: Linearisation, states: States, theta: Floats, prior: Gaussian, effects: Effects, mesh_error: Difference | None
+) -> Nuisances:
+    """The nuisances of a state.
+
+    Parameters
+    ----------
+    at : Linearisation
+    states : States
+    theta : (p,) array
+        Of the tissues there.
+    prior : Gaussian
+        Of `theta`.
+    effects : Effects
+        At that state.
+    mesh_error : Difference or None
+        The state on a finer mesh less the state.
+    """
+    sensors = at.sensors
+    families = [
+        Family("tissue", _tissue(at, states, theta) @ prior.factor),
+        Family("stiffness field", at.answers_of_elements(at.element_forces, states.modes)),
+        Family("compressibility", _law_columns(effects, _other_volume(states))),
+        Family("shape of the law", _law_columns(effects, _other_shape())),
+        Family("known loads", _known_loads(at)),
+        Family("registration", sensors.rigid * np.repeat([_SHIFT, _TURN], 3)),
+    ]
+    mean = np.zeros(len(sensors))
+    if mesh_error is not None:
+        believed = Discretisation()
+        answer = _observed(sensors, mesh_error.u, mesh_error.reactions)
+        mean = believed.mean * answer
+        families.append(Family("mesh", believed.deviation * answer[:, None]))
+    families.append(Family("mesh, unknown", _fractional(at)))
+    return Nuisances(tuple(families), mean)
+
+
+def _observed(sensors: Sensors, u: Floats, reactions: Floats) -> Floats:
+    return np.asarray(sensors.by_displacement @ u.ravel() + sensors.by_reactions @ reactions.ravel())
+
+
+def _tissue(at: Linearisation, states: States, theta: Floats) -> Floats:
+    """Derivatives (n, p) of what is recorded by the parameters of the tissues."""
+    system = at.system
+    forces = np.zeros((len(theta), system.size, 3))
+    for k in range(len(theta)):
+        for sign in (-1.0, 1.0):
+            beside = theta.copy()
+            beside[k] += sign * _STEP
+            system.set_materials(states.parameters.materials(beside))
+            forces[k] -= sign * at.internal_forces() / (2.0 * _STEP)
+    system.set_materials(states.parameters.materials(theta))
+    return at.answers(forces)
+
+
+def _law_columns(effects: Effects, proposals: list[Proposal]) -> Floats:
+    return np.concatenate([effect.columns for effect in effects.of(proposals)], axis=1)
+
+
+def _other_volume(states: States) -> list[Proposal]:
+    own = -math.log1p(-2.0 * states.case.poisson)
+    return [
+        Proposal.of_one(lambda c: Compressibility(poisson=-0.5 * math.expm1(-c)), own, _VOLUME, "smooth", own),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SecondInvariant(Mechanism):
+    """A law with a share of the second invariant."""
+
+    share: float
+    kind: ClassVar[str] = "second invariant"
+    sentence: ClassVar[str] = "The law has a share of the second invariant."
+
+    def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
+        """See `warpbrain.physics.mechanism.Substituting`."""
+        mu = law.shear_modulus
+        return MooneyRivlin(0.5 * mu * (1.0 - self.share), 0.5 * mu * self.share), poisson, formulation
+
+
+def _other_shape() -> list[Proposal]:
+    return [
+        Proposal.of_one(lambda a: Asymmetry(exponent=a), 2.0, _EXPONENT, "smooth", 2.0),
+        Proposal.of_one(lambda share: _SecondInvariant(share=share), 0.5, _SECOND, "smooth", 0.5),
+    ]
+
+
+def _known_loads(at: Linearisation) -> Floats:
+    """All known loads larger or smaller by one factor, and all prescribed displacements."""
+    model = at.system.model
+    columns = [_LOADS * at.answers(model.external_forces()[None])]
+    if model.prescribed.any():
+        moved = at.system.stiffness() @ model.prescribed.ravel()
+        moved = moved.reshape(-1, 3)
+        own = _observed(at.sensors, model.prescribed, np.where(model.constrained, moved, 0.0))
+        answer = own + at.answers(np.where(model.constrained, 0.0, -moved)[None])[:, 0]
+        columns.append(_LOADS * answer[:, None])
+    found = np.concatenate(columns, axis=1)
+    return found[:, found.any(axis=0)]
+
+
+def _fractional(at: Linearisation) -> Floats:
+    """A part of the displacement in any direction, alike among neighbours."""
+    from scipy.spatial import cKDTree
+
+    sensors = at.sensors
+    rows = np.flatnonzero(sensors.is_displacement)
+    if not len(rows):
+        return np.zeros((len(sensors), 0))
+    where = sensors.positions[rows]
+    nearest = cKDTree(at.system.model.mesh.points).query(where)[1]
+    size = np.linalg.norm(at.u, axis=1)[nearest]
+    anchors = where[spread_points(where, _ALIKE, 60)]
+    near: Any = np.exp(-0.5 * (np.linalg.norm(where[:, None] - anchors[None], axis=2) / (0.7 * _ALIKE)) ** 2)
+    near /= np.sqrt(np.sum(near**2, axis=1, keepdims=True))
+    found = np.zeros((len(sensors), 3 * len(anchors)))
+    along = sensors.directions[rows]
+    found[rows] = (_FRACTION * size[:, None, None] * near[:, :, None] * along[:, None, :]).reshape(len(rows), -1)
+    return found

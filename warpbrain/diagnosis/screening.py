@@ -1,0 +1,111 @@
+"""Which kind of mechanism explains residuals best, to first order: evidence of every proposal, averaged over a kind.
+
+Averaging over places, levels and sets is the correction for having looked in many of them. Beside the named kinds stands
+the unknown: any smooth force, alone or on top of one of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.dictionary import Candidates
+from warpbrain.diagnosis.evidence import Explanation, Stack, kappa_log_prior
+
+Floats = NDArray[np.float64]
+
+UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """Evidence of b residuals, logarithms, against nothing missing.
+
+    Attributes
+    ----------
+    kinds : tuple of str
+        Those of the candidates, then ``"unknown"``.
+    none : (b,) array
+        Log density with nothing missing.
+    log_factors : (kinds, b) array
+        Log Bayes factor of each kind.
+    places : (v, b) array
+        Of each effect.
+    """
+
+    kinds: tuple[str, ...]
+    none: Floats
+    log_factors: Floats
+    places: Floats
+
+    @property
+    def alarm(self) -> Floats:
+        """Log Bayes factor (b,) of anything missing: the mean over kinds."""
+        from scipy.special import logsumexp
+
+        return np.asarray(logsumexp(self.log_factors, axis=0) - np.log(len(self.log_factors)))
+
+    def best_effect(self, candidates: Candidates, kind: str, number: int = 0) -> int:
+        """Number of the most probable effect of a kind."""
+        own = candidates.of_kind[kind]
+        return int(own[np.argmax(self.places[own, number])])
+
+
+class Screening:
+    """Compares residuals with candidates.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        Noise and nuisances.
+    candidates : Candidates
+    flexible : sequence of (n, k) arrays
+        Columns of any smooth force, each with a length and a size.
+    """
+
+    def __init__(self, explanation: Explanation, candidates: Candidates, flexible: list[Floats]) -> None:
+        self.explanation = explanation
+        self.candidates = candidates
+        self.stack: Stack = explanation.stack(candidates.effects)
+        self.flexible = [explanation.with_more(columns) for columns in flexible]
+
+    def run(self, residuals: Floats) -> Screen:
+        """Evidence for whitened residuals (n, b)."""
+        from scipy.special import logsumexp
+
+        weights = kappa_log_prior()[:, None]
+        none = np.asarray(logsumexp(self.explanation.log_none(residuals) + weights, axis=0))
+        places = self._places(self.explanation, residuals) - none
+        by_kind = self._by_kind(places)
+        unknown = self._unknown(residuals) - none
+        return Screen((*self.candidates.kinds, UNKNOWN), none, np.vstack([by_kind, unknown]), places)
+
+    def _places(self, explanation: Explanation, residuals: Floats) -> Floats:
+        """Log density (v, b) of residuals with each effect."""
+        from scipy.special import logsumexp
+
+        base = explanation.log_none(residuals)[:, None, :]
+        factors = explanation.log_factors(self.stack, residuals)
+        return np.asarray(logsumexp(base + factors + kappa_log_prior()[:, None, None], axis=0))
+
+    def _by_kind(self, places: Floats) -> Floats:
+        from scipy.special import logsumexp
+
+        rows = [logsumexp(places[own], axis=0) - np.log(len(own)) for own in self.candidates.of_kind.values()]
+        return np.array(rows).reshape(len(rows), places.shape[1])
+
+    def _unknown(self, residuals: Floats) -> Floats:
+        """Log density (b,) with any smooth force: half of the weight alone, half on top of a kind."""
+        from scipy.special import logsumexp
+
+        found = []
+        for flexible in self.flexible:
+            alone = logsumexp(flexible.log_none(residuals) + kappa_log_prior()[:, None], axis=0)
+            kinds = self._by_kind(self._places(flexible, residuals))
+            on_top = logsumexp(kinds, axis=0) - np.log(max(len(kinds), 1))
+            found.append(np.logaddexp(alone, on_top) - np.log(2.0))
+        return np.asarray(logsumexp(np.array(found), axis=0) - np.log(len(found)))
+
+

@@ -1,0 +1,42 @@
+"""What is believed of a case's tissues before its recordings: the generative model's word, or the case's own."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.case import Case
+from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.prior_modes import prior_modes, prior_of
+
+Floats = NDArray[np.float64]
+
+#: Standard deviations where no study is named: of a log modulus, of a share of C2, of an exponent.
+_OWN = {"ln(mu0 / Pa)": 0.5, "C2 / (C1 + C2)": 0.2, "alpha": 3.0}
+
+
+def tissue_prior(case: Case, parameters: Parameters) -> Gaussian:
+    """A normal distribution of `theta`.
+
+    Tissues with groups of the generative model have its prior, of Ogden's exponents the part with the signs of the
+    case's own laws; the others are around what the case says.
+    """
+    try:
+        modes = prior_modes(prior_of(case), parameters)
+    except (InputError, SolveError):
+        mean = declared(case, parameters)
+        sd = np.array([_OWN[parameter.coordinate.name] for parameter in parameters.each])
+        return Gaussian(mean, np.diag(sd**2))
+    try:
+        own = declared(case, parameters)
+    except InputError:
+        return modes[0].gaussian
+    inside = [mode for mode in modes if np.all((own >= mode.low) & (own <= mode.high))]
+    return (inside or list(modes))[0].gaussian
+
+
+def declared(case: Case, parameters: Parameters) -> Floats:
+    """`theta` (p,) of the laws that the case declares; `InputError` if it leaves one to the prior."""
+    return parameters.theta_of([case.tissues[labels[0]].known_law for labels in parameters.labels])

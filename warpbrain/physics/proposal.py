@@ -1,0 +1,126 @@
+"""What a mechanism proposes where it is looked for: ways in which it may act that a case does not declare.
+
+A proposal is a family of mechanisms, made from a few coefficients `c` that are normal beforehand. A diagnosis scans the
+proposals of a kind (places, levels, node sets), and averages over them: that is the price of looking elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.mesh import TetMesh
+
+if TYPE_CHECKING:
+    from warpbrain.physics.mechanism import Mechanism
+
+Floats = NDArray[np.float64]
+
+#: How the effect of a proposal follows its coefficients: in proportion, to first order about a start that does nothing,
+#: or all at once.
+Follows = Literal["proportional", "smooth", "switch"]
+
+
+class NotTestableError(Exception):
+    """A mechanism that the data of a case cannot show; the message says what is missing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """What a mechanism may know of a case in which it is looked for.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+        The simulated one.
+    gravity_axis : (float, float, float) or None
+    density, poisson : float
+        [kg/m3] and without unit.
+    assumed : frozenset of str
+        Kinds of mechanisms that the case assumes.
+    laws : frozenset of str
+        Of its tissues.
+    held, free : tuple of str
+        Node sets with faces of the surface: those that nothing moves, and those on which nothing is declared.
+    instants : int
+        At how many times something was recorded.
+    volume_sites, surface_sites : (k, 3) array
+        Points [m] a spacing apart in the tissue, and on its free surface.
+    spacing : float
+        [m]
+    """
+
+    mesh: TetMesh
+    gravity_axis: tuple[float, float, float] | None
+    density: float
+    poisson: float
+    assumed: frozenset[str]
+    laws: frozenset[str]
+    held: tuple[str, ...]
+    free: tuple[str, ...]
+    instants: int
+    volume_sites: Floats
+    surface_sites: Floats
+    spacing: float
+
+    def require_new(self, kind: str) -> None:
+        """Raise `NotTestableError` if the case assumes a mechanism already."""
+        if kind in self.assumed:
+            raise NotTestableError("the case assumes it already")
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Mechanisms of one kind at one place.
+
+    Attributes
+    ----------
+    make : callable
+        From coefficients (k,) to the mechanism.
+    mean, sd : (k,) array
+        Of the coefficients beforehand.
+    follows : str
+        One of `Follows`. A smooth one does nothing at `start`; a switch has one coefficient, its share.
+    start : (k,) array
+        About which a smooth one is differentiated; zero if proportional.
+    releases : str
+        Node set that is no longer held by the case's own boundaries.
+    centre, radius : (3,) array and float, or None
+        Where it acts [m], if somewhere.
+    region : str
+        Where it acts in words.
+    """
+
+    make: Callable[[Floats], Mechanism]
+    mean: Floats
+    sd: Floats
+    follows: Follows = "proportional"
+    start: Floats = field(default_factory=lambda: np.zeros(0))
+    releases: str = ""
+    centre: Floats | None = None
+    radius: float | None = None
+    region: str = ""
+
+    @classmethod
+    def of_one(
+        cls,
+        make: Callable[[float], Mechanism],
+        mean: float,
+        sd: float,
+        follows: Follows = "proportional",
+        start: float = 0.0,
+        **where: object,
+    ) -> Proposal:
+        """A proposal with one coefficient."""
+
+        def made(c: Floats) -> Mechanism:
+            return make(float(c[0]))
+
+        return cls(made, np.array([mean]), np.array([sd]), follows, np.array([start]), **where)  # type: ignore[arg-type]
+
+    def __len__(self) -> int:
+        return len(self.mean)
