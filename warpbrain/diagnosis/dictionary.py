@@ -113,19 +113,28 @@ class Candidates:
     effects : tuple of Effect
     of_kind : dict of str to int array
         Numbers of the effects of each kind.
+    alternatives : frozenset of str
+        Kinds that are no physics.
     rejected : dict of str to str
     """
 
     kinds: tuple[str, ...]
     effects: tuple[Effect, ...]
     of_kind: dict[str, NDArray[np.int64]]
+    alternatives: frozenset[str]
     rejected: dict[str, str]
 
 
 def candidates_at(
-    dictionary: Dictionary, effects: Effects, on_kind: Callable[[str], None] | None = None
+    dictionary: Dictionary,
+    effects: Effects,
+    alternatives: dict[str, Effect],
+    on_kind: Callable[[str], None] | None = None,
 ) -> Candidates:
-    """The effects of a dictionary at one state; what cannot be simulated is rejected and says why."""
+    """The effects of a dictionary at one state, and of what is no physics.
+
+    What cannot be simulated is rejected and says why.
+    """
     found: list[Effect] = []
     of_kind: dict[str, NDArray[np.int64]] = {}
     rejected = dict(dictionary.rejected)
@@ -145,4 +154,7 @@ def candidates_at(
             of_kind[kind] = np.arange(len(found), len(found) + len(own))
             rejected.pop(kind, None)
             found.extend(own)
-    return Candidates(tuple(of_kind), tuple(found), of_kind, rejected)
+    for name, effect in alternatives.items():
+        of_kind[name] = np.array([len(found)])
+        found.append(effect)
+    return Candidates(tuple(of_kind), tuple(found), of_kind, frozenset(alternatives), rejected)

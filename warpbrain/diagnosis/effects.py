@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,20 +31,27 @@ class Effect:
 
     Attributes
     ----------
-    proposal : Proposal
+    proposal : Proposal or None
+        None of what is no physics.
     mean : (n,) array
         Where the coefficients are what is expected beforehand.
     columns : (n, k) array
         Of one standard deviation of each.
     """
 
-    proposal: Proposal
+    proposal: Proposal | None
     mean: Floats
     columns: Floats
 
+    @property
+    def proposed(self) -> Proposal:
+        """The proposal of an effect that is physics."""
+        assert self.proposal is not None
+        return self.proposal
+
     def coefficients(self, z: Floats) -> Floats:
         """The proposal's own coefficients."""
-        return self.proposal.mean + self.proposal.sd * z
+        return self.proposed.mean + self.proposed.sd * z
 
 
 class Effects:
@@ -61,12 +69,24 @@ class Effects:
         self._switched = switched
         self._internal: Floats | None = None
 
-    def of(self, proposals: Sequence[Proposal]) -> list[Effect]:
-        """Columns of each proposal, in one pass over what they have in common."""
+    @property
+    def switches(self) -> dict[str, Any]:
+        """States of switches that were solved."""
+        return getattr(self._switched, "known", {})
+
+    def of(self, proposals: Sequence[Proposal], present: Mechanism | None = None) -> list[Effect]:
+        """Columns of each proposal, in one pass over what they have in common.
+
+        Parameters
+        ----------
+        proposals : sequence of Proposal
+        present : Mechanism, optional
+            What of them acts at the state already.
+        """
         asked: list[Mechanism] = []
         for proposal in proposals:
             asked.extend(self._points(proposal))
-        answers = self._answers(asked)
+        answers = self._answers(asked, present)
         found, next_one = [], 0
         for proposal in proposals:
             count = len(self._points(proposal))
@@ -95,10 +115,12 @@ class Effects:
         away = (proposal.mean - proposal.start) / proposal.sd
         return Effect(proposal, answers[:, 0] + columns @ away, columns)
 
-    def _answers(self, mechanisms: Sequence[Mechanism]) -> Floats:
+    def _answers(self, mechanisms: Sequence[Mechanism], present: Mechanism | None) -> Floats:
         """What each mechanism changes at the present state, (n, count)."""
         at, system = self.at, self.at.system
         mesh = system.model.mesh
+        stiff = present.stiffness_factor(mesh, 1.0) if isinstance(present, Weakening) else 1.0
+        large = 1.0 + present.growth(mesh, 1.0) if isinstance(present, Growing) else 1.0
         count = len(mechanisms)
         forces = np.zeros((count, system.size, 3))
         stiffer = np.zeros((system.elements, count))
@@ -112,9 +134,9 @@ class Effects:
             if isinstance(mechanism, Substituting):
                 forces[number] -= self._substituting(mechanism)
             if isinstance(mechanism, Weakening):
-                stiffer[:, number] = mechanism.stiffness_factor(mesh, factor) - 1.0
+                stiffer[:, number] = mechanism.stiffness_factor(mesh, factor) / stiff - 1.0
             if isinstance(mechanism, Growing):
-                larger[:, number] = mechanism.growth(mesh, factor)
+                larger[:, number] = (1.0 + mechanism.growth(mesh, factor)) / large - 1.0
         total = np.zeros((len(at.sensors), count))
         pushed = forces.any(axis=(1, 2))
         if pushed.any():

@@ -24,16 +24,16 @@ from warpbrain.diagnosis.effects import Effect
 
 Floats = NDArray[np.float64]
 
-#: Factors on the noise, and the standard deviation of their logarithm.
-KAPPAS = np.array([0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6])
+#: Factors on the noise, and the scale of their logarithm.
+KAPPAS = np.array([0.65, 0.78, 0.9, 1.0, 1.12, 1.28, 1.5, 1.9, 2.5, 3.5])
 KAPPA_SD = 0.2
 
 
 def kappa_log_prior(kappas: Floats = KAPPAS, sd: float = KAPPA_SD) -> Floats:
-    """Logarithm of the weight of each factor."""
+    """Logarithm of the weight of each factor: a Student t of three degrees of freedom in `ln kappa`."""
     from scipy.special import logsumexp
 
-    found = -0.5 * (np.log(kappas) / sd) ** 2
+    found = -2.0 * np.log1p((np.log(kappas) / sd) ** 2 / 3.0)
     return np.asarray(found - logsumexp(found))
 
 

@@ -12,6 +12,7 @@ as long for as many as there are sensors.
 
 from __future__ import annotations
 
+import copy
 from functools import cached_property
 from typing import Any
 
@@ -45,26 +46,37 @@ class Linearisation:
         self.u = u
         self.reactions = reactions
         self.sensors = sensors
-        self.compliance = self._compliance()
+        self._factorise()
+        self.compliance = self.compliance_of(sensors.by_displacement, sensors.by_reactions)
 
-    def _compliance(self) -> Floats:
-        """`A`, shape (n, 3 N)."""
+    def _factorise(self) -> None:
         from scipy.sparse.linalg import splu
 
         system = self.system
         system.u.assign(self.u)
         K = system.stiffness().tocsr()
         free = ~system.model.constrained.ravel()
-        held_free = K[~free][:, free]
-        by_R = self.sensors.by_reactions[:, ~free]
-        rows = self.sensors.by_displacement[:, free] + by_R @ held_free
+        self._free, self._held_free = free, K[~free][:, free]
         options = {"SymmetricMode": True}
         try:
-            factors = splu(K[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+            self._factors: Any = splu(K[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
         except RuntimeError as error:
             raise SolveError(f"the state is unstable: its tangent stiffness cannot be factorised ({error})") from None
-        A = np.zeros((len(self.sensors), len(free)))
-        A[:, free] = factors.solve(np.asarray(rows.todense()).T).T
+
+    def with_sensors(self, sensors: Sensors) -> Linearisation:
+        """The same state with other sensors; nothing is factorised again."""
+        other = copy.copy(self)
+        other.sensors = sensors
+        other.compliance = self.compliance_of(sensors.by_displacement, sensors.by_reactions)
+        return other
+
+    def compliance_of(self, by_displacement: Any, by_reactions: Any) -> Floats:
+        """`A` (n, 3 N) of sensors with these derivatives, SciPy CSR (n, 3 N)."""
+        free = self._free
+        by_R = by_reactions[:, ~free]
+        rows = by_displacement[:, free] + by_R @ self._held_free
+        A = np.zeros((by_displacement.shape[0], len(free)))
+        A[:, free] = self._factors.solve(np.asarray(rows.todense()).T).T
         A[:, ~free] = -np.asarray(by_R.todense())
         return A
 

@@ -64,15 +64,22 @@ class Nuisances:
         The first is the tissue's parameters, the second the stiffness field.
     mean : (n,) array
         What they are expected to change of what is recorded beforehand: the error of the mesh.
+    anchors : (a, 3) array
+        Points [m] about which the unknown part of the mesh's error is alike.
     """
 
     families: tuple[Family, ...]
     mean: Floats
+    anchors: Floats
 
     @property
     def columns(self) -> Floats:
         """Of all, side by side (n, q)."""
         return np.concatenate([family.columns for family in self.families], axis=1)
+
+    def weakened(self) -> Nuisances:
+        """The same as if nothing of them could be: columns that are next to nothing."""
+        return Nuisances(tuple(Family(f.name, 1e-9 * f.columns) for f in self.families), self.mean, self.anchors)
 
     def part(self, name: str) -> slice:
         """Where the columns of a family are."""
@@ -86,7 +93,13 @@ class Nuisances:
 
 
 def nuisances_at(
-    at: Linearisation, states: States, theta: Floats, prior: Gaussian, effects: Effects, mesh_error: Difference | None
+    at: Linearisation,
+    states: States,
+    theta: Floats,
+    prior: Gaussian,
+    effects: Effects,
+    mesh_error: Difference | None,
+    anchors: Floats | None = None,
 ) -> Nuisances:
     """The nuisances of a state.
 
@@ -102,8 +115,13 @@ def nuisances_at(
         At that state.
     mesh_error : Difference or None
         The state on a finer mesh less the state.
+    anchors : (a, 3) array, optional
+        Those of other sensors, so that columns mean the same.
     """
     sensors = at.sensors
+    if anchors is None:
+        where = sensors.positions[sensors.is_displacement]
+        anchors = where[spread_points(where, _ALIKE, 60)]
     families = [
         Family("tissue", _tissue(at, states, theta) @ prior.factor),
         Family("stiffness field", at.answers_of_elements(at.element_forces, states.modes)),
@@ -118,8 +136,8 @@ def nuisances_at(
         answer = _observed(sensors, mesh_error.u, mesh_error.reactions)
         mean = believed.mean * answer
         families.append(Family("mesh", believed.deviation * answer[:, None]))
-    families.append(Family("mesh, unknown", _fractional(at)))
-    return Nuisances(tuple(families), mean)
+    families.append(Family("mesh, unknown", _fractional(at, anchors)))
+    return Nuisances(tuple(families), mean, anchors)
 
 
 def _observed(sensors: Sensors, u: Floats, reactions: Floats) -> Floats:
@@ -186,7 +204,7 @@ def _known_loads(at: Linearisation) -> Floats:
     return found[:, found.any(axis=0)]
 
 
-def _fractional(at: Linearisation) -> Floats:
+def _fractional(at: Linearisation, anchors: Floats) -> Floats:
     """A part of the displacement in any direction, alike among neighbours."""
     from scipy.spatial import cKDTree
 
@@ -197,7 +215,6 @@ def _fractional(at: Linearisation) -> Floats:
     where = sensors.positions[rows]
     nearest = cKDTree(at.system.model.mesh.points).query(where)[1]
     size = np.linalg.norm(at.u, axis=1)[nearest]
-    anchors = where[spread_points(where, _ALIKE, 60)]
     near: Any = np.exp(-0.5 * (np.linalg.norm(where[:, None] - anchors[None], axis=2) / (0.7 * _ALIKE)) ** 2)
     near /= np.sqrt(np.sum(near**2, axis=1, keepdims=True))
     found = np.zeros((len(sensors), 3 * len(anchors)))

@@ -1,6 +1,6 @@
 """Which kind of mechanism explains residuals best, to first order: evidence of every proposal, averaged over a kind.
 
-Averaging over places, levels and sets is the correction for having looked in many of them. Beside the named kinds stands
+Averaging over places, levels and sets is the correction for having looked in many of them. Beside named kinds stands
 the unknown: any smooth force, alone or on top of one of them.
 """
 

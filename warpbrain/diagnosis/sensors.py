@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.registration import rigid_columns
+from warpbrain.mesh import TetMesh
+from warpbrain.recordings.location import locate
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -95,6 +98,27 @@ def sensors_at(observations: Observations, u: Floats, reactions: Floats, centre:
         np.concatenate(groups),
         np.concatenate(recordings),
         tuple(one.name for one in observations.each),
+    )
+
+
+def tracked_points(mesh: TetMesh, points: Floats, centre: Floats) -> Sensors:
+    """Rows of the displacement of points (k, 3) [m] that were not recorded."""
+    from scipy.sparse import csr_matrix, eye, kron
+
+    matrix = locate(mesh.points, mesh.tetrahedra, points).matrix(len(mesh.points))
+    by_displacement = kron(matrix, eye(3), format="csr")
+    count = 3 * len(points)
+    return Sensors(
+        np.zeros(count),
+        by_displacement,
+        csr_matrix(by_displacement.shape),
+        rigid_columns(points, centre).reshape(-1, 6),
+        np.ones(count),
+        np.repeat(points, 3, axis=0),
+        np.tile(np.eye(3), (len(points), 1)),
+        np.repeat(np.arange(len(points)), 3),
+        np.zeros(count, dtype=np.int64),
+        ("points",),
     )
 
 

@@ -1,0 +1,213 @@
+"""The state that everything is compared at: the case as declared, its tissue refitted beside any smooth force.
+
+Nuisances fitted as if nothing were missing imitate what is missing; fitted beside a force that may be anything they do
+not. One round from the declared state is enough.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.effects import Effects
+from warpbrain.diagnosis.evidence import Explanation
+from warpbrain.diagnosis.flexible import LENGTHS, flexible_columns
+from warpbrain.diagnosis.gross_errors import ASIDE, gross_errors
+from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.diagnosis.nuisances import Nuisances, nuisances_at
+from warpbrain.diagnosis.options import Listener
+from warpbrain.diagnosis.sensing import explanation_of, known_sigma
+from warpbrain.diagnosis.sensors import tracked_points
+from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
+from warpbrain.diagnosis.switching import switched
+from warpbrain.diagnosis.tissue_prior import declared, tissue_prior
+from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.discretisation import Difference, FinerMesh
+from warpbrain.estimation.forward import State
+from warpbrain.estimation.gaussian import Gaussian
+
+Floats = NDArray[np.float64]
+
+#: How far tissue and field may go from the middle of their prior in the first round [standard deviations].
+_FARTHEST = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """The base state and everything that is linear about it.
+
+    Attributes
+    ----------
+    states : States
+    prior : Gaussian
+        Of the tissues' parameters.
+    declared : SolvedState
+        The case as declared.
+    state : SolvedState
+        The base.
+    at : Linearisation
+    effects : Effects
+    nuisances : Nuisances
+    flexible : tuple of (n, k) arrays
+        Columns of smooth forces of each length, of 1 m.
+    sigma : (n,) array
+        Noise of each row, very large where a row is set aside.
+    noise : (n,) array
+        The same without that.
+    aside : (n,) bool array
+        Gross errors.
+    explanation : Explanation
+    residual : (n,) array
+        Of the linear model with all nuisances in the middle of their prior.
+    difference : Difference or None
+        The error of the mesh.
+    remarks : tuple of str
+    """
+
+    states: States
+    prior: Gaussian
+    declared: SolvedState
+    state: SolvedState
+    at: Linearisation
+    effects: Effects
+    nuisances: Nuisances
+    flexible: tuple[Floats, ...]
+    sigma: Floats
+    noise: Floats
+    aside: NDArray[np.bool_]
+    explanation: Explanation
+    residual: Floats
+    difference: Difference | None
+    remarks: tuple[str, ...]
+
+    @property
+    def whitened(self) -> Floats:
+        """The residual, whitened by the noise."""
+        return self.explanation.whitened(self.residual)
+
+    def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
+        """What nuisances do to the displacement of other points (k, 3) [m], and what makes effects there."""
+        at = self.at.with_sensors(tracked_points(self.at.system.model.mesh, points, self.states.centre))
+        effects = Effects(at, switched(self.states, self.state, at.sensors, self.effects.switches))
+        theta = self.state.hypothesis.theta
+        anchors = self.nuisances.anchors
+        return nuisances_at(at, self.states, theta, self.prior, effects, self.difference, anchors), effects
+
+
+class BaseFinder:
+    """Finds the base of a case.
+
+    Parameters
+    ----------
+    states : States
+    spacing : float
+        Between sites [m].
+    mesh_error : bool
+    without_nuisances : bool
+    listener : Listener
+    """
+
+    def __init__(
+        self, states: States, spacing: float, mesh_error: bool, without_nuisances: bool, listener: Listener
+    ) -> None:
+        self.states = states
+        self.prior = tissue_prior(states.case, states.parameters)
+        self._spacing, self._mesh_error, self._bare = spacing, mesh_error, without_nuisances
+        self._listener = listener
+        self._remarks: list[str] = []
+
+    def find(self) -> Base:
+        """The base state.
+
+        Raises
+        ------
+        SolveError
+            If the case as declared has no equilibrium.
+        """
+        self._listener.stage("the case as declared")
+        first = self.states.solve(self._declared())
+        self._listener.stage("tissue beside any smooth force")
+        rough = self._linearised(first, first, None)
+        explanation = rough.explanation.with_more(_any_force(rough.flexible, rough.residual, rough.at))
+        kappa = explanation.best_kappa(rough.whitened)
+        xi = explanation.nuisances_given(rough.whitened, kappa)
+        hypothesis = self._moved(rough.nuisances, xi)
+        try:
+            second = self.states.solve(hypothesis, first.u)
+        except (SolveError, InputError):
+            second = first
+        self._listener.stage("the error of the mesh, and the compliance of the body at the sensors")
+        return self._linearised(first, second, self._difference(second))
+
+    def _declared(self) -> Hypothesis:
+        field = np.zeros(self.states.modes.shape[1])
+        try:
+            theta = declared(self.states.case, self.states.parameters)
+        except InputError:
+            theta = self.prior.mean.copy()
+        return Hypothesis(theta, field)
+
+    def _moved(self, nuisances: Nuisances, xi: Floats) -> Hypothesis:
+        tissue = np.clip(xi[nuisances.part("tissue")], -_FARTHEST, _FARTHEST)
+        field = np.clip(xi[nuisances.part("stiffness field")], -_FARTHEST, _FARTHEST)
+        return Hypothesis(self.prior.mean + self.prior.factor @ tissue, field)
+
+    def _difference(self, state: SolvedState) -> Difference | None:
+        if not self._mesh_error:
+            return None
+        theta = state.hypothesis.theta
+        try:
+            finer = FinerMesh(self.states.case, theta, self.states.device)
+            coarse = self.states.solve(Hypothesis(theta, np.zeros_like(state.hypothesis.field)), state.u)
+            return finer.difference(State(theta, coarse.u, coarse.reactions, 0))
+        except (SolveError, InputError) as error:
+            self._remarks.append(f"the error of the mesh is not known: {error}")
+            return None
+
+    def _linearised(self, first: SolvedState, state: SolvedState, difference: Difference | None) -> Base:
+        sensors = state.sensors
+        at = Linearisation(state.system, state.u, state.reactions, sensors)
+        effects = Effects(at, switched(self.states, state, sensors, {}))
+        theta = state.hypothesis.theta
+        nuisances = nuisances_at(at, self.states, theta, self.prior, effects, difference)
+        if self._bare:
+            nuisances = nuisances.weakened()
+        flexible = tuple(flexible_columns(at, length * self._spacing) for length in LENGTHS)
+        # what the state has of tissue and field is given back, so that their middle is that of their prior
+        z = np.zeros(nuisances.columns.shape[1])
+        z[nuisances.part("tissue")] = np.linalg.solve(self.prior.factor, theta - self.prior.mean)
+        z[nuisances.part("stiffness field")] = state.hypothesis.field
+        residual = sensors.residual - nuisances.mean + nuisances.columns @ z
+        noise = known_sigma(sensors, residual, nuisances.columns, np.column_stack(flexible))
+        anything = _any_force(flexible, residual, at)
+        looser = explanation_of(sensors, noise, np.column_stack([nuisances.columns, anything]))
+        kappa = max(1.15, looser.best_kappa(looser.whitened(residual)))
+        aside = gross_errors(sensors, looser, kappa, residual)
+        sigma = np.where(aside, ASIDE * noise, noise)
+        explanation = explanation_of(sensors, sigma, nuisances.columns)
+        return Base(
+            self.states,
+            self.prior,
+            first,
+            state,
+            at,
+            effects,
+            nuisances,
+            flexible,
+            sigma,
+            noise,
+            aside,
+            explanation,
+            residual,
+            difference,
+            tuple(self._remarks),
+        )
+
+
+def _any_force(flexible: tuple[Floats, ...], residual: Floats, at: Linearisation) -> Floats:
+    """Columns of smooth forces as large as the residuals."""
+    rows = at.sensors.is_displacement
+    size = float(np.sqrt(np.mean(residual[rows] ** 2))) if rows.any() else 1.0
+    return size * np.column_stack(flexible)

@@ -1,0 +1,426 @@
+"""What was left out of a case: locate, name, model, show. One stage after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.case import Case
+from warpbrain.diagnosis.alternatives import alternatives_at
+from warpbrain.diagnosis.base import Base, BaseFinder
+from warpbrain.diagnosis.calibration import probabilities
+from warpbrain.diagnosis.confounding import SEEN, Gram
+from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
+from warpbrain.diagnosis.flexible import LENGTHS, SCALES
+from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo
+from warpbrain.diagnosis.locating import ScoreMap, score_map
+from warpbrain.diagnosis.measuring import next_measurements
+from warpbrain.diagnosis.observable import require_observable
+from warpbrain.diagnosis.options import DiagnosisOptions, Listener
+from warpbrain.diagnosis.parameters import smallest_of, values_of
+from warpbrain.diagnosis.refitting import Refit, Refitting
+from warpbrain.diagnosis.result import Diagnosis, Fit, Ranked, Smallest
+from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening
+from warpbrain.diagnosis.sentences import assumptions_of, sentence_of
+from warpbrain.diagnosis.states import States
+from warpbrain.diagnosis.verdict import Evidence, decide
+from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.observations import Observations
+
+Floats = NDArray[np.float64]
+
+#: Kinds that are refitted without linearising, and the log Bayes factor behind the best at which that ends.
+_REFITTED, _BEHIND = 3, 12.0
+#: How many patterns a mechanism that is scanned competes with, and one that is not.
+_TRIES_SCANNED, _TRIES = 12, 2
+
+
+class Diagnosing:
+    """Diagnoses one case.
+
+    Parameters
+    ----------
+    case : Case
+    options : DiagnosisOptions, optional
+    device : str, optional
+    listener : Listener, optional
+
+    Raises
+    ------
+    InputError
+        If the case has too few recordings for any conclusion, or is a specimen.
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        options: DiagnosisOptions | None = None,
+        device: str | None = None,
+        listener: Listener | None = None,
+    ) -> None:
+        self.case = case
+        self.options = options or DiagnosisOptions()
+        self.listener = listener or Listener()
+        require_observable(case)
+        self.dictionary = dictionary_of(case, self.options.candidates)
+        self.states = States(case, device)
+        self.seconds: dict[str, float] = {}
+
+    def run(self) -> Diagnosis:
+        """Every stage.
+
+        Raises
+        ------
+        SolveError
+            If the case as declared has no equilibrium.
+        """
+        options = self.options
+        rng = np.random.default_rng([options.seed, 7])
+        spacing = self.dictionary.situation.spacing
+        with self._timed("base"):
+            finder = BaseFinder(
+                self.states, spacing, options.mesh_error, options.without_nuisances, self.listener
+            )
+            base = finder.find()
+        with self._timed("candidates"):
+            candidates = self._candidates(base)
+        self.listener.stage("screening")
+        with self._timed("screening"):
+            noise = float(np.median(base.noise[base.at.sensors.is_displacement]))
+            flexible = [scale * noise * columns for columns in base.flexible for scale in SCALES]
+            screening = Screening(base.explanation, candidates, flexible)
+            screen = screening.run(base.whitened[:, None])
+        kappa = base.explanation.best_kappa(base.whitened)
+        with self._timed("significance"):
+            draws = base.explanation.draws(options.draws, kappa, rng)
+            null = screening.run(draws).alarm
+            p_value = float((1 + np.sum(null >= screen.alarm[0])) / (1 + len(null)))
+            at = base.at
+            where = score_map(
+                at, base.explanation, base.whitened, draws, kappa, 0.7 * spacing, spacing, options.alpha
+            )
+        with self._timed("refit"):
+            fits = self._refits(base, candidates, screen, kappa)
+        with self._timed("held out"):
+            return self._conclude(base, candidates, screening, screen, fits, where, p_value, kappa, rng)
+
+    def _candidates(self, base: Base) -> Candidates:
+        alternatives = alternatives_at(base.at.sensors, base.nuisances)
+        return candidates_at(
+            self.dictionary, base.effects, alternatives, lambda kind: self.listener.stage(f"candidate: {kind}")
+        )
+
+    def _refits(self, base: Base, candidates: Candidates, screen: Screen, kappa: float) -> dict[str, Refit]:
+        """Fits without linearising: of nothing, and of the most probable kinds."""
+        refitting = Refitting(self.states, base.prior, base.nuisances, base.explanation.factor, base.state)
+        stack = base.explanation.stack(candidates.effects)
+        order = [k for k in np.argsort(-screen.log_factors[: len(candidates.kinds), 0])]
+        best = screen.log_factors[order[0], 0] if order else 0.0
+        chosen = [candidates.kinds[k] for k in order[:_REFITTED] if best - screen.log_factors[k, 0] < _BEHIND]
+        fits = {}
+        for kind in ["none", *chosen]:
+            self.listener.stage(f"refit without linearising: {kind}")
+            effects = () if kind == "none" else (candidates.effects[screen.best_effect(candidates, kind)],)
+            if any(effect.proposal is None for effect in effects):
+                continue
+            begin = _linear_point(base, stack, candidates, screen, kind, kappa)
+            try:
+                fits[kind] = refitting.fit(effects, begin, kappa)
+            except (SolveError, InputError):
+                continue
+        return fits
+
+    def _conclude(
+        self,
+        base: Base,
+        candidates: Candidates,
+        screening: Screening,
+        screen: Screen,
+        fits: dict[str, Refit],
+        where: ScoreMap,
+        p_value: float,
+        kappa: float,
+        rng: np.random.Generator,
+    ) -> Diagnosis:
+        options = self.options
+        sensors = base.at.sensors
+        log_evidence = self._log_evidence(base, candidates, screen, fits)
+        chances = probabilities(log_evidence, candidates.alternatives)
+        held_out = HeldOut(sensors, base.sigma, ~base.aside)
+        none = fits.get("none")
+        linear, columns = (base.residual, base.nuisances.columns) if none is None else (none.linear, none.columns)
+        without = held_out.predict(linear, columns)
+        predicted = {kind: held_out.predict(fit.linear, fit.columns) for kind, fit in fits.items() if kind != "none"}
+        gram = Gram(base.explanation, screening.stack, kappa)
+        ranking = tuple(
+            sorted(
+                (
+                    self._ranked(kind, base, candidates, screen, fits, log_evidence[kind], chances[kind], gram, predicted, without)
+                    for kind in log_evidence
+                ),
+                key=lambda ranked: -ranked.probability,
+            )
+        )
+        best = ranking[0].kind if ranking[0].kind in fits else next((r.kind for r in ranking if r.kind in fits), "none")
+        gain, placebo_p, adequacy_p, size = (0.0, 0.0, 0.0), 1.0, 1.0, 0.0
+        ceiling = self._ceiling(base, held_out, linear, columns)
+        if best != "none" and best in predicted:
+            gain = predicted[best].improvement(without, rng)
+            scanned = len(candidates.of_kind[best]) > 20
+            freedom = fits[best].effects[0].columns.shape[1]
+            noise = float(np.median(base.noise[sensors.is_displacement]))
+            patterns = placebo(
+                held_out, linear, columns, base.flexible[-1], freedom,
+                _TRIES_SCANNED if scanned else _TRIES, 4.0 * noise, rng,
+            )  # fmt: skip
+            placebo_p = float((1 + np.sum(patterns <= predicted[best].rmse)) / (1 + len(patterns)))
+            adequacy_p = self._adequacy(base, fits[best], candidates, rng)
+            size = float(np.abs(fits[best].coefficients[0]).max())
+        verdict = decide(Evidence(options.alpha, p_value, ranking, gain, placebo_p, adequacy_p, size))
+        named = tuple(r for r in ranking if r.kind in verdict.kinds) if "named" in verdict.verdict else ()
+        explained = self._explained(fits, named)
+        fit = self._fit(base, fits, without, held_out, predicted, named, gain, placebo_p, ceiling)
+        smallest = self._smallest(candidates, gram)
+        physical = [r.kind for r in ranking if r.physics and r.kind in candidates.of_kind][:2]
+        measurements = next_measurements(base, candidates, screening, screen, physical, fits, kappa)
+        return Diagnosis(
+            self.case,
+            verdict.verdict,
+            sentence_of(verdict, ranking, p_value, smallest, fit),
+            p_value,
+            named,
+            verdict.kinds if not named else (),
+            ranking,
+            candidates.rejected,
+            where,
+            base,
+            fits,
+            explained,
+            smallest,
+            {},
+            measurements,
+            fit,
+            assumptions_of(self.case, base, kappa),
+            base.remarks,
+            self.seconds,
+        )
+
+    def _log_evidence(
+        self, base: Base, candidates: Candidates, screen: Screen, fits: dict[str, Refit]
+    ) -> dict[str, float]:
+        """Against nothing missing: of refits where there are, else of screening, no better than a refit."""
+        from scipy.special import logsumexp
+
+        screened = dict(zip(screen.kinds, screen.log_factors[:, 0].tolist(), strict=True))
+        if "none" not in fits:
+            return screened
+        none = fits["none"].log_evidence
+        found: dict[str, float] = {}
+        for kind, value in screened.items():
+            if kind in fits:
+                own = screen.places[candidates.of_kind[kind], 0]
+                # what was averaged over places and levels stays averaged
+                over_places = float(logsumexp(own)) - np.log(len(own)) - float(own.max())
+                found[kind] = fits[kind].log_evidence + over_places - none
+            elif kind != UNKNOWN:
+                found[kind] = value - (none - float(screen.none[0]))
+        best_screened = max((screened[kind] for kind in fits if kind != "none"), default=0.0)
+        best_fitted = max((found[kind] for kind in fits if kind != "none"), default=0.0)
+        # to first order only: what is not refitted is taken no better beside the best than screening had it
+        for kind in found:
+            if kind not in fits and candidates.effects[candidates.of_kind[kind][0]].proposal is not None:
+                found[kind] = min(found[kind], best_fitted - (best_screened - screened[kind]))
+        found[UNKNOWN] = self._unknown(base, fits) - none
+        return found
+
+    def _unknown(self, base: Base, fits: dict[str, Refit]) -> float:
+        """Log evidence of any smooth force on top of what was refitted: half of the weight alone."""
+        from scipy.special import logsumexp
+
+        from warpbrain.diagnosis.evidence import kappa_log_prior
+
+        noise = float(np.median(base.noise[base.at.sensors.is_displacement]))
+        found = []
+        others = max(len(fits) - 1, 1)
+        for kind, fit in fits.items():
+            explanation = fit.explanation(base.explanation.factor)
+            white = explanation.whitened(fit.linear)
+            values = []
+            for columns in base.flexible:
+                for scale in SCALES:
+                    loose = explanation.with_more(scale * noise * columns)
+                    values.append(logsumexp(loose.log_none(white[:, None])[:, 0] + kappa_log_prior()))
+            weight = np.log(0.5) if kind == "none" else np.log(0.5 / others)
+            found.append(float(logsumexp(values)) - np.log(len(values)) + weight)
+        return float(logsumexp(found))
+
+    def _ranked(
+        self,
+        kind: str,
+        base: Base,
+        candidates: Candidates,
+        screen: Screen,
+        fits: dict[str, Refit],
+        log_evidence: float,
+        chance: float,
+        gram: Gram,
+        predicted: dict[str, Predicted],
+        without: Predicted,
+    ) -> Ranked:
+        if kind == UNKNOWN:
+            return Ranked(kind, False, log_evidence, chance, 0.0, None, (), None, None, "")
+        number = screen.best_effect(candidates, kind)
+        effect = candidates.effects[number]
+        if effect.proposal is None:
+            return Ranked(kind, False, log_evidence, chance, 0.0, None, (), None, None, "", "no physics")
+        own = gram.stack.columns[:, gram.stack.first[number] : gram.stack.first[number + 1]]
+        if kind in fits:
+            z, covariance = fits[kind].coefficients[0], fits[kind].covariances[0]
+        else:
+            from warpbrain.diagnosis.evidence import Inner
+
+            inner = Inner(base.explanation, gram.stack, base.whitened[:, None])
+            z, covariance = inner.coefficients(gram.kappa, number)
+        d = base.explanation.detectability(own[:, 0] + own[:, 1:] @ z, gram.kappa)
+        centre, radius = _place(candidates, screen, kind)
+        change = predicted[kind].rmse - without.rmse if kind in predicted else None
+        why = "" if kind in fits else "less probable than what was refitted"
+        values = values_of(fits[kind].effects[0] if kind in fits else effect, z, covariance)
+        return Ranked(kind, True, log_evidence, chance, d, change, values, centre, radius, effect.proposed.region, why)
+
+    def _adequacy(self, base: Base, fit: Refit, candidates: Candidates, rng: np.random.Generator) -> float:
+        """Probability of what is left after a refit, if it is noise: any smooth force against none."""
+        from scipy.special import logsumexp
+
+        from warpbrain.diagnosis.evidence import kappa_log_prior
+
+        explanation = fit.explanation(base.explanation.factor)
+        noise = float(np.median(base.noise[base.at.sensors.is_displacement]))
+        loose = [explanation.with_more(SCALES[0] * noise * columns) for columns in base.flexible]
+        weights = kappa_log_prior()[:, None]
+
+        def statistic(residuals: Floats) -> Floats:
+            none = logsumexp(explanation.log_none(residuals) + weights, axis=0)
+            return np.asarray(
+                np.max([logsumexp(one.log_none(residuals) + weights, axis=0) - none for one in loose], axis=0)
+            )
+
+        own = statistic(explanation.whitened(fit.linear)[:, None])[0]
+        null = statistic(explanation.draws(self.options.draws, fit.kappa, rng))
+        return float((1 + np.sum(null >= own)) / (1 + len(null)))
+
+    def _ceiling(self, base: Base, held_out: HeldOut, linear: Floats, columns: Floats) -> float:
+        """Held-out error with any smooth force of the size that suits best."""
+        noise = float(np.median(base.noise[base.at.sensors.is_displacement]))
+        return min(
+            held_out.predict(linear, np.column_stack([columns, scale * noise * flexible])).rmse
+            for flexible in base.flexible
+            for scale in SCALES
+        )
+
+    def _explained(self, fits: dict[str, Refit], named: tuple[Ranked, ...]) -> Case | None:
+        if not named:
+            return None
+        case = self.states.case_of(fits[named[0].kind].state.hypothesis)
+        return replace(case, name=f"{case.name}-explained", title=f"{case.title}, with {named[0].kind}")
+
+    def _fit(
+        self,
+        base: Base,
+        fits: dict[str, Refit],
+        without: Predicted,
+        held_out: HeldOut,
+        predicted: dict[str, Predicted],
+        named: tuple[Ranked, ...],
+        gain: tuple[float, float, float],
+        placebo_p: float,
+        ceiling: float,
+    ) -> Fit:
+        rows = base.at.sensors.is_displacement & ~base.aside
+        raw = float(np.sqrt(np.mean(base.declared.sensors.residual[rows] ** 2)))
+        refitted = fits["none"].residual if "none" in fits else base.residual
+        inside = float(np.sqrt(np.mean(refitted[rows] ** 2)))
+        explained = improvement = chance = None
+        if named:
+            own = fits[named[0].kind]
+            explained = (float(np.sqrt(np.mean(own.residual[rows] ** 2))), predicted[named[0].kind].rmse)
+            improvement, chance = gain, placebo_p
+        return Fit(
+            (raw, raw), (inside, without.rmse), explained, improvement, chance, ceiling, self._check(base, fits, named)
+        )
+
+    def _check(self, base: Base, fits: dict[str, Refit], named: tuple[Ranked, ...]) -> tuple[float, ...] | None:
+        """RMSE [m] at recordings with role `check`, which nothing above has seen."""
+        checks = Observations.to_check(self.case)
+        states = [base.declared]
+        if "none" in fits:
+            states.append(fits["none"].state)
+        if named:
+            states.append(fits[named[0].kind].state)
+        found = []
+        for state in states:
+            parts = checks.at(state.u, state.reactions, base.states.centre)
+            lengths = [p.values for p, one in zip(parts, checks.each, strict=True) if one.kind != "force"]
+            if not lengths:
+                return None
+            found.append(float(np.sqrt(np.mean(np.concatenate([values.ravel() for values in lengths]) ** 2))))
+        return tuple(found)
+
+    def _smallest(self, candidates: Candidates, gram: Gram) -> dict[str, Smallest]:
+        """Of each kind, where the data see it half as well as at the best of its places."""
+        found = {}
+        for kind, numbers in candidates.of_kind.items():
+            if candidates.effects[numbers[0]].proposal is None:
+                continue
+            lengths = []
+            for number in numbers.tolist():
+                own = gram.stack.columns[:, gram.stack.first[number] : gram.stack.first[number + 1]]
+                effect = candidates.effects[number]
+                switch = effect.proposed.follows == "switch" or effect.proposed.mean.any()
+                lengths.append(gram.explanation.detectability(own[:, 0 if switch else 1], gram.kappa))
+            middle = int(np.argsort(lengths)[len(lengths) // 2])
+            found[kind] = smallest_of(candidates.effects[numbers[middle]], lengths[middle], SEEN)
+        return found
+
+    @contextmanager
+    def _timed(self, stage: str) -> Iterator[None]:
+        begun = time.perf_counter()
+        yield
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
+
+
+def _linear_point(
+    base: Base, stack: object, candidates: Candidates, screen: Screen, kind: str, kappa: float
+) -> Floats:
+    """Coordinates of nuisances and mechanism that the linear model has, to begin a refit with."""
+    columns, mean = base.nuisances.columns, np.zeros(len(base.residual))
+    if kind != "none":
+        effect = candidates.effects[screen.best_effect(candidates, kind)]
+        columns, mean = np.column_stack([columns, effect.columns]), effect.mean
+    explanation = base.explanation
+    W = explanation.whitened(columns) / kappa
+    w = explanation.whitened(base.residual - mean) / kappa
+    return np.asarray(np.linalg.solve(np.eye(W.shape[1]) + W.T @ W, W.T @ w))
+
+
+def _place(candidates: Candidates, screen: Screen, kind: str) -> tuple[Floats | None, float | None]:
+    """Mean of the places where a kind may act, and the radius of a ball that holds 90 % of them."""
+    from scipy.special import softmax
+
+    own = candidates.of_kind[kind]
+    best = candidates.effects[screen.best_effect(candidates, kind)].proposed
+    if best.centre is None:
+        return None, None
+    located = [k for k in own.tolist() if candidates.effects[k].proposed.centre is not None]
+    sites = np.array([candidates.effects[k].proposed.centre for k in located])
+    weights = softmax(screen.places[located, 0])
+    centre = weights @ sites
+    apart = np.linalg.norm(sites - centre, axis=1)
+    order = np.argsort(apart)
+    at = min(int(np.searchsorted(np.cumsum(weights[order]), 0.9)), len(order) - 1)
+    return centre, max(float(apart[order][at]), float(best.radius or 0.0))

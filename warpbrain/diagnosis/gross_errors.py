@@ -1,0 +1,78 @@
+"""Recorded points that no smooth force field explains: gross errors, such as landmarks that were mispaired.
+
+A point is compared with what all others say of it, under the nuisances and any smooth force (leave one out, in closed
+form). Points that stand out beside each other are no errors but a signal, and are kept.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.evidence import Explanation
+from warpbrain.diagnosis.sensors import Sensors
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+#: Probability below which a point is a gross error, and how often to look again without the ones found.
+_UNLIKELY, _ROUNDS = 2e-4, 3
+#: Neighbours [m], and how many of them standing out together are a signal.
+_NEAR, _TOGETHER = 0.013, 3
+#: Factor on the noise of what is set aside: it counts for nothing then.
+ASIDE = 1e3
+
+
+def gross_errors(sensors: Sensors, explanation: Explanation, kappa: float, residual: Floats) -> Bools:
+    """Which rows (n,) belong to gross errors.
+
+    Parameters
+    ----------
+    sensors : Sensors
+    explanation : Explanation
+        With any smooth force among the nuisances.
+    kappa : float
+        Factor on the noise.
+    residual : (n,) array
+        As recorded, not whitened.
+    """
+    from scipy.stats import chi2
+
+    S = kappa**2 * explanation.factor @ explanation.factor.T + explanation.nuisances @ explanation.nuisances.T
+    aside = np.zeros(len(sensors), dtype=bool)
+    groups = np.unique(sensors.groups)
+    rows_of = {group: np.flatnonzero(sensors.groups == group) for group in groups.tolist()}
+    for _ in range(_ROUNDS):
+        kept = np.flatnonzero(~aside)
+        place = np.full(len(sensors), -1)
+        place[kept] = np.arange(len(kept))
+        precision = np.linalg.inv(S[np.ix_(kept, kept)])
+        weighted = precision @ residual[kept]
+        found = []
+        for rows in rows_of.values():
+            own = place[rows]
+            if (own < 0).any():
+                continue
+            covariance = np.linalg.inv(precision[np.ix_(own, own)])
+            apart = covariance @ weighted[own]
+            square = float(apart @ precision[np.ix_(own, own)] @ apart)
+            if chi2.sf(square, len(rows)) < _UNLIKELY:
+                found.append(rows)
+        if not found:
+            break
+        for rows in found:
+            aside[rows] = True
+    return _without_clusters(sensors, aside, rows_of)
+
+
+def _without_clusters(sensors: Sensors, aside: Bools, rows_of: dict[int, NDArray[np.int64]]) -> Bools:
+    out = [rows for rows in rows_of.values() if aside[rows[0]] and np.isfinite(sensors.positions[rows[0]]).all()]
+    if not out:
+        return aside
+    where = np.array([sensors.positions[rows[0]] for rows in out])
+    near = (np.linalg.norm(where[:, None] - where[None], axis=2) < _NEAR).sum(axis=1)
+    kept = aside.copy()
+    for rows, count in zip(out, near.tolist(), strict=True):
+        if count >= _TOGETHER:
+            kept[rows] = False
+    return kept

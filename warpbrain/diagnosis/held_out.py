@@ -1,0 +1,150 @@
+"""What a hypothesis predicts of points that it was not fitted to.
+
+Points are put into spatial blocks before anything is fitted; each block is predicted from all others. Only mechanics
+predicts: the means of the nuisances and of the mechanism given the rest, no interpolation of residuals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.sensors import Sensors, spread_points
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Blocks, and draws of the bootstrap over them.
+_BLOCKS, _DRAWS = 12, 2000
+
+
+def spatial_blocks(sensors: Sensors) -> Ints:
+    """Block (n,) of each row: that of the nearest of points that are far from each other; forces are one block."""
+    rows = sensors.is_displacement
+    found = np.zeros(len(sensors), dtype=np.int64)
+    where = sensors.positions[rows]
+    if not len(where):
+        return found
+    order = spread_points(where, 0.0, min(_BLOCKS, len(np.unique(sensors.groups[rows]))))
+    found[rows] = np.argmin(np.linalg.norm(where[:, None] - where[order][None], axis=2), axis=1)
+    found[~rows] = len(order)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """Errors of predictions.
+
+    Attributes
+    ----------
+    errors : (n,) array
+        What was recorded less what was predicted from the other blocks [m]; of displacements.
+    blocks : (n,) int array
+    """
+
+    errors: Floats
+    blocks: Ints
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square of the rows [m]."""
+        return float(np.sqrt(np.mean(self.errors**2)))
+
+    def improvement(self, over: Predicted, rng: np.random.Generator) -> tuple[float, float, float]:
+        """Part of another's mean square error that is gone, and its 95 % interval (bootstrap over blocks)."""
+        names = np.unique(self.blocks)
+        own = np.array([np.sum(self.errors[self.blocks == b] ** 2) for b in names])
+        other = np.array([np.sum(over.errors[over.blocks == b] ** 2) for b in names])
+        chosen = rng.integers(len(names), size=(_DRAWS, len(names)))
+        parts = 1.0 - np.sqrt(own[chosen].sum(axis=1) / other[chosen].sum(axis=1))
+        low, high = np.quantile(parts, [0.025, 0.975])
+        return float(1.0 - np.sqrt(own.sum() / other.sum())), float(low), float(high)
+
+
+class HeldOut:
+    """Predicts blocks of whitened-by-sigma rows.
+
+    Parameters
+    ----------
+    sensors : Sensors
+    sigma : (n,) array
+        Noise of each row; rows that are set aside have a very large one.
+    counted : (n,) bool array
+        Rows that errors are counted of.
+    """
+
+    def __init__(self, sensors: Sensors, sigma: Floats, counted: NDArray[np.bool_]) -> None:
+        self.blocks = spatial_blocks(sensors)
+        self._sigma = sigma
+        self._counted = counted & sensors.is_displacement
+
+    def predict(self, residual: Floats, columns: Floats) -> Predicted:
+        """Errors of a linear model `residual = columns z + noise`, `z ~ N(0, I)`.
+
+        Parameters
+        ----------
+        residual : (n,) array
+            With all of `z` at zero.
+        columns : (n, k) array
+        """
+        W = columns / self._sigma[:, None]
+        w = residual / self._sigma
+        whole, right = W.T @ W, W.T @ w
+        errors = np.zeros(len(residual))
+        for block in np.unique(self.blocks):
+            own = self.blocks == block
+            matrix = np.eye(W.shape[1]) + whole - W[own].T @ W[own]
+            z = np.linalg.solve(matrix, right - W[own].T @ w[own])
+            errors[own] = residual[own] - columns[own] @ z
+        return Predicted(errors[self._counted], self.blocks[self._counted])
+
+
+def placebo(
+    held_out: HeldOut,
+    residual: Floats,
+    columns: Floats,
+    flexible: Floats,
+    freedom: int,
+    tries: int,
+    size: float,
+    rng: np.random.Generator,
+    count: int = 200,
+) -> Floats:
+    """Root mean square errors (count,) with patterns that mean nothing in the place of a mechanism.
+
+    Parameters
+    ----------
+    held_out : HeldOut
+    residual, columns : arrays
+        Of the hypothesis without the mechanism.
+    flexible : (n, f) array
+        Modes of smooth forces, of which patterns are made.
+    freedom : int
+        Parameters of the mechanism.
+    tries : int
+        Of how many patterns the one that fits best is taken, as a mechanism that is scanned is.
+    size : float
+        Of a pattern relative to that of `flexible`.
+    rng : Generator
+    count : int
+    """
+    found = np.zeros(count)
+    white_columns = columns / held_out._sigma[:, None]
+    white = residual / held_out._sigma
+    gram = np.eye(columns.shape[1]) + white_columns.T @ white_columns
+    for number in range(count):
+        best, pattern = -np.inf, None
+        for _ in range(tries):
+            one = size * flexible @ rng.normal(size=(flexible.shape[1], freedom))
+            scaled = one / held_out._sigma[:, None]
+            cross = white_columns.T @ scaled
+            left = scaled - white_columns @ np.linalg.solve(gram, cross)
+            b, M = left.T @ white, np.eye(freedom) + scaled.T @ left
+            gain = float(b @ np.linalg.solve(M, b)) - float(np.linalg.slogdet(M)[1])
+            if gain > best:
+                best, pattern = gain, one
+        assert pattern is not None
+        found[number] = held_out.predict(residual, np.column_stack([columns, pattern])).rmse
+    return found

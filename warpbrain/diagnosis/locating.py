@@ -1,0 +1,144 @@
+"""Where the mismatch is: a score of a force at every place, its significance, and what the data could see there.
+
+A patch of force with columns `B` has the score `T = s^T I^-1 s`, `s = B^T S^-1 r`, `I = B^T S^-1 B`: chi-squared of three
+degrees of freedom where nothing is missing. Of a single source without noise the score is largest at its own place,
+however deep it lies (the standardisation of Pascual-Marqui's sLORETA, 2002). The largest score of all places is compared
+with its distribution in draws of noise and nuisances (Westfall and Young 1993): looking everywhere is paid for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.evidence import Explanation
+from warpbrain.diagnosis.flexible import force_patches
+from warpbrain.diagnosis.linearisation import Linearisation
+
+Floats = NDArray[np.float64]
+
+#: A force is detectable if it is found with this probability at the level of the map.
+POWER = 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class ScoreMap:
+    """Scores of places.
+
+    Attributes
+    ----------
+    sites : (s, 3) array
+        [m]
+    length : float
+        Standard deviation of a patch [m].
+    scores : (s,) array
+    threshold : float
+        Of the largest score, at the level `alpha`.
+    global_p, local_p : float
+        Of the largest score: looking everywhere, and at this place alone.
+    detectable : (s,) array
+        Smallest force [N] that would be found there, in the direction in which the sensors see least.
+    region : (s,) bool array
+        Places that the data cannot tell from the best.
+    """
+
+    sites: Floats
+    length: float
+    scores: Floats
+    threshold: float
+    global_p: float
+    local_p: float
+    detectable: Floats
+    region: NDArray[np.bool_]
+
+    @property
+    def best(self) -> int:
+        """Number of the place with the largest score."""
+        return int(np.argmax(self.scores))
+
+    @property
+    def significant(self) -> bool:
+        """Whether the largest score is above the threshold."""
+        return bool(self.scores[self.best] > self.threshold)
+
+    @property
+    def centre(self) -> Floats:
+        """Mean (3,) [m] of the places that may be it, weighted by their scores' likelihood."""
+        weights = np.exp(0.5 * (self.scores - self.scores.max())) * self.region
+        return np.asarray(weights @ self.sites / weights.sum())
+
+    @property
+    def radius(self) -> float:
+        """Of a ball [m] about the centre that holds 90 % of that weight, no less than a patch."""
+        weights = np.exp(0.5 * (self.scores - self.scores.max())) * self.region
+        apart = np.linalg.norm(self.sites - self.centre, axis=1)
+        order = np.argsort(apart)
+        enough = np.searchsorted(np.cumsum(weights[order]), 0.9 * weights.sum())
+        return max(float(apart[order][min(enough, len(order) - 1)]), self.length)
+
+
+def score_map(
+    at: Linearisation,
+    explanation: Explanation,
+    whitened: Floats,
+    draws: Floats,
+    kappa: float,
+    length: float,
+    spacing: float,
+    alpha: float = 0.05,
+) -> ScoreMap:
+    """The map of whitened residuals (n,).
+
+    Parameters
+    ----------
+    at : Linearisation
+    explanation : Explanation
+        Noise and nuisances.
+    whitened : (n,) array
+    draws : (n, b) array
+        Whitened residuals of which nothing is missing.
+    kappa : float
+        Factor on the noise.
+    length, spacing : float
+        Of patches and between them [m].
+    alpha : float
+    """
+    from scipy.stats import chi2
+
+    sites, answers = force_patches(at, length, spacing)
+    columns = explanation.whitened(answers.reshape(len(answers), -1))
+    left = explanation.precision_times(columns, kappa).reshape(answers.shape)
+    information = np.einsum("nsi,nsj->sij", columns.reshape(answers.shape), left, optimize=True)
+    # what is held, or hidden behind what the nuisances explain, has no information: it has no score either
+    size = np.trace(information, axis1=1, axis2=2)
+    information += 1e-9 * max(float(size.max()), 1e-300) * np.eye(3)
+
+    def scores(residuals: Floats) -> Floats:
+        s = np.einsum("nsi,nb->sib", left, residuals, optimize=True)
+        return np.asarray(np.einsum("sib,sib->sb", s, np.linalg.solve(information, s)))
+
+    own = scores(whitened[:, None])[:, 0]
+    largest = scores(draws).max(axis=0)
+    threshold = float(np.quantile(largest, 1.0 - alpha))
+    # the noncentrality at which a single place passes the threshold of all
+    needed = _noncentrality(threshold)
+    weakest = np.linalg.eigvalsh(information)[:, 0]
+    return ScoreMap(
+        sites,
+        length,
+        own,
+        threshold,
+        float((1 + np.sum(largest >= own.max())) / (1 + len(largest))),
+        float(chi2.sf(own.max(), 3)),
+        np.sqrt(needed / np.maximum(weakest, 1e-300)),
+        own.max() - own <= float(chi2.ppf(0.95, 3)),
+    )
+
+
+def _noncentrality(threshold: float) -> float:
+    from scipy.optimize import brentq
+    from scipy.stats import ncx2
+
+    return float(brentq(lambda c: ncx2.sf(threshold, 3, c) - POWER, 1e-6, 10.0 * threshold + 100.0))

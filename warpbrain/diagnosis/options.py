@@ -1,0 +1,65 @@
+"""How a diagnosis is asked for, and how it tells what it does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from warpbrain.errors import InputError
+
+
+@dataclass(frozen=True)
+class DiagnosisOptions:
+    """What is asked for.
+
+    Parameters
+    ----------
+    candidates : tuple of str or None
+        Kinds of mechanisms to look for; None: all.
+    alpha : float
+        Probability of an alarm where nothing is missing.
+    seed : int
+        Of all draws.
+    draws : int
+        Of residuals in which nothing is missing.
+    mesh_error : bool
+        Whether the error of the mesh is computed on elements of half the size.
+    without_nuisances : bool
+        Credit mechanisms with what nuisances could explain too: what the method is worth without its heart, for
+        comparisons.
+
+    Raises
+    ------
+    InputError
+        If a number makes no sense.
+    """
+
+    candidates: tuple[str, ...] | None = None
+    alpha: float = 0.05
+    seed: int = 0
+    draws: int = 400
+    mesh_error: bool = True
+    without_nuisances: bool = False
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.alpha) and 0.0 < self.alpha < 0.5):
+            raise InputError(f"alpha = {self.alpha:g}: expected a number between 0 and 0.5")
+        if self.draws < 1.0 / self.alpha:
+            raise InputError(f"draws = {self.draws}: too few for alpha = {self.alpha:g}")
+
+
+@dataclass(frozen=True)
+class Listener:
+    """Told what a diagnosis does.
+
+    Attributes
+    ----------
+    stage : callable
+        With a sentence, when something new begins.
+    progress : callable
+        With a part from 0 to 1 and a word.
+    """
+
+    stage: Callable[[str], None] = lambda _text: None
+    progress: Callable[[float, str], None] = lambda _part, _word: None

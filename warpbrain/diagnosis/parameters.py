@@ -1,0 +1,81 @@
+"""From the coefficients of a proposal to the parameters that a user knows, with units and standard deviations."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.effects import Effect
+from warpbrain.diagnosis.result import Smallest, Value
+from warpbrain.physics.mechanism import Mechanism
+
+Floats = NDArray[np.float64]
+
+
+def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...]:
+    """Parameters of the mechanism at coordinates (k,) with a covariance (k, k): to first order.
+
+    The length of a vector follows its components, as `value, size`.
+    """
+    if effect.proposed.follows == "switch":
+        return ()
+    here = _numbers(effect, z)
+    factor = np.linalg.cholesky(covariance + 1e-18 * np.eye(len(z)))
+    beside = [(_numbers(effect, z + 0.1 * column), _numbers(effect, z - 0.1 * column)) for column in factor.T]
+    found = []
+    for name, (value, unit) in here.items():
+        change = np.array([(up[name][0] - down[name][0]) / 0.2 for up, down in beside if name in up and name in down])
+        sd = float(np.linalg.norm(change))
+        if sd > 0.0:
+            found.append(Value(name, value, sd, unit))
+    return tuple(found)
+
+
+def _numbers(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
+    """Numbers of the mechanism at coordinates, with units."""
+    mechanism: Mechanism = effect.proposed.make(effect.coefficients(z))
+    found: dict[str, tuple[float, str]] = {}
+    if mechanism.ramp:
+        found["share"] = (mechanism.factor(), "")
+    for name, says in mechanism.parameters().items():
+        value = getattr(mechanism, name)
+        if value is None or isinstance(value, str):
+            continue
+        numbers = np.ravel(np.asarray(value, dtype=float)) / says.si
+        if len(numbers) == 1:
+            found[name] = (float(numbers[0]), says.unit)
+        elif len(numbers) == 3 and says.kind in ("vector", "position"):
+            unit = says.unit if says.kind == "vector" else "m"
+            for axis, number in zip("xyz", numbers.tolist(), strict=True):
+                found[f"{name}_{axis}"] = (number, unit)
+            if says.kind == "vector":
+                found[f"{name}_size"] = (float(np.linalg.norm(numbers)), unit)
+    return found
+
+
+def smallest_of(effect: Effect, whitened_length: float, wanted: float) -> Smallest:
+    """The size at which an effect has a detectability.
+
+    Parameters
+    ----------
+    effect : Effect
+    whitened_length : float
+        Its detectability per standard deviation of its first coefficient (of a switch: when it is there).
+    wanted : float
+    """
+    factor = wanted / max(whitened_length, 1e-12)
+    if effect.proposed.follows == "switch":
+        return Smallest(factor, "of being there", "share")
+    z = np.zeros(effect.columns.shape[1])
+    start = -effect.proposed.mean / effect.proposed.sd if effect.proposed.follows == "proportional" else z
+    base = _numbers(effect, start)
+    z = start.copy()
+    z[0] += min(factor, 1e3)
+    try:
+        there = _numbers(effect, z)
+    except Exception:  # a mechanism refuses sizes that cannot be
+        return Smallest(float("inf"), "", "")
+    for name, (value, unit) in there.items():
+        if name in base and abs(value - base[name][0]) > 0.0:
+            return Smallest(abs(value - base[name][0]), unit, name)
+    return Smallest(float("inf"), "", "")

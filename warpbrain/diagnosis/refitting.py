@@ -1,0 +1,268 @@
+"""A hypothesis fitted without linearising it: tissue, stiffness field and mechanism together, then its evidence.
+
+Gauss-Newton on standard normal coordinates: those of tissue, field and mechanism go through an equilibrium,
+the other nuisances act linearly. The Jacobian is made anew where the mechanism acts. The evidence is Laplace's: that
+of the linear model about the best point, averaged over the factor on the noise as in screening.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.effects import Effect, Effects
+from warpbrain.diagnosis.evidence import Explanation, kappa_log_prior
+from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.diagnosis.nuisances import Nuisances
+from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
+from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.gaussian import Gaussian
+
+Floats = NDArray[np.float64]
+
+_ITERATIONS, _HALVINGS = 5, 4
+#: Steps shorter than this in standard deviations of the prior end the search.
+_SHORT = 0.03
+#: How far [standard deviations] coordinates of tissue and field may go.
+_FARTHEST = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A hypothesis at its best point.
+
+    Attributes
+    ----------
+    effects : tuple of Effect
+        Of the mechanisms that it has beside the case's own.
+    state : SolvedState
+    nuisances : (q,) array
+        Their coordinates.
+    coefficients : tuple of (k,) arrays
+        Of each effect, in standard deviations about its mean.
+    covariances : tuple of (k, k) arrays
+        Of these.
+    residual : (n,) array
+        What is left at the best point, linear nuisances and expected mesh error taken off.
+    linear : (n,) array
+        Of the linear model about it, with all coordinates at zero.
+    columns : (n, q + k) array
+        Of that model.
+    log_evidence : float
+    kappa : float
+        Factor on the noise.
+    converged : bool
+    """
+
+    effects: tuple[Effect, ...]
+    state: SolvedState
+    nuisances: Floats
+    coefficients: tuple[Floats, ...]
+    covariances: tuple[Floats, ...]
+    residual: Floats
+    linear: Floats
+    columns: Floats
+    log_evidence: float
+    kappa: float
+    converged: bool
+
+    def explanation(self, factor: Floats) -> Explanation:
+        """The linear model about the best point."""
+        return Explanation(factor, self.columns)
+
+    def proposal_coefficients(self) -> tuple[Floats, ...]:
+        """The coefficients that the proposals are made with."""
+        pairs = zip(self.effects, self.coefficients, strict=True)
+        return tuple(effect.coefficients(z) for effect, z in pairs)
+
+
+class Refitting:
+    """Fits hypotheses of one case.
+
+    Parameters
+    ----------
+    states : States
+    prior : Gaussian
+        Of the tissues' parameters.
+    nuisances : Nuisances
+        At the state that screening was done at.
+    factor : (n, n) array
+        Of the noise.
+    start : SolvedState
+        Near to the others.
+    """
+
+    def __init__(
+        self, states: States, prior: Gaussian, nuisances: Nuisances, factor: Floats, start: SolvedState
+    ) -> None:
+        self.states, self.prior, self.nuisances, self.factor = states, prior, nuisances, factor
+        self.start = start
+        self._U = nuisances.columns
+        self._tissue, self._field = nuisances.part("tissue"), nuisances.part("stiffness field")
+        self._linear = np.ones(self._U.shape[1], dtype=bool)
+        self._linear[self._tissue] = self._linear[self._field] = False
+
+    def coordinates_of(self, hypothesis: Hypothesis) -> Floats:
+        """Coordinates (q,) of the tissue and field of a hypothesis; the linear ones are zero."""
+        found = np.zeros(self._U.shape[1])
+        found[self._tissue] = np.linalg.solve(self.prior.factor, hypothesis.theta - self.prior.mean)
+        found[self._field] = hypothesis.field
+        return found
+
+    def fit(self, effects: tuple[Effect, ...], begin: Floats, kappa: float = 1.0) -> Refit:
+        """Fit one.
+
+        Parameters
+        ----------
+        effects : tuple of Effect
+            Columns at the state of screening.
+        begin : (q + k,) array
+            Coordinates to begin with, as screening has them.
+        kappa : float
+
+        Raises
+        ------
+        SolveError
+            If there is no equilibrium near the beginning.
+        """
+        from scipy.linalg import solve_triangular
+
+        q = self._U.shape[1]
+        columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
+        z = self._limited(begin)
+        state, residual = self._try(effects, z)
+        best = self._objective(residual, z, kappa)
+        converged = False
+        for iteration in range(_ITERATIONS):
+            if iteration == 1 and effects:
+                columns = self._columns_at(state, effects, z[q:], columns)
+            white = solve_triangular(self.factor, np.column_stack([residual, columns]), lower=True) / kappa
+            gradient = white[:, 1:].T @ white[:, 0] - z
+            step = np.linalg.solve(np.eye(len(z)) + white[:, 1:].T @ white[:, 1:], gradient)
+            taken = False
+            for _ in range(_HALVINGS):
+                trial = self._limited(z + step)
+                try:
+                    beside, left = self._try(effects, trial, state)
+                except (SolveError, InputError):
+                    step = 0.5 * step
+                    continue
+                value = self._objective(left, trial, kappa)
+                if value <= best + 1e-9:
+                    converged = bool(np.abs(trial - z).max() < _SHORT)
+                    state, residual, z, best, taken = beside, left, trial, value, True
+                    break
+                step = 0.5 * step
+            if not taken:
+                # what is left is rounding, or nothing better lies this way: the last good point stands
+                converged = bool(np.abs(step).max() < 2.0 * _SHORT)
+                break
+            if converged:
+                break
+        return self._refit(effects, state, z, residual, columns, converged)
+
+    def _limited(self, z: Floats) -> Floats:
+        found = z.copy()
+        for part in (self._tissue, self._field):
+            found[part] = np.clip(found[part], -_FARTHEST, _FARTHEST)
+        return found
+
+    def _objective(self, residual: Floats, z: Floats, kappa: float) -> float:
+        from scipy.linalg import solve_triangular
+
+        white = solve_triangular(self.factor, residual, lower=True) / kappa
+        return 0.5 * float(white @ white + z @ z)
+
+    def _hypothesis(self, effects: tuple[Effect, ...], z: Floats) -> Hypothesis:
+        mechanisms, releases, at = [], [], self._U.shape[1]
+        for effect in effects:
+            size = effect.columns.shape[1]
+            mechanisms.append(effect.proposed.make(effect.coefficients(z[at : at + size])))
+            if effect.proposed.releases:
+                releases.append(effect.proposed.releases)
+            at += size
+        theta = self.prior.mean + self.prior.factor @ z[self._tissue]
+        return Hypothesis(theta, z[self._field], tuple(mechanisms), tuple(releases))
+
+    def _try(
+        self, effects: tuple[Effect, ...], z: Floats, near: SolvedState | None = None
+    ) -> tuple[SolvedState, Floats]:
+        hypothesis = self._hypothesis(effects, z)
+        begin = self.start if near is None else near
+        try:
+            state = self.states.solve(hypothesis, begin.u)
+        except SolveError:
+            state = self.states.solve(hypothesis)
+        at = self._U.shape[1]
+        linear = self._U[:, self._linear] @ z[:at][self._linear]
+        residual = state.sensors.residual - self.nuisances.mean - linear
+        for effect in effects:
+            size = effect.columns.shape[1]
+            if effect.proposed.follows == "switch":
+                # it is there or not: its share only says how exactly it is simulated
+                residual = residual - effect.columns @ z[at : at + size]
+            at += size
+        return state, residual
+
+    def _columns_at(self, state: SolvedState, effects: tuple[Effect, ...], z: Floats, columns: Floats) -> Floats:
+        """Columns with those of the mechanisms made anew where they act."""
+        q = self._U.shape[1]
+        if all(effect.proposed.follows == "switch" for effect in effects):
+            return columns
+        at = Linearisation(state.system, state.u, state.reactions, state.sensors)
+        anew, place, found = Effects(at, _none), 0, [columns[:, :q]]
+        for effect in effects:
+            size = effect.columns.shape[1]
+            if effect.proposed.follows == "switch":
+                found.append(effect.columns)
+            else:
+                here = effect.coefficients(z[place : place + size])
+                about = replace(effect.proposed, follows="smooth", start=here)
+                found.append(anew.of([about], effect.proposed.make(here))[0].columns)
+            place += size
+        return np.concatenate(found, axis=1)
+
+    def _refit(
+        self,
+        effects: tuple[Effect, ...],
+        state: SolvedState,
+        z: Floats,
+        residual: Floats,
+        columns: Floats,
+        converged: bool,
+    ) -> Refit:
+        from scipy.special import logsumexp
+
+        q = self._U.shape[1]
+        linear = residual + columns @ z
+        model = Explanation(self.factor, columns)
+        white = model.whitened(linear)
+        log_evidence = float(logsumexp(model.log_none(white[:, None])[:, 0] + kappa_log_prior()))
+        kappa = model.best_kappa(white)
+        W = model.whitened(columns) / kappa
+        covariance = np.linalg.inv(np.eye(len(z)) + W.T @ W)
+        coefficients, covariances, at = [], [], q
+        for effect in effects:
+            size = effect.columns.shape[1]
+            coefficients.append(z[at : at + size])
+            covariances.append(covariance[at : at + size, at : at + size])
+            at += size
+        return Refit(
+            effects,
+            state,
+            z[:q],
+            tuple(coefficients),
+            tuple(covariances),
+            residual,
+            linear,
+            columns,
+            log_evidence,
+            kappa,
+            converged,
+        )
+
+
+def _none(_mechanism: object, _releases: str) -> Floats:
+    raise AssertionError("switches keep their columns")

@@ -1,0 +1,197 @@
+"""What a diagnosis found, as plain data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.case import Case
+from warpbrain.diagnosis.base import Base
+from warpbrain.diagnosis.locating import ScoreMap
+from warpbrain.diagnosis.refitting import Refit
+
+Floats = NDArray[np.float64]
+
+#: The seven verdicts.
+NOTHING, NAMED, GROUP, NAMED_AND_REST, UNKNOWN, NOT_PHYSICS, CANNOT_SAY = VERDICTS = (
+    "nothing missing",
+    "named",
+    "group",
+    "named + rest",
+    "unknown",
+    "not physics",
+    "cannot say",
+)
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter of a mechanism after the fit.
+
+    Attributes
+    ----------
+    name : str
+    value, sd : float
+        In the unit.
+    unit : str
+    """
+
+    name: str
+    value: float
+    sd: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Ranked:
+    """One candidate.
+
+    Attributes
+    ----------
+    kind : str
+    physics : bool
+        Whether it is a mechanism, not something that is no physics.
+    log_evidence : float
+        Logarithm, against nothing missing.
+    probability : float
+        Among all that may be missing.
+    detectability : float
+        `d` of the effect that was fitted.
+    heldout_rmse_change : float or None
+        Of held-out points [m] against the refitted case without it; negative is better. None where it was not fitted.
+    values : tuple of Value
+        Its parameters.
+    centre, radius : (3,) array and float, or None
+        Where it acts, if somewhere [m].
+    region : str
+    rejected_because : str
+    """
+
+    kind: str
+    physics: bool
+    log_evidence: float
+    probability: float
+    detectability: float
+    heldout_rmse_change: float | None
+    values: tuple[Value, ...]
+    centre: Floats | None
+    radius: float | None
+    region: str
+    rejected_because: str = ""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Something that could be measured next.
+
+    Attributes
+    ----------
+    what : str
+    expected_nats : float
+        By which it would tell the two most probable causes apart, expected log Bayes factor.
+    """
+
+    what: str
+    expected_nats: float
+
+
+@dataclass(frozen=True)
+class Smallest:
+    """The smallest effect of a kind that these data show.
+
+    Attributes
+    ----------
+    size : float
+        In the unit.
+    unit : str
+    name : str
+        Of the parameter.
+    """
+
+    size: float
+    unit: str
+    name: str
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How well hypotheses agree with the displacements that were recorded [m].
+
+    Attributes
+    ----------
+    declared, refitted, explained : (rmse, held-out rmse)
+        Of the case as declared, after its tissue was refitted, and with what was named; the last is None if nothing is.
+    improvement : (part, low, high) or None
+        Of the refitted case's held-out error that is gone, with its 95 % interval.
+    placebo_p : float or None
+        Probability that a pattern that means nothing does as well.
+    ceiling : float or None
+        Held-out error with any smooth force.
+    check : tuple of float, or None
+        RMSE at the recordings with role `check`: declared, refitted, explained.
+    """
+
+    declared: tuple[float, float]
+    refitted: tuple[float, float]
+    explained: tuple[float, float] | None
+    improvement: tuple[float, float, float] | None
+    placebo_p: float | None
+    ceiling: float | None
+    check: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """All of it.
+
+    Attributes
+    ----------
+    case : Case
+    verdict : str
+        One of `VERDICTS`.
+    sentence : str
+    p_value : float
+        Of nothing missing.
+    named : tuple of Ranked
+        What is named, the strongest first.
+    group : tuple of str
+        Kinds that cannot be told apart.
+    ranking : tuple of Ranked
+    rejected : dict of str to str
+        Kinds that were not tried, and why.
+    map : ScoreMap
+    base : Base
+    fits : dict of str to Refit
+        By kind; ``"none"`` without any.
+    explained : Case or None
+        The case with what was named, ready to run.
+    smallest : dict of str to Smallest
+    confusion : dict
+    next_measurement : tuple of Measurement
+    fit : Fit
+    assumptions, remarks : tuple of str
+    seconds : dict of str to float
+    """
+
+    case: Case
+    verdict: str
+    sentence: str
+    p_value: float
+    named: tuple[Ranked, ...]
+    group: tuple[str, ...]
+    ranking: tuple[Ranked, ...]
+    rejected: dict[str, str]
+    map: ScoreMap
+    base: Base
+    fits: dict[str, Refit]
+    explained: Case | None
+    smallest: dict[str, Smallest]
+    confusion: dict[str, Any]
+    next_measurement: tuple[Measurement, ...]
+    fit: Fit
+    assumptions: tuple[str, ...]
+    remarks: tuple[str, ...]
+    seconds: dict[str, float] = field(default_factory=dict)

@@ -1,0 +1,41 @@
+"""States with a mechanism that is there or not: solved anew, and remembered."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.effects import Switched
+from warpbrain.diagnosis.sensors import Sensors
+from warpbrain.diagnosis.states import SolvedState, States
+from warpbrain.physics.mechanism import Mechanism
+
+Floats = NDArray[np.float64]
+
+
+def switched(states: States, state: SolvedState, sensors: Sensors, known: dict[str, SolvedState]) -> Switched:
+    """What answers switches at a state.
+
+    Parameters
+    ----------
+    states : States
+    state : SolvedState
+        Without the mechanisms.
+    sensors : Sensors
+        Whose answers are asked for.
+    known : dict
+        States that were solved already; more are put there.
+    """
+
+    def answer(mechanism: Mechanism, releases: str) -> Floats:
+        key = f"{mechanism!r} {releases}"
+        if key not in known:
+            asked = replace(state.hypothesis, mechanisms=(mechanism,), releases=(releases,) if releases else ())
+            known[key] = states.solve(asked, state.u)
+        du, dR = known[key].u - state.u, known[key].reactions - state.reactions
+        return np.asarray(sensors.by_displacement @ du.ravel() + sensors.by_reactions @ dR.ravel())
+
+    answer.known = known  # type: ignore[attr-defined]
+    return answer

@@ -1,0 +1,117 @@
+"""The rule that turns numbers into one of seven verdicts. It was fixed before any case was scored with it.
+
+1. No alarm if the global test is not significant: nothing missing, with what would have been seen.
+2. Named if one mechanism is probable enough, predicts points that it was not fitted to better than without it and than
+   patterns that mean nothing, has a plausible size, and leaves nothing significant. Named + rest if something is left.
+3. Not physics if a nuisance far larger than it should be explains the residuals better than any mechanism.
+4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is. Else: cannot say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.alternatives import SENTENCES
+from warpbrain.diagnosis.result import (
+    CANNOT_SAY,
+    GROUP,
+    NAMED,
+    NAMED_AND_REST,
+    NOT_PHYSICS,
+    NOTHING,
+    UNKNOWN,
+    Ranked,
+)
+from warpbrain.diagnosis.screening import UNKNOWN as UNKNOWN_KIND
+
+Floats = NDArray[np.float64]
+
+#: Probability that a name needs, that a label set needs, and that what is left must have to be noise.
+SURE, TOGETHER, ADEQUATE = 0.9, 0.9, 0.01
+#: Largest size [standard deviations of its prior] and placebo probability of a name, and members of a group.
+LARGEST, PLACEBO, MEMBERS = 4.0, 0.05, 4
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the rule looks at.
+
+    Attributes
+    ----------
+    alpha, p_value : float
+    ranking : tuple of Ranked
+        The most probable first.
+    gain : (part, low, high)
+        Of the held-out error by the most probable one.
+    placebo_p, adequacy_p : float
+        Of it.
+    size : float
+        Its largest coefficient in standard deviations of the prior.
+    """
+
+    alpha: float
+    p_value: float
+    ranking: Sequence[Ranked]
+    gain: tuple[float, float, float]
+    placebo_p: float
+    adequacy_p: float
+    size: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the rule says.
+
+    Attributes
+    ----------
+    verdict : str
+    kinds : tuple of str
+        Named, or of the group.
+    why : str
+        What kept it from a name, if something did.
+    """
+
+    verdict: str
+    kinds: tuple[str, ...]
+    why: str = ""
+
+
+def decide(found: Evidence) -> Verdict:
+    """Apply the rule."""
+    if found.p_value > found.alpha:
+        return Verdict(NOTHING, ())
+    best = found.ranking[0]
+    if not best.physics and best.kind in SENTENCES and best.probability >= 0.5:
+        return Verdict(NOT_PHYSICS, (best.kind,))
+    vetoes = _vetoes(found)
+    if best.physics and best.probability >= SURE and not vetoes:
+        return Verdict(NAMED if found.adequacy_p > ADEQUATE else NAMED_AND_REST, (best.kind,))
+    label_set = _label_set(found.ranking)
+    physics = all(ranked.physics for ranked in found.ranking if ranked.kind in label_set)
+    if 1 < len(label_set) <= MEMBERS and physics and found.gain[0] > 0.0:
+        return Verdict(GROUP, label_set, "; ".join(vetoes))
+    if best.kind == UNKNOWN_KIND and best.probability >= 0.5:
+        return Verdict(UNKNOWN, ())
+    return Verdict(CANNOT_SAY, label_set, "; ".join(vetoes))
+
+
+def _vetoes(found: Evidence) -> list[str]:
+    vetoes = []
+    if found.gain[1] <= 0.0:
+        vetoes.append("points that were held out are not predicted better with it")
+    if found.placebo_p > PLACEBO:
+        vetoes.append("patterns that mean nothing predict as well")
+    if found.size > LARGEST:
+        vetoes.append("its size would be implausible")
+    return vetoes
+
+
+def _label_set(ranking: Sequence[Ranked]) -> tuple[str, ...]:
+    """The fewest kinds that are probable enough together."""
+    total = np.cumsum([ranked.probability for ranked in ranking])
+    count = int(np.searchsorted(total, TOGETHER)) + 1
+    return tuple(ranked.kind for ranked in ranking[:count])
