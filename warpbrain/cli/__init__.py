@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from warpbrain import __version__
-from warpbrain.cli import cases, ensemble, estimate, gp, run
+from warpbrain.cli import cases, diagnose, ensemble, estimate, gp, run
 from warpbrain.terminal.command import OneLineParser, exit_status
 
 
@@ -18,6 +18,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     run.add_parser(commands)
     estimate.add_parser(commands)
+    diagnose.add_parser(commands)
     ensemble.add_parser(commands)
     cases.add_parser(commands)
     gp.add_parser(commands)

@@ -1,0 +1,123 @@
+"""A diagnosis as JSON: the contract of `diagnosis.json`, docs/diagnosis.md."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from warpbrain.diagnosis.options import DiagnosisOptions
+from warpbrain.diagnosis.result import Diagnosis, Ranked, Value
+from warpbrain.report.fingerprints import fingerprints
+from warpbrain.report.summary import machine
+
+
+def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:
+    """Everything that is known of a diagnosis, lengths in metres and other units beside the values."""
+    best = found.named[0] if found.named else None
+    return {
+        "verdict": found.verdict,
+        "sentence": found.sentence,
+        "p_value": found.p_value,
+        "mechanism": best.kind if best else None,
+        "probability": best.probability if best else found.ranking[0].probability,
+        "parameters": _values(best.values) if best else {},
+        "where": _where(found, best),
+        "when": None,
+        "ranking": [_ranked(ranked) for ranked in found.ranking]
+        + [_rejected(kind, why) for kind, why in found.rejected.items()],
+        "group": list(found.group),
+        "next_measurement": [{"what": m.what, "expected_nats": m.expected_nats} for m in found.next_measurement],
+        "smallest_detectable": {
+            kind: {"size": one.size, "unit": one.unit, "parameter": one.name} for kind, one in found.smallest.items()
+        },
+        "confusion": found.confusion,
+        "fit": _fit(found),
+        "assumptions": list(found.assumptions),
+        "remarks": list(found.remarks),
+        "case": {"name": found.case.name, "title": found.case.title, "origin": found.case.origin},
+        "inputs_sha256": fingerprints(found.case),
+        "options": {
+            "candidates": "all" if options.candidates is None else list(options.candidates),
+            "alpha": options.alpha,
+            "seed": options.seed,
+            "draws": options.draws,
+            "mesh_error": options.mesh_error,
+            "without_nuisances": options.without_nuisances,
+        },
+        "seconds": found.seconds,
+        "equilibria": found.base.states.solves,
+        **machine(device),
+    }
+
+
+def _values(values: tuple[Value, ...]) -> dict[str, Any]:
+    return {one.name: {"value": one.value, "sd": one.sd, "unit": one.unit} for one in values}
+
+
+def _where(found: Diagnosis, best: Ranked | None) -> dict[str, Any] | None:
+    if best is not None and best.centre is not None:
+        return {
+            "centre_m": best.centre,
+            "radius_m": best.radius,
+            "region": best.region,
+            "local_p": found.map.local_p,
+            "global_p": found.map.global_p,
+        }
+    if not found.map.significant:
+        return None
+    return {
+        "centre_m": found.map.centre,
+        "radius_m": found.map.radius,
+        "region": best.region if best is not None else "",
+        "local_p": found.map.local_p,
+        "global_p": found.map.global_p,
+    }
+
+
+def _ranked(ranked: Ranked) -> dict[str, Any]:
+    return {
+        "mechanism": ranked.kind,
+        "physics": ranked.physics,
+        "log_evidence": ranked.log_evidence,
+        "probability": ranked.probability,
+        "heldout_rmse_change": ranked.heldout_rmse_change,
+        "detectability": ranked.detectability,
+        "estimate": _values(ranked.values),
+        "where": None if ranked.centre is None else {"centre_m": ranked.centre, "radius_m": ranked.radius},
+        "region": ranked.region,
+        "rejected_because": ranked.rejected_because,
+    }
+
+
+def _rejected(kind: str, why: str) -> dict[str, Any]:
+    return {
+        "mechanism": kind,
+        "physics": True,
+        "log_evidence": None,
+        "probability": 0.0,
+        "heldout_rmse_change": None,
+        "detectability": None,
+        "estimate": {},
+        "where": None,
+        "region": "",
+        "rejected_because": why,
+    }
+
+
+def _fit(found: Diagnosis) -> dict[str, Any]:
+    fit = found.fit
+    rows = {"declared": fit.declared, "refitted": fit.refitted, "explained": fit.explained}
+    check = dict(zip(rows, fit.check, strict=False)) if fit.check else None
+    improvement = fit.improvement
+    return {
+        "rmse_m": {name: None if pair is None else pair[0] for name, pair in rows.items()},
+        "heldout_rmse_m": {name: None if pair is None else pair[1] for name, pair in rows.items()},
+        "check_rmse_m": check,
+        "ceiling_heldout_rmse_m": fit.ceiling,
+        "noise_m": float(found.base.noise[found.base.at.sensors.is_displacement].mean())
+        if found.base.at.sensors.is_displacement.any()
+        else None,
+        "improvement": None
+        if improvement is None
+        else {"part": improvement[0], "interval_95": [improvement[1], improvement[2]]},
+        "placebo_p": fit.placebo_p,
+    }

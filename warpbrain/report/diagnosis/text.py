@@ -1,0 +1,62 @@
+"""A diagnosis as lines of text, made from its JSON."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from typing import Any
+
+from warpbrain.report.files import MILLIMETRES
+
+_WIDTH = 110
+
+
+def diagnosis_lines(said: Mapping[str, Any]) -> list[str]:
+    """The verdict on top, then the candidates, the fit and what to do next."""
+    lines = [f"VERDICT: {said['verdict']}", *textwrap.wrap(said["sentence"], _WIDTH, initial_indent="  ", subsequent_indent="  ")]
+    where = said["where"]
+    if where is not None:
+        x, y, z = (MILLIMETRES * value for value in where["centre_m"])
+        lines.append(
+            f"  where: ({x:.1f}, {y:.1f}, {z:.1f}) mm, within {MILLIMETRES * where['radius_m']:.1f} mm; "
+            f"p = {where['global_p']:.2g} looking everywhere"
+        )
+    lines += ["", "  candidate          probability   log evidence        d    held-out RMSE    estimate"]
+    lines += [_line(one) for one in said["ranking"] if one["log_evidence"] is not None]
+    rejected = [one for one in said["ranking"] if one["log_evidence"] is None]
+    if rejected:
+        lines += ["", "  not tried:"]
+        lines += [f"    {one['mechanism']}: {one['rejected_because']}" for one in rejected]
+    lines += ["", *_fit_lines(said["fit"])]
+    if said["next_measurement"]:
+        lines += ["", "  what to measure next (expected nats between the two most probable mechanisms):"]
+        lines += [f"    {one['expected_nats']:8.1f}  {one['what']}" for one in said["next_measurement"][:5]]
+    return lines
+
+
+def _line(one: Mapping[str, Any]) -> str:
+    change = one["heldout_rmse_change"]
+    held = f"{MILLIMETRES * change:+8.3f} mm" if change is not None else " " * 11
+    estimate = ", ".join(
+        f"{name} {value['value']:.3g} ± {value['sd']:.2g} {value['unit']}".rstrip()
+        for name, value in list(one["estimate"].items())[:3]
+    )
+    d = f"{one['detectability']:8.1f}" if one["physics"] else " " * 8
+    return f"  {one['mechanism']:<18} {one['probability']:11.3f} {one['log_evidence']:14.1f} {d}   {held}      {estimate}".rstrip()
+
+
+def _fit_lines(fit: Mapping[str, Any]) -> list[str]:
+    lines = ["  RMSE [mm]                      fitted   held out"]
+    names = (("declared", "as declared"), ("refitted", "tissue refitted"), ("explained", "with what is named"))
+    for key, name in names:
+        inside, outside = fit["rmse_m"][key], fit["heldout_rmse_m"][key]
+        if inside is not None:
+            lines.append(f"  {name:<28} {MILLIMETRES * inside:8.3f}   {MILLIMETRES * outside:8.3f}")
+    lines.append(f"  {'any smooth force (ceiling)':<28} {'':8}   {MILLIMETRES * fit['ceiling_heldout_rmse_m']:8.3f}")
+    if fit["improvement"] is not None:
+        low, high = fit["improvement"]["interval_95"]
+        lines.append(
+            f"  held-out error falls by {100 * fit['improvement']['part']:.0f} % (95 %: {100 * low:.0f} to {100 * high:.0f} %); "
+            f"a pattern that means nothing does as well with p = {fit['placebo_p']:.2g}"
+        )
+    return lines
