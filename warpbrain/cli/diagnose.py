@@ -15,8 +15,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     parser = commands.add_parser(
         "diagnose",
         help="say what physics a case leaves out",
-        description="Locates where simulation and recordings differ, names the physics that was left out, models it, and "
-        "shows the fit improve on data it was not fitted to. Writes diagnosis.json, map.vtu, explained/ and report.html.",
+        description="Locates where simulation and recordings differ, names the physics that was left out, models it, "
+        "and shows the fit improve on data it was not fitted to. Writes diagnosis.json, map.vtu and explained/.",
     )
     add = parser.add_argument
     add("--case", required=True, metavar="NAME", help="0529, ... (see warpbrain cases), or the path of a case folder")
@@ -33,8 +33,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     add(
         "--ablation",
         choices=("no-nuisances",),
-        help="leave out what makes the method work, for comparisons: credit mechanisms with what stiffness, registration "
-        "and mesh could explain",
+        help="leave out what makes the method work, for comparisons: credit mechanisms with what stiffness, "
+        "registration and mesh could explain",
     )
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
     add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-diagnose-CASE)")

@@ -1,1 +1,1 @@
-"""What a simulation left out: where it and the recordings differ, which physics would explain it, and whether it does."""
+"""What a simulation left out: where it and the recordings differ, what would explain it, and whether it does."""

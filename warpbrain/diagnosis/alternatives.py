@@ -1,4 +1,4 @@
-"""Explanations that are no physics: nuisances far larger than they should be, which compete with mechanisms for a name."""
+"""Explanations that are no physics: nuisances far larger than they should be, which compete with mechanisms."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """From log evidence to probabilities that are right as often as they say.
 
-Evidence is sharper than it should be where the model of noise, mesh and tissue is only nearly right. So it is divided by
-a temperature, and the unknown has an offset; both are of calibration cases that no score is taken of.
+Evidence is sharper than it should be where the model of noise, mesh and tissue is only nearly right. So it is divided
+by a temperature, and the unknown has an offset; both are of calibration cases that no score is taken of.
 """
 
 from __future__ import annotations
@@ -29,6 +29,6 @@ def probabilities(log_evidence: Mapping[str, float], alternatives: frozenset[str
     from scipy.special import softmax
 
     kinds = list(log_evidence)
-    offset = {kind: ALTERNATIVE_OFFSET for kind in alternatives} | {"unknown": UNKNOWN_OFFSET}
+    offset = dict.fromkeys(alternatives, ALTERNATIVE_OFFSET) | {"unknown": UNKNOWN_OFFSET}
     weights = softmax(np.array([(log_evidence[k] + offset.get(k, 0.0)) / TEMPERATURE for k in kinds]))
     return dict(zip(kinds, weights.tolist(), strict=True))

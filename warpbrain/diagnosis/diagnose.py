@@ -16,7 +16,7 @@ from warpbrain.diagnosis.base import Base, BaseFinder
 from warpbrain.diagnosis.calibration import probabilities
 from warpbrain.diagnosis.confounding import SEEN, Gram
 from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
-from warpbrain.diagnosis.flexible import LENGTHS, SCALES
+from warpbrain.diagnosis.flexible import SCALES
 from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo
 from warpbrain.diagnosis.locating import ScoreMap, score_map
 from warpbrain.diagnosis.measuring import next_measurements
@@ -83,9 +83,7 @@ class Diagnosing:
         rng = np.random.default_rng([options.seed, 7])
         spacing = self.dictionary.situation.spacing
         with self._timed("base"):
-            finder = BaseFinder(
-                self.states, spacing, options.mesh_error, options.without_nuisances, self.listener
-            )
+            finder = BaseFinder(self.states, spacing, options.mesh_error, options.without_nuisances, self.listener)
             base = finder.find()
         with self._timed("candidates"):
             candidates = self._candidates(base)
@@ -101,9 +99,7 @@ class Diagnosing:
             null = screening.run(draws).alarm
             p_value = float((1 + np.sum(null >= screen.alarm[0])) / (1 + len(null)))
             at = base.at
-            where = score_map(
-                at, base.explanation, base.whitened, draws, kappa, 0.7 * spacing, spacing, options.alpha
-            )
+            where = score_map(at, base.explanation, base.whitened, draws, kappa, 0.7 * spacing, spacing, options.alpha)
         with self._timed("refit"):
             fits = self._refits(base, candidates, screen, kappa)
         with self._timed("held out"):
@@ -119,7 +115,7 @@ class Diagnosing:
         """Fits without linearising: of nothing, and of the most probable kinds."""
         refitting = Refitting(self.states, base.prior, base.nuisances, base.explanation.factor, base.state)
         stack = base.explanation.stack(candidates.effects)
-        order = [k for k in np.argsort(-screen.log_factors[: len(candidates.kinds), 0])]
+        order = np.argsort(-screen.log_factors[: len(candidates.kinds), 0]).tolist()
         best = screen.log_factors[order[0], 0] if order else 0.0
         chosen = [candidates.kinds[k] for k in order[:_REFITTED] if best - screen.log_factors[k, 0] < _BEHIND]
         fits = {}
@@ -160,8 +156,8 @@ class Diagnosing:
         ranking = tuple(
             sorted(
                 (
-                    self._ranked(kind, base, candidates, screen, fits, log_evidence[kind], chances[kind], gram, predicted, without)
-                    for kind in log_evidence
+                    self._ranked(kind, base, candidates, screen, fits, value, chances[kind], gram, predicted, without)
+                    for kind, value in log_evidence.items()
                 ),
                 key=lambda ranked: -ranked.probability,
             )
@@ -394,9 +390,7 @@ class Diagnosing:
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
 
 
-def _linear_point(
-    base: Base, stack: object, candidates: Candidates, screen: Screen, kind: str, kappa: float
-) -> Floats:
+def _linear_point(base: Base, stack: object, candidates: Candidates, screen: Screen, kind: str, kappa: float) -> Floats:
     """Coordinates of nuisances and mechanism that the linear model has, to begin a refit with."""
     columns, mean = base.nuisances.columns, np.zeros(len(base.residual))
     if kind != "none":

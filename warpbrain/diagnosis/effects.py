@@ -1,4 +1,4 @@
-"""What a mechanism would change of what is recorded, to first order: forces at the present state, times the compliance."""
+"""What a mechanism changes of what is recorded, to first order: forces at the present state times compliance."""
 
 from __future__ import annotations
 
@@ -68,6 +68,10 @@ class Effects:
         self.at = at
         self._switched = switched
         self._internal: Floats | None = None
+        model = at.system.model
+        acting = [m for m in (*model.loads, *model.mechanisms) if isinstance(m, Mechanism) and not m.several]
+        # of these a case has only one: what is proposed takes their place
+        self._own = {mechanism.kind: mechanism for mechanism in acting}
 
     @property
     def switches(self) -> dict[str, Any]:
@@ -145,6 +149,12 @@ class Effects:
             altered = weights.any(axis=0)
             if altered.any():
                 total[:, altered] += at.answers_of_elements(getattr(at, own), weights[:, altered])
+        replaced = {mechanism.kind for mechanism in mechanisms} & set(self._own) if present is None else set()
+        for kind in sorted(replaced):
+            own, self._own = self._own[kind], {}
+            without = self._answers([own], None)
+            self._own = {m.kind: m for m in (*self._own.values(), own)}
+            total[:, [mechanism.kind == kind for mechanism in mechanisms]] -= without
         return total
 
     def _following(self, mechanism: Following) -> Floats:

@@ -72,7 +72,7 @@ class Explanation:
         self.nuisances = nuisances
         self._W = self.whitened(nuisances)
         values, vectors = np.linalg.eigh(self._W.T @ self._W)
-        self._D = np.maximum(values, 0.0)
+        self._D: Floats = np.maximum(values, 0.0)
         self._WV = self._W @ vectors
         self._log_det = 2.0 * float(np.log(np.diag(factor)).sum())
 
@@ -195,5 +195,5 @@ class Inner:
         """Mean (k,) and covariance (k, k) of the `z` of an effect after the first of the residuals."""
         width = int(self.stack.first[number + 1] - self.stack.first[number])
         GSG, GSr = self.moments(kappa, np.array([number]), width)
-        covariance = np.linalg.inv(np.eye(width - 1) + GSG[0, 1:, 1:])
+        covariance: Floats = np.linalg.inv(np.eye(width - 1) + GSG[0, 1:, 1:])
         return covariance @ (GSr[0, 1:, 0] - GSG[0, 1:, 0]), covariance

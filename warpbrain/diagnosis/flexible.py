@@ -21,7 +21,7 @@ _CUT = 1e-4
 
 
 def force_patches(at: Linearisation, length: float, spacing: float | None = None) -> tuple[Floats, Floats]:
-    """Sites (s, 3) [m], and answers (n, s, 3) to a force of 1 N in each direction, spread with a Gaussian of a length."""
+    """Sites (s, 3) [m], and answers (n, s, 3) to a force of 1 N in each direction, spread with a Gaussian."""
     mesh = at.system.model.mesh
     sites = mesh.points[spread_points(mesh.points, length if spacing is None else spacing, 700)]
     apart = np.linalg.norm(mesh.points[:, None] - sites[None], axis=2)

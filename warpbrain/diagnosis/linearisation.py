@@ -5,8 +5,8 @@ At an equilibrium `u` with tangent stiffness `K`, a nodal force `g` beside the l
 
     A = [ (H_u + H_R K_cf) K_ff^-1 ,  -H_R ]
 
-is needed, one right-hand side a sensor; whatever is looked for costs a product with `A` after that. SciPy's sparse LU
-has the factors of 5,000 nodes in a second, and 100 right-hand sides in another; block conjugate gradients take ten times
+is needed, one right-hand side a sensor; whatever is looked for costs a product with `A` after that. SciPy's LU has
+the factors of 5,000 nodes in a second, and 100 right-hand sides in another; block conjugate gradients take ten times
 as long for as many as there are sensors.
 """
 
@@ -59,7 +59,9 @@ class Linearisation:
         self._free, self._held_free = free, K[~free][:, free]
         options = {"SymmetricMode": True}
         try:
-            self._factors: Any = splu(K[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+            self._factors: Any = splu(
+                K[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
+            )
         except RuntimeError as error:
             raise SolveError(f"the state is unstable: its tangent stiffness cannot be factorised ({error})") from None
 
@@ -132,4 +134,3 @@ class Linearisation:
         asked.evaluate_forces()
         asked.gather_forces()
         return np.asarray(asked.internal.numpy().astype(np.float64))
-

@@ -1,6 +1,6 @@
 """Where the mismatch is: a score of a force at every place, its significance, and what the data could see there.
 
-A patch of force with columns `B` has the score `T = s^T I^-1 s`, `s = B^T S^-1 r`, `I = B^T S^-1 B`: chi-squared of three
+A force patch with columns `B` has the score `T = s^T I^-1 s`, `s = B^T S^-1 r`, `I = B^T S^-1 B`: chi-squared of three
 degrees of freedom where nothing is missing. Of a single source without noise the score is largest at its own place,
 however deep it lies (the standardisation of Pascual-Marqui's sLORETA, 2002). The largest score of all places is compared
 with its distribution in draws of noise and nuisances (Westfall and Young 1993): looking everywhere is paid for.

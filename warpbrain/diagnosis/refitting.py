@@ -242,8 +242,10 @@ class Refitting:
         log_evidence = float(logsumexp(model.log_none(white[:, None])[:, 0] + kappa_log_prior()))
         kappa = model.best_kappa(white)
         W = model.whitened(columns) / kappa
-        covariance = np.linalg.inv(np.eye(len(z)) + W.T @ W)
-        coefficients, covariances, at = [], [], q
+        covariance: Floats = np.linalg.inv(np.eye(len(z)) + W.T @ W)
+        coefficients: list[Floats] = []
+        covariances: list[Floats] = []
+        at = q
         for effect in effects:
             size = effect.columns.shape[1]
             coefficients.append(z[at : at + size])

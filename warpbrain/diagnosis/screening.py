@@ -107,5 +107,3 @@ class Screening:
             on_top = logsumexp(kinds, axis=0) - np.log(max(len(kinds), 1))
             found.append(np.logaddexp(alone, on_top) - np.log(2.0))
         return np.asarray(logsumexp(np.array(found), axis=0) - np.log(len(found)))
-
-

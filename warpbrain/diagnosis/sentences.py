@@ -31,8 +31,8 @@ def sentence_of(
     if verdict.verdict == NOTHING:
         seen = "; ".join(f"{kind} {_size(one)}" for kind, one in smallest.items() if one.unit != "of being there")
         return (
-            f"No missing physics is detected (p = {p_value:.2g}). The smallest effects that these data would have shown: "
-            f"{seen or 'none of those that were looked for'}."
+            f"No missing physics is detected (p = {p_value:.2g}). The smallest effects that these data would have shown "
+            f"are {seen or 'none of those that were looked for'}."
         )
     if verdict.verdict in (NAMED, NAMED_AND_REST):
         said = mechanisms()[best.kind].sentence
@@ -49,8 +49,8 @@ def sentence_of(
         )
     if verdict.verdict == UNKNOWN:
         return (
-            f"Something is missing (p = {p_value:.2g}) that none of the mechanisms explains: a force without a name fits "
-            "better than all of them."
+            f"Something is missing (p = {p_value:.2g}) that none of the mechanisms explains: a force without a name "
+            "fits better than all of them."
         )
     if verdict.verdict == NOT_PHYSICS:
         return f"{SENTENCES[verdict.kinds[0]]} That explains the mismatch better than any physics does."

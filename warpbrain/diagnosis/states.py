@@ -95,9 +95,7 @@ class States:
             b for b in applied.boundaries if not (isinstance(b, Fixed) and b.nodes in hypothesis.releases)
         )
         kept = tuple(
-            m
-            for m in applied.mechanisms
-            if all(new.several or new.kind != m.kind for new in hypothesis.mechanisms)
+            m for m in applied.mechanisms if all(new.several or new.kind != m.kind for new in hypothesis.mechanisms)
         )
         return replace(applied, boundaries=boundaries, mechanisms=(*kept, *hypothesis.mechanisms))
 

@@ -112,7 +112,7 @@ class Contact(Mechanism):
         """What is held slides instead, or lifts off."""
         found = [
             Proposal.of_one(
-                lambda _share, nodes=nodes, state=state: cls(nodes=nodes, state=state),  # type: ignore[misc]
+                lambda _share, nodes=nodes, state=state: cls(nodes=nodes, state=state),
                 1.0,
                 0.3,
                 "switch",

@@ -74,7 +74,7 @@ class Falx(Mechanism):
         if not names:
             raise NotTestableError("needs a node set 'falx' or 'tentorium' in the mesh")
         return [
-            Proposal.of_one(lambda _share, nodes=nodes: cls(nodes=nodes), 1.0, 0.3, "switch", region=nodes)  # type: ignore[misc]
+            Proposal.of_one(lambda _share, nodes=nodes: cls(nodes=nodes), 1.0, 0.3, "switch", region=nodes)
             for nodes in names
         ]
 

@@ -160,7 +160,7 @@ class Fibres(Mechanism):
         """Along each axis of the anatomy."""
         return [
             Proposal.of_one(
-                lambda k1, axis=axis: cls(direction=axis, stiffness=max(k1, 1e-9)),  # type: ignore[misc]
+                lambda k1, axis=axis: cls(direction=axis, stiffness=max(k1, 1e-9)),
                 0.0,
                 500.0,
                 region=f"fibres along {name}",

@@ -107,7 +107,6 @@ class Gravity(Load, Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Levels of the fluid, with the head's pose known to some degrees; any direction if it is not known at all."""
-        situation.require_new(cls.kind)
         points = situation.mesh.points
         if situation.gravity_axis is None:
 

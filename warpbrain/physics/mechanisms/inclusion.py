@@ -62,7 +62,7 @@ class Inclusion(Mechanism):
             for radius in _RADII:
                 found.append(
                     Proposal.of_one(
-                        lambda s, centre=centre, radius=radius: cls(ratio=math.exp(s), centre=centre, radius=radius),  # type: ignore[misc]
+                        lambda s, centre=centre, radius=radius: cls(ratio=math.exp(s), centre=centre, radius=radius),
                         0.0,
                         _USUAL,
                         "smooth",

@@ -66,7 +66,7 @@ class Swelling(Mechanism):
             for radius in _RADII:
                 found.append(
                     Proposal.of_one(
-                        lambda g, centre=centre, radius=radius: cls(amount=g, centre=centre, radius=radius),  # type: ignore[misc]
+                        lambda g, centre=centre, radius=radius: cls(amount=g, centre=centre, radius=radius),
                         0.0,
                         _SOMEWHERE,
                         "smooth",

@@ -73,7 +73,9 @@ class Traction(Load, Mechanism):
         for site in situation.surface_sites:
             for radius in _RADII:
 
-                def pulling(c: NDArray[np.float64], site: NDArray[np.float64] = site, radius: float = radius) -> Traction:
+                def pulling(
+                    c: NDArray[np.float64], site: NDArray[np.float64] = site, radius: float = radius
+                ) -> Traction:
                     return cls(centre=tuple(site.tolist()), value=tuple(c.tolist()), radius=radius)
 
                 found.append(Proposal(pulling, np.zeros(3), np.full(3, _USUAL), centre=site, radius=radius))

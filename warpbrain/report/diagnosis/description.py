@@ -45,7 +45,8 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
         },
         "seconds": found.seconds,
         "equilibria": found.base.states.solves,
-        **machine(device),
+        "device": device,
+        "versions": machine(),
     }
 
 

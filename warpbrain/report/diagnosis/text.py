@@ -13,7 +13,10 @@ _WIDTH = 110
 
 def diagnosis_lines(said: Mapping[str, Any]) -> list[str]:
     """The verdict on top, then the candidates, the fit and what to do next."""
-    lines = [f"VERDICT: {said['verdict']}", *textwrap.wrap(said["sentence"], _WIDTH, initial_indent="  ", subsequent_indent="  ")]
+    lines = [
+        f"VERDICT: {said['verdict']}",
+        *textwrap.wrap(said["sentence"], _WIDTH, initial_indent="  ", subsequent_indent="  "),
+    ]
     where = said["where"]
     if where is not None:
         x, y, z = (MILLIMETRES * value for value in where["centre_m"])
@@ -42,7 +45,8 @@ def _line(one: Mapping[str, Any]) -> str:
         for name, value in list(one["estimate"].items())[:3]
     )
     d = f"{one['detectability']:8.1f}" if one["physics"] else " " * 8
-    return f"  {one['mechanism']:<18} {one['probability']:11.3f} {one['log_evidence']:14.1f} {d}   {held}      {estimate}".rstrip()
+    numbers = f"{one['probability']:11.3f} {one['log_evidence']:14.1f} {d}   {held}"
+    return f"  {one['mechanism']:<18} {numbers}      {estimate}".rstrip()
 
 
 def _fit_lines(fit: Mapping[str, Any]) -> list[str]:
@@ -56,7 +60,7 @@ def _fit_lines(fit: Mapping[str, Any]) -> list[str]:
     if fit["improvement"] is not None:
         low, high = fit["improvement"]["interval_95"]
         lines.append(
-            f"  held-out error falls by {100 * fit['improvement']['part']:.0f} % (95 %: {100 * low:.0f} to {100 * high:.0f} %); "
-            f"a pattern that means nothing does as well with p = {fit['placebo_p']:.2g}"
+            f"  held-out error falls by {100 * fit['improvement']['part']:.0f} % (95 %: {100 * low:.0f} to "
+            f"{100 * high:.0f} %); a pattern that means nothing does as well with p = {fit['placebo_p']:.2g}"
         )
     return lines
