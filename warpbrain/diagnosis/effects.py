@@ -120,7 +120,17 @@ class Effects:
         return Effect(proposal, answers[:, 0] + columns @ away, columns)
 
     def _answers(self, mechanisms: Sequence[Mechanism], present: Mechanism | None) -> Floats:
-        """What each mechanism changes at the present state, (n, count)."""
+        """What each mechanism changes at the present state, (n, count), in the place of the case's own of its kind."""
+        total = self._added(mechanisms, present)
+        if present is None:
+            for kind, own in self._own.items():
+                same = [mechanism.kind == kind for mechanism in mechanisms]
+                if any(same):
+                    total[:, same] -= self._added([own], None)
+        return total
+
+    def _added(self, mechanisms: Sequence[Mechanism], present: Mechanism | None) -> Floats:
+        """What each mechanism changes beside all that acts, (n, count)."""
         at, system = self.at, self.at.system
         mesh = system.model.mesh
         stiff = present.stiffness_factor(mesh, 1.0) if isinstance(present, Weakening) else 1.0
@@ -149,12 +159,6 @@ class Effects:
             altered = weights.any(axis=0)
             if altered.any():
                 total[:, altered] += at.answers_of_elements(getattr(at, own), weights[:, altered])
-        replaced = {mechanism.kind for mechanism in mechanisms} & set(self._own) if present is None else set()
-        for kind in sorted(replaced):
-            own, self._own = self._own[kind], {}
-            without = self._answers([own], None)
-            self._own = {m.kind: m for m in (*self._own.values(), own)}
-            total[:, [mechanism.kind == kind for mechanism in mechanisms]] -= without
         return total
 
     def _following(self, mechanism: Following) -> Floats:

@@ -122,7 +122,8 @@ class Explanation:
 
     def detectability(self, whitened: Floats, kappa: float = 1.0) -> float:
         """`d = sqrt(delta^T S^-1 delta)` of a change of the sensors (n,), whitened."""
-        return float(np.sqrt(max(whitened @ self.precision_times(whitened[:, None], kappa)[:, 0], 0.0)))
+        square = float(whitened @ self.precision_times(whitened[:, None], kappa)[:, 0])
+        return max(square, 0.0) ** 0.5
 
     def best_kappa(self, whitened: Floats) -> float:
         """Mean of the factor on the noise after residuals (n,), whitened."""
@@ -195,5 +196,5 @@ class Inner:
         """Mean (k,) and covariance (k, k) of the `z` of an effect after the first of the residuals."""
         width = int(self.stack.first[number + 1] - self.stack.first[number])
         GSG, GSr = self.moments(kappa, np.array([number]), width)
-        covariance: Floats = np.linalg.inv(np.eye(width - 1) + GSG[0, 1:, 1:])
+        covariance = np.asarray(np.linalg.inv(np.eye(width - 1) + GSG[0, 1:, 1:]), dtype=np.float64)
         return covariance @ (GSr[0, 1:, 0] - GSG[0, 1:, 0]), covariance

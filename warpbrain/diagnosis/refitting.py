@@ -242,7 +242,7 @@ class Refitting:
         log_evidence = float(logsumexp(model.log_none(white[:, None])[:, 0] + kappa_log_prior()))
         kappa = model.best_kappa(white)
         W = model.whitened(columns) / kappa
-        covariance: Floats = np.linalg.inv(np.eye(len(z)) + W.T @ W)
+        covariance = np.asarray(np.linalg.inv(np.eye(len(z)) + W.T @ W), dtype=np.float64)
         coefficients: list[Floats] = []
         covariances: list[Floats] = []
         at = q

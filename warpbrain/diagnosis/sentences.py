@@ -31,8 +31,8 @@ def sentence_of(
     if verdict.verdict == NOTHING:
         seen = "; ".join(f"{kind} {_size(one)}" for kind, one in smallest.items() if one.unit != "of being there")
         return (
-            f"No missing physics is detected (p = {p_value:.2g}). The smallest effects that these data would have shown "
-            f"are {seen or 'none of those that were looked for'}."
+            f"No missing physics is detected (p = {p_value:.2g}). The smallest effects that these data would have "
+            f"shown are {seen or 'none of those that were looked for'}."
         )
     if verdict.verdict in (NAMED, NAMED_AND_REST):
         said = mechanisms()[best.kind].sentence
