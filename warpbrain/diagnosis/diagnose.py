@@ -16,6 +16,7 @@ from warpbrain.diagnosis.base import Base, BaseFinder
 from warpbrain.diagnosis.calibration import probabilities
 from warpbrain.diagnosis.confounding import SEEN, Gram
 from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
+from warpbrain.diagnosis.evidence import Inner, kappa_log_prior
 from warpbrain.diagnosis.flexible import SCALES
 from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo
 from warpbrain.diagnosis.locating import ScoreMap, score_map
@@ -231,29 +232,22 @@ class Diagnosing:
         for kind in found:
             if kind not in fits and candidates.effects[candidates.of_kind[kind][0]].proposal is not None:
                 found[kind] = min(found[kind], best_fitted - (best_screened - screened[kind]))
-        found[UNKNOWN] = self._unknown(base, fits) - none
+        found[UNKNOWN] = self._unknown(base, fits["none"]) - none
         return found
 
-    def _unknown(self, base: Base, fits: dict[str, Refit]) -> float:
-        """Log evidence of any smooth force on top of what was refitted: half of the weight alone."""
+    def _unknown(self, base: Base, none: Refit) -> float:
+        """Log evidence of any smooth force in the place of a mechanism."""
         from scipy.special import logsumexp
 
-        from warpbrain.diagnosis.evidence import kappa_log_prior
-
         noise = float(np.median(base.noise[base.at.sensors.is_displacement]))
-        found = []
-        others = max(len(fits) - 1, 1)
-        for kind, fit in fits.items():
-            explanation = fit.explanation(base.explanation.factor)
-            white = explanation.whitened(fit.linear)
-            values = []
-            for columns in base.flexible:
-                for scale in SCALES:
-                    loose = explanation.with_more(scale * noise * columns)
-                    values.append(logsumexp(loose.log_none(white[:, None])[:, 0] + kappa_log_prior()))
-            weight = np.log(0.5) if kind == "none" else np.log(0.5 / others)
-            found.append(float(logsumexp(values)) - np.log(len(values)) + weight)
-        return float(logsumexp(found))
+        explanation = none.explanation(base.explanation.factor)
+        white = explanation.whitened(none.linear)
+        values = []
+        for columns in base.flexible:
+            for scale in SCALES:
+                loose = explanation.with_more(scale * noise * columns)
+                values.append(logsumexp(loose.log_none(white[:, None])[:, 0] + kappa_log_prior()))
+        return float(logsumexp(values)) - float(np.log(len(values)))
 
     def _ranked(
         self,
@@ -278,8 +272,6 @@ class Diagnosing:
         if kind in fits:
             z, covariance = fits[kind].coefficients[0], fits[kind].covariances[0]
         else:
-            from warpbrain.diagnosis.evidence import Inner
-
             inner = Inner(base.explanation, gram.stack, base.whitened[:, None])
             z, covariance = inner.coefficients(gram.kappa, number)
         d = base.explanation.detectability(own[:, 0] + own[:, 1:] @ z, gram.kappa)
@@ -292,8 +284,6 @@ class Diagnosing:
     def _adequacy(self, base: Base, fit: Refit, candidates: Candidates, rng: np.random.Generator) -> float:
         """Probability of what is left after a refit, if it is noise: any smooth force against none."""
         from scipy.special import logsumexp
-
-        from warpbrain.diagnosis.evidence import kappa_log_prior
 
         explanation = fit.explanation(base.explanation.factor)
         noise = float(np.median(base.noise[base.at.sensors.is_displacement]))

@@ -1,7 +1,7 @@
 """Which kind of mechanism explains residuals best, to first order: evidence of every proposal, averaged over a kind.
 
 Averaging over places, levels and sets is the correction for having looked in many of them. Beside named kinds stands
-the unknown: any smooth force, alone or on top of one of them.
+the unknown: any smooth force.
 """
 
 from __future__ import annotations
@@ -97,13 +97,9 @@ class Screening:
         return np.array(rows).reshape(len(rows), places.shape[1])
 
     def _unknown(self, residuals: Floats) -> Floats:
-        """Log density (b,) with any smooth force: half of the weight alone, half on top of a kind."""
+        """Log density (b,) with any smooth force."""
         from scipy.special import logsumexp
 
-        found = []
-        for flexible in self.flexible:
-            alone = logsumexp(flexible.log_none(residuals) + kappa_log_prior()[:, None], axis=0)
-            kinds = self._by_kind(self._places(flexible, residuals))
-            on_top = logsumexp(kinds, axis=0) - np.log(max(len(kinds), 1))
-            found.append(np.logaddexp(alone, on_top) - np.log(2.0))
+        weights = kappa_log_prior()[:, None]
+        found = [logsumexp(flexible.log_none(residuals) + weights, axis=0) for flexible in self.flexible]
         return np.asarray(logsumexp(np.array(found), axis=0) - np.log(len(found)))
