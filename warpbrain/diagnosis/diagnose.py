@@ -23,7 +23,7 @@ from warpbrain.diagnosis.locating import ScoreMap, score_map
 from warpbrain.diagnosis.measuring import next_measurements
 from warpbrain.diagnosis.observable import require_observable
 from warpbrain.diagnosis.options import DiagnosisOptions, Listener
-from warpbrain.diagnosis.parameters import smallest_of, values_of
+from warpbrain.diagnosis.parameters import scanned_values, smallest_of, values_of
 from warpbrain.diagnosis.refitting import Refit, Refitting
 from warpbrain.diagnosis.result import Diagnosis, Fit, Ranked, Smallest
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening
@@ -68,8 +68,8 @@ class Diagnosing:
         self.options = options or DiagnosisOptions()
         self.listener = listener or Listener()
         require_observable(case)
-        self.dictionary = dictionary_of(case, self.options.candidates)
         self.states = States(case, device)
+        self.dictionary = dictionary_of(case, self.options.candidates, len(self.states.times))
         self.seconds: dict[str, float] = {}
 
     def run(self) -> Diagnosis:
@@ -262,6 +262,8 @@ class Diagnosing:
         predicted: dict[str, Predicted],
         without: Predicted,
     ) -> Ranked:
+        from scipy.special import softmax
+
         if kind == UNKNOWN:
             return Ranked(kind, False, log_evidence, chance, 0.0, None, (), None, None, "")
         number = screen.best_effect(candidates, kind)
@@ -278,7 +280,11 @@ class Diagnosing:
         centre, radius = _place(candidates, screen, kind)
         change = predicted[kind].rmse - without.rmse if kind in predicted else None
         why = "" if kind in fits else "less probable than what was refitted"
+        own_places = candidates.of_kind[kind]
+        scanned = [candidates.effects[k] for k in own_places.tolist()]
+        weights = softmax(screen.places[own_places, 0])
         values = values_of(fits[kind].effects[0] if kind in fits else effect, z, covariance)
+        values += tuple(v for v in scanned_values(scanned, weights) if v.name not in {known.name for known in values})
         return Ranked(kind, True, log_evidence, chance, d, change, values, centre, radius, effect.proposed.region, why)
 
     def _adequacy(self, base: Base, fit: Refit, candidates: Candidates, rng: np.random.Generator) -> float:

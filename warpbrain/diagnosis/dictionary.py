@@ -79,7 +79,7 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
     )
 
 
-def dictionary_of(case: Case, kinds: Sequence[str] | None = None) -> Dictionary:
+def dictionary_of(case: Case, kinds: Sequence[str] | None = None, instants: int = 1) -> Dictionary:
     """Proposals of all kinds, or of some.
 
     Raises
@@ -92,7 +92,7 @@ def dictionary_of(case: Case, kinds: Sequence[str] | None = None) -> Dictionary:
     for kind in asked:
         if kind not in known:
             raise InputError(f"candidates: no mechanism '{kind}': expected all, or some of {', '.join(known)}")
-    situation = situation_of(case)
+    situation = situation_of(case, instants)
     proposals: dict[str, tuple[Proposal, ...]] = {}
     rejected: dict[str, str] = {}
     for kind in asked:

@@ -94,9 +94,15 @@ class Effects:
         found, next_one = [], 0
         for proposal in proposals:
             count = len(self._points(proposal))
-            found.append(self._effect(proposal, answers[:, next_one : next_one + count]))
+            found.append(self._effect(proposal, self._over_time(proposal, answers[:, next_one : next_one + count])))
             next_one += count
         return found
+
+    def _over_time(self, proposal: Proposal, answers: Floats) -> Floats:
+        if proposal.history is None:
+            return answers
+        parts = [0.0 if np.isinf(time) else proposal.history(time) for time in self.at.sensors.times.tolist()]
+        return answers * np.array(parts)[:, None]
 
     @staticmethod
     def _points(proposal: Proposal) -> list[Mechanism]:
@@ -172,6 +178,8 @@ class Effects:
         blocks = wp.zeros((count, nodes * (nodes + 1) // 2), dtype=p.mat33, device=device)
         term.place(wp.zeros((count, nodes), dtype=p.vec3, device=device), blocks)
         term.set_scale(term.factor(np.inf))
+        # what remembers answers as if the state had come at once: its history says how much of that is left
+        term.set_time_step(0.0 if term.forgets_in is not None else np.inf)
         system.u.assign(self.at.u)
         term.evaluate_forces(system.u)
         found = np.zeros((system.size, 3))

@@ -16,8 +16,8 @@ Floats = NDArray[np.float64]
 
 #: Lengths of patches in spacings of the sites, and scales in standard deviations of the noise.
 LENGTHS, SCALES = (1.0, 2.4), (1.5, 4.0, 10.0)
-#: Part of the variance that is cut off.
-_CUT = 1e-4
+#: Part of the variance that is cut off, and the most modes that are kept.
+_CUT, _MOST = 1e-3, 150
 
 
 def force_patches(at: Linearisation, length: float, spacing: float | None = None) -> tuple[Floats, Floats]:
@@ -36,9 +36,10 @@ def flexible_columns(at: Linearisation, length: float) -> Floats:
     """Columns (n, k) of a body force of a length, of 1 m root mean square over the displacements."""
     _, answers = force_patches(at, length)
     columns = answers.reshape(len(answers), -1)
-    left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    squares, left = np.linalg.eigh(columns @ columns.T)
+    sizes, left = np.sqrt(np.maximum(squares[::-1], 0.0)), left[:, ::-1]
     total = np.cumsum(sizes**2) / np.sum(sizes**2)
-    kept = int(np.searchsorted(total, 1.0 - _CUT)) + 1
+    kept = min(int(np.searchsorted(total, 1.0 - _CUT)) + 1, _MOST)
     found = left[:, :kept] * sizes[:kept]
     rows = at.sensors.is_displacement
     return np.asarray(found / np.sqrt(np.mean(np.sum(found[rows] ** 2, axis=1))))

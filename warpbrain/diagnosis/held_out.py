@@ -77,7 +77,7 @@ class HeldOut:
 
     def __init__(self, sensors: Sensors, sigma: Floats, counted: NDArray[np.bool_]) -> None:
         self.blocks = spatial_blocks(sensors)
-        self._sigma = sigma
+        self.sigma = sigma
         self._counted = counted & sensors.is_displacement
 
     def predict(self, residual: Floats, columns: Floats) -> Predicted:
@@ -89,14 +89,15 @@ class HeldOut:
             With all of `z` at zero.
         columns : (n, k) array
         """
-        W = columns / self._sigma[:, None]
-        w = residual / self._sigma
-        whole, right = W.T @ W, W.T @ w
+        from scipy.linalg import cho_factor, cho_solve
+
+        W = columns / self.sigma[:, None]
+        w = residual / self.sigma
+        whole, right = np.eye(W.shape[1]) + W.T @ W, W.T @ w
         errors = np.zeros(len(residual))
         for block in np.unique(self.blocks):
             own = self.blocks == block
-            matrix = np.eye(W.shape[1]) + whole - W[own].T @ W[own]
-            z = np.linalg.solve(matrix, right - W[own].T @ w[own])
+            z = cho_solve(cho_factor(whole - W[own].T @ W[own], check_finite=False), right - W[own].T @ w[own])
             errors[own] = residual[own] - columns[own] @ z
         return Predicted(errors[self._counted], self.blocks[self._counted])
 
@@ -131,20 +132,19 @@ def placebo(
     count : int
     """
     found = np.zeros(count)
-    white_columns = columns / held_out._sigma[:, None]
-    white = residual / held_out._sigma
+    white_columns = columns / held_out.sigma[:, None]
+    white = residual / held_out.sigma
     gram = np.eye(columns.shape[1]) + white_columns.T @ white_columns
     for number in range(count):
-        best, pattern = -np.inf, None
-        for _ in range(tries):
-            one = size * flexible @ rng.normal(size=(flexible.shape[1], freedom))
-            scaled = one / held_out._sigma[:, None]
-            cross = white_columns.T @ scaled
-            left = scaled - white_columns @ np.linalg.solve(gram, cross)
-            b, M = left.T @ white, np.eye(freedom) + scaled.T @ left
-            gain = float(b @ np.linalg.solve(M, b)) - float(np.linalg.slogdet(M)[1])
-            if gain > best:
-                best, pattern = gain, one
-        assert pattern is not None
-        found[number] = held_out.predict(residual, np.column_stack([columns, pattern])).rmse
+        many = size * flexible @ rng.normal(size=(flexible.shape[1], tries * freedom))
+        scaled = many / held_out.sigma[:, None]
+        left = scaled - white_columns @ np.linalg.solve(gram, white_columns.T @ scaled)
+        b, whole = left.T @ white, scaled.T @ left
+        gains = []
+        for k in range(0, tries * freedom, freedom):
+            own = slice(k, k + freedom)
+            M = np.eye(freedom) + whole[own, own]
+            gains.append(float(b[own] @ np.linalg.solve(M, b[own])) - float(np.linalg.slogdet(M)[1]))
+        k = freedom * int(np.argmax(gains))
+        found[number] = held_out.predict(residual, np.column_stack([columns, many[:, k : k + freedom]])).rmse
     return found

@@ -77,8 +77,12 @@ class Linearisation:
         free = self._free
         by_R = by_reactions[:, ~free]
         rows = by_displacement[:, free] + by_R @ self._held_free
+        dense = np.asarray(rows.todense())
+        # what was recorded at several times is the same right-hand side
+        mark = dense @ np.random.default_rng(0).normal(size=dense.shape[1])
+        _, different, which = np.unique(mark, return_index=True, return_inverse=True)
         A = np.zeros((by_displacement.shape[0], len(free)))
-        A[:, free] = self._factors.solve(np.asarray(rows.todense()).T).T
+        A[:, free] = self._factors.solve(np.ascontiguousarray(dense[different].T)).T[which.ravel()]
         A[:, ~free] = -np.asarray(by_R.todense())
         return A
 

@@ -3,7 +3,7 @@
 A force patch with columns `B` has the score `T = s^T I^-1 s`, `s = B^T S^-1 r`, `I = B^T S^-1 B`: chi-squared of three
 degrees of freedom where nothing is missing. Of a single source without noise the score is largest at its own place,
 however deep it lies (the standardisation of Pascual-Marqui's sLORETA, 2002). The largest score of all places is
-compared with its distribution in draws of noise and nuisances (Westfall and Young 1993): looking everywhere is paid for.
+compared with its distribution in draws of noise and nuisances (Westfall and Young 1993): looking everywhere is paid.
 """
 
 from __future__ import annotations

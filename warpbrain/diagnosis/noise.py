@@ -20,5 +20,7 @@ def noise_factor(sensors: Sensors, sigma: Floats) -> Floats:
     where, directions = sensors.positions[rows], sensors.directions[rows]
     apart = np.linalg.norm(where[:, None] - where[None], axis=2)
     common = np.exp(-0.5 * (apart / REACH) ** 2) * (directions @ directions.T)
+    # what was recorded at another time has another noise
+    common *= sensors.times[rows][:, None] == sensors.times[rows][None]
     covariance[np.ix_(rows, rows)] += COMMON**2 * np.outer(sigma[rows], sigma[rows]) * common
     return np.asarray(np.linalg.cholesky(covariance))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,29 @@ from warpbrain.diagnosis.result import Smallest, Value
 from warpbrain.physics.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
+
+
+def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, ...]:
+    """Parameters that differ among proposals, such as a level or a radius: mean and spread over them.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Of one kind.
+    weights : (v,) array
+        Their probabilities, with the sum 1.
+    """
+    numbers = [_numbers(effect, np.zeros(effect.columns.shape[1])) for effect in effects]
+    found = []
+    for name, (_, unit) in numbers[0].items():
+        values = np.array([one[name][0] if name in one else np.nan for one in numbers])
+        if np.isnan(values).any() or np.ptp(values) == 0.0:
+            continue
+        mean = float(weights @ values)
+        # half of the step between neighbours is not known either
+        step = float(np.ptp(values)) / max(len(np.unique(values)) - 1, 1)
+        found.append(Value(name, mean, float(np.sqrt(weights @ (values - mean) ** 2 + step**2 / 12.0)), unit))
+    return tuple(found)
 
 
 def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...]:

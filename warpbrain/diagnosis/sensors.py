@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.observations import Observation, Observations, Residuals
 from warpbrain.estimation.registration import rigid_columns
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.location import locate
@@ -39,6 +40,8 @@ class Sensors:
         Number of the point, or of the row of a recording, that each belongs to.
     recordings : (n,) int array
         Number of the recording.
+    times : (n,) array
+        When [s]; infinite of the end.
     names : tuple of str
         Of the recordings.
     """
@@ -52,6 +55,7 @@ class Sensors:
     directions: Floats
     groups: Ints
     recordings: Ints
+    times: Floats
     names: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -63,42 +67,43 @@ class Sensors:
         return np.asarray(self.directions.any(axis=1))
 
 
-def sensors_at(observations: Observations, u: Floats, reactions: Floats, centre: Floats | None = None) -> Sensors:
-    """The rows of all recordings at a state; displacement and reactions (N, 3), see `Observations.at`."""
+#: What was recorded at a time, with displacement and reactions (N, 3) then.
+Instant = tuple[float, Observations, Floats, Floats]
+
+
+def sensors_at(instants: Sequence[Instant], centre: Floats) -> Sensors:
+    """The rows of all recordings at the states of one or several times; `centre` as in `Observations.at`."""
     from scipy.sparse import vstack
 
-    parts = observations.at(u, reactions, centre)
-    residual: list[Floats] = []
-    rigid: list[Floats] = []
-    sigma: list[Floats] = []
-    positions: list[Floats] = []
-    groups: list[Ints] = []
-    recordings: list[Ints] = []
-    first = 0
-    for number, (one, part) in enumerate(zip(observations.each, parts, strict=True)):
-        rows, size = part.values.shape
-        residual.append(part.values.ravel())
-        rigid.append(part.rigid.reshape(-1, 6))
-        own = np.full(rows, np.nan) if one.sigma is None else one.sigma
-        sigma.append(np.repeat(own, size))
-        where = one.positions if len(one.positions) else np.full((rows, 3), np.nan)
-        positions.append(np.repeat(where, size, axis=0))
-        groups.append(first + np.repeat(np.arange(rows), size))
-        recordings.append(np.full(rows * size, number))
-        first += rows
-    turned = np.concatenate(rigid)
+    parts = [one for time, observations, u, R in instants for one in _rows(time, observations, u, R, centre)]
+    first = np.cumsum([0, *(len(part.values) for _, _, part in parts)])
+    sizes = [part.values.size for _, _, part in parts]
+    repeat = [one.size for _, one, _ in parts]
+    names = tuple(dict.fromkeys(one.name for _, one, _ in parts))
+    rigid = np.concatenate([part.rigid.reshape(-1, 6) for _, _, part in parts])
+    sigma = [np.full(len(one.rows), np.nan) if one.sigma is None else one.sigma for _, one, _ in parts]
+    nowhere = [one.positions if len(one.positions) else np.full((len(one.rows), 3), np.nan) for _, one, _ in parts]
+    numbers = [start + np.arange(len(part.values)) for start, (_, _, part) in zip(first, parts, strict=False)]
     return Sensors(
-        np.concatenate(residual),
-        vstack([part.by_displacement for part in parts]).tocsr(),
-        vstack([part.by_reactions for part in parts]).tocsr(),
-        turned,
-        np.concatenate(sigma),
-        np.concatenate(positions),
-        turned[:, :3].copy(),
-        np.concatenate(groups),
-        np.concatenate(recordings),
-        tuple(one.name for one in observations.each),
+        np.concatenate([part.values.ravel() for _, _, part in parts]),
+        vstack([part.by_displacement for _, _, part in parts]).tocsr(),
+        vstack([part.by_reactions for _, _, part in parts]).tocsr(),
+        rigid,
+        np.concatenate([np.repeat(own, size) for own, size in zip(sigma, repeat, strict=True)]),
+        np.concatenate([np.repeat(where, size, axis=0) for where, size in zip(nowhere, repeat, strict=True)]),
+        rigid[:, :3].copy(),
+        np.concatenate([np.repeat(own, size) for own, size in zip(numbers, repeat, strict=True)]),
+        np.repeat([names.index(one.name) for _, one, _ in parts], sizes),
+        np.repeat([time for time, _, _ in parts], sizes),
+        names,
     )
+
+
+def _rows(
+    time: float, observations: Observations, u: Floats, reactions: Floats, centre: Floats
+) -> list[tuple[float, Observation, Residuals]]:
+    parts = observations.at(u, reactions, centre)
+    return [(time, one, part) for one, part in zip(observations.each, parts, strict=True)]
 
 
 def tracked_points(mesh: TetMesh, points: Floats, centre: Floats) -> Sensors:
@@ -118,6 +123,7 @@ def tracked_points(mesh: TetMesh, points: Floats, centre: Floats) -> Sensors:
         np.tile(np.eye(3), (len(points), 1)),
         np.repeat(np.arange(len(points)), 3),
         np.zeros(count, dtype=np.int64),
+        np.full(count, np.inf),
         ("points",),
     )
 

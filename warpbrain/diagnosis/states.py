@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from warpbrain.estimation.parameters import Parameters
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
@@ -76,6 +78,8 @@ class States:
 
     Attributes
     ----------
+    times : tuple of float
+        Recorded ones [s], increasing; infinity alone where no times were recorded, or they do not matter.
     solves : int
     """
 
@@ -83,8 +87,9 @@ class States:
         self.case = case
         self.device = device
         self.parameters = Parameters.of(case)
-        self.observations = Observations.to_fit(case)
-        self.centre = self.observations.centre
+        self.times = recorded_times(case)
+        self.observations = tuple(Observations.to_fit(case, None if np.isinf(time) else time) for time in self.times)
+        self.centre = self.observations[-1].centre
         self.modes = stiffness_modes(case.remaining[0])
         self.solves = 0
 
@@ -115,8 +120,41 @@ class States:
             field = StiffnessField(log_factor=self.modes @ hypothesis.field)
             model = replace(model, mechanisms=(*model.mechanisms, field))
         system = System(model, self.device)
+        options = EquilibriumOptions(tolerance=TOLERANCE)
+        if any(term.forgets_in is not None for term in system.terms):
+            found = {moment.time: moment.state for moment in follow_slowly(system, self._steps(), options)}
+            states = [found[time] for time in self.times]
+        else:
+            states = [EquilibriumSolver(system, options).solve(model.external_forces(), start)] * len(self.times)
         external = model.external_forces()
-        found = EquilibriumSolver(system, EquilibriumOptions(tolerance=TOLERANCE)).solve(external, start)
-        reactions = np.where(model.constrained, found.internal - external, 0.0)
-        sensors = sensors_at(self.observations, found.u, reactions, self.centre)
-        return SolvedState(hypothesis, system, found.u, reactions, sensors)
+        reactions = [np.where(model.constrained, state.internal - external, 0.0) for state in states]
+        parts = zip(self.times, self.observations, states, reactions, strict=True)
+        instants = [(time, observations, state.u, R) for time, observations, state, R in parts]
+        return SolvedState(hypothesis, system, states[-1].u, reactions[-1], sensors_at(instants, self.centre))
+
+    def _steps(self) -> list[float]:
+        """Times [s] of the steps from rest to the last recorded time: short ones after the load, longer ones later."""
+        first = self.times[0]
+        found = [first * part for part in (1e-3, 0.1, 0.4)]
+        for before, after in itertools.pairwise((0.0, *self.times)):
+            found += [before + part * (after - before) for part in ((1.0,) if before == 0.0 else (0.3, 0.6, 1.0))]
+        return found
+
+
+def recorded_times(case: Case) -> tuple[float, ...]:
+    """Times [s] at which all that a case is fitted to was recorded, under loads that no longer change.
+
+    Infinity alone, for the end, where there is one time or none, or where loads or motions change after the first.
+    """
+    fitted = [recording for recording in case.recordings if recording.role == "fit"]
+    series: list[set[float]] = []
+    for recording in fitted:
+        times = getattr(recording, "time", None)
+        series.append(set() if times is None else set(np.unique(times).tolist()))
+    found = sorted(set.intersection(*series)) if series else []
+    if len(found) < 2 or found[0] <= 0.0:
+        return (np.inf,)
+    ramps = [ramp for one in (*case.boundaries, *case.mechanisms) if (ramp := getattr(one, "ramp", ()))]
+    changing = any(ramp[-1][0] > found[0] for ramp in ramps)
+    moving = any(getattr(boundary, "has_history", False) for boundary in case.boundaries)
+    return (np.inf,) if changing or moving else tuple(found)

@@ -104,8 +104,14 @@ class Observations:
     remarks: tuple[str, ...]
 
     @classmethod
-    def to_fit(cls, case: Case) -> Observations:
+    def to_fit(cls, case: Case, time: float | None = None) -> Observations:
         """The recordings that a case is fitted to.
+
+        Parameters
+        ----------
+        case : Case
+        time : float, optional
+            [s] The end of each recording if absent.
 
         Raises
         ------
@@ -116,7 +122,7 @@ class Observations:
         if not any(recording.role == "fit" for recording in case.recordings):
             checks = f"; its {len(case.recordings)} have role = 'check'" if case.recordings else ""
             raise InputError(f"{case.path}: no [[recording]] to estimate from{checks}")
-        found = cls._of(case, "fit")
+        found = cls._of(case, "fit", time)
         if not found.each:
             raise InputError(f"{case.path}: nothing to estimate from: {'; '.join(found.remarks)}")
         for observation in found.each:
@@ -129,12 +135,12 @@ class Observations:
         return found
 
     @classmethod
-    def to_check(cls, case: Case) -> Observations:
-        """The recordings that only score what was estimated without them; `InputError` as from `to_fit`."""
-        return cls._of(case, "check")
+    def to_check(cls, case: Case, time: float | None = None) -> Observations:
+        """The recordings that only score what was estimated without them; as `to_fit`."""
+        return cls._of(case, "check", time)
 
     @classmethod
-    def _of(cls, case: Case, role: str) -> Observations:
+    def _of(cls, case: Case, role: str, time: float | None) -> Observations:
         each, remarks = [], []
         for recording in case.recordings:
             if recording.role != role:
@@ -144,7 +150,7 @@ class Observations:
                     f"recording '{recording.name}' says nothing of tissue: the force of '{recording.boundary}' is given"
                 )
                 continue
-            each.append(_observation(case, recording))
+            each.append(_observation(case, recording, time))
         return cls(tuple(each), tuple(remarks))
 
     @property
@@ -169,21 +175,21 @@ class Observations:
         return tuple(observation.at(u, reactions, about) for observation in self.each)
 
 
-def _observation(case: Case, recording: Recording) -> Observation:
+def _observation(case: Case, recording: Recording, time: float | None) -> Observation:
     if isinstance(recording, PointsRecording):
-        return _points(case, recording)
+        return _points(case, recording, time)
     if isinstance(recording, SurfaceRecording):
-        return _surface(case, recording)
+        return _surface(case, recording, time)
     if isinstance(recording, ForceRecording):
-        return _force(case, recording)
+        return _force(case, recording, time)
     raise InputError(f"recording '{recording.name}': a {recording.kind} is of a specimen, not of a deformed body")
 
 
-def _points(case: Case, recording: PointsRecording) -> Observation:
+def _points(case: Case, recording: PointsRecording, time: float | None) -> Observation:
     from scipy.sparse import csr_matrix, eye, kron
 
     mesh = case.remaining[0]
-    rows = rows_at(recording)
+    rows = rows_at(recording, time)
     weights = np.ones(len(rows)) if recording.weights is None else recording.weights[rows]
     if not (np.isfinite(weights) & (weights >= 0.0)).all():
         raise InputError(f"recording '{recording.name}': a weight is negative or no number")
@@ -204,11 +210,11 @@ def _points(case: Case, recording: PointsRecording) -> Observation:
     return Observation(recording.name, recording.kind, "m", rows, sigma, weights, 3, positions, at)
 
 
-def _surface(case: Case, recording: SurfaceRecording) -> Observation:
+def _surface(case: Case, recording: SurfaceRecording, time: float | None) -> Observation:
     from scipy.sparse import csr_matrix
 
     mesh = case.remaining[0]
-    rows = rows_at(recording)
+    rows = rows_at(recording, time)
     points = recording.points[rows]
     faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
     size = float(np.ptp(mesh.points, axis=0).max())
@@ -241,11 +247,11 @@ def _surface(case: Case, recording: SurfaceRecording) -> Observation:
     return Observation(recording.name, recording.kind, "m", rows, sigma, ones, 1, points, at)
 
 
-def _force(case: Case, recording: ForceRecording) -> Observation:
+def _force(case: Case, recording: ForceRecording, time: float | None) -> Observation:
     from scipy.sparse import csr_matrix
 
     nodes = case.remaining[0].node_sets[case.boundary(recording.boundary).nodes]
-    rows = rows_at(recording)
+    rows = rows_at(recording, time)
     recorded = np.isfinite(recording.force[rows]).all(axis=0)
     size = int(recorded.sum())
     if size == 0:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.mesh.quadratic import QuadraticMesh
-from warpbrain.mesh.surface import boundary_faces, face_vectors
+from warpbrain.mesh.surface import face_vectors
 from warpbrain.mesh.tet_mesh import Floats, TetMesh
 
 #: Values (k, 3) of a field at points (k, 3).
@@ -67,7 +67,7 @@ def volume_forces(mesh: TetMesh | QuadraticMesh, density: Field) -> Floats:
 def surface_forces(mesh: TetMesh | QuadraticMesh, traction: Field) -> Floats:
     """Forces (n, 3) [N] of a force on the boundary [Pa], by a rule of degree 4 on each triangle."""
     linear = mesh if isinstance(mesh, TetMesh) else mesh.corners
-    faces = boundary_faces(linear.tetrahedra)
+    faces = linear.boundary
     areas = np.linalg.norm(face_vectors(linear.points, faces), axis=1)
     bary, weights = triangle_rule()
     if isinstance(mesh, TetMesh):

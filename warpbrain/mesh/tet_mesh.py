@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -164,6 +165,18 @@ class TetMesh:
     def volumes(self) -> Floats:
         """Volume of each tetrahedron [m3], shape (m,)."""
         return signed_volumes(self.points, self.tetrahedra)
+
+    @cached_property
+    def centres(self) -> Floats:
+        """Middle of each tetrahedron [m], shape (m, 3)."""
+        return np.asarray(self.points[self.tetrahedra].mean(axis=1))
+
+    @cached_property
+    def boundary(self) -> Ints:
+        """Triangles (b, 3) of the boundary, oriented outwards; found once."""
+        from warpbrain.mesh.surface import boundary_faces
+
+        return boundary_faces(self.tetrahedra)
 
     @property
     def volume(self) -> float:

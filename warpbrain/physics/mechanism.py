@@ -6,8 +6,8 @@
 3. what it does: a mechanism is also one or several of `Load` (forces that do not follow the deformation), `Following`
    (a term with forces that do), `Weakening` (softer or stiffer elements), `Emptying` (lighter ones), `Growing` (larger
    or smaller ones), `Substituting` (another law) and `Removing` (fewer elements);
-4. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), an `example`, and how it may
-   act where a case does not declare it (`proposals`).
+4. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), an `example`, and how it
+   may act where a case does not declare it (`proposals`).
 
 Its derivatives by its parameters are nobody's work: `warpbrain.simulation.beside` differences what it does. For that a
 `Following` one's term names the arrays of what it remembers (`Term.memory`) and takes the body's moduli in

@@ -89,6 +89,8 @@ class Proposal:
         About which a smooth one is differentiated; zero if proportional.
     releases : str
         Node set that is no longer held by the case's own boundaries.
+    history : callable, or None
+        From the time since the load came [s] to the part of its effect that is there; None: all of it, always.
     centre, radius : (3,) array and float, or None
         Where it acts [m], if somewhere.
     region : str
@@ -101,6 +103,7 @@ class Proposal:
     follows: Follows = "proportional"
     start: Floats = field(default_factory=lambda: np.zeros(0))
     releases: str = ""
+    history: Callable[[float], float] | None = None
     centre: Floats | None = None
     radius: float | None = None
     region: str = ""

@@ -42,8 +42,7 @@ def region_weights(
     elif elements:
         raise ParameterError("elements", "given beside centre and radius: a region is a set or a ball")
     else:
-        middles = mesh.points[mesh.tetrahedra].mean(axis=1)
-        part = np.clip(np.linalg.norm(middles - np.asarray(centre), axis=1) / radius, 0.0, 2.0)
+        part = np.clip(np.linalg.norm(mesh.centres - np.asarray(centre), axis=1) / radius, 0.0, 2.0)
         weights = 0.5 * (1.0 + np.cos(0.5 * np.pi * part))
     if not weights.any():
         raise ParameterError("centre" if centre is not None else "elements", "no element is in this region")

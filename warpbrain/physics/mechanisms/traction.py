@@ -20,9 +20,9 @@ from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.proposal import Proposal, Situation
 
-
 #: Where it is looked for: radii [m] of patches, and standard deviation of each component [Pa].
 _RADII, _USUAL = (0.009, 0.014), 1000.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class Traction(Load, Mechanism):

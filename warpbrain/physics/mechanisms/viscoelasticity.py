@@ -14,12 +14,14 @@ exp(-h/(2 tau_i))` and `S = 2 dPsi/dC`, `Psi = mu0/2 (J^(-2/3) I1 - 3)`,
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warpbrain.kernels.invariants import cofactor
 from warpbrain.kernels.module import compiled_module
@@ -27,7 +29,11 @@ from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks, store_forces
 from warpbrain.physics.expectation import LogNormal, LogUniform
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body, Term
+
+#: Relaxation times [s] that are looked for.
+_LOOKED_FOR = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +79,24 @@ class Viscoelasticity(Mechanism):
             values = getattr(self, name)
             if not all(math.isfinite(value) and value > 0.0 for value in values):
                 raise ParameterError(name, f"found {list(values)}, expected positive numbers")
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """One branch, of times around those that were recorded."""
+        situation.require_new(cls.kind)
+        if situation.instants < 2:
+            raise NotTestableError(f"needs {cls.needs[0]}")
+        found = []
+        for relaxation in _LOOKED_FOR:
+
+            def branch(c: NDArray[np.float64], relaxation: float = relaxation) -> "Viscoelasticity":
+                return cls(moduli=(max(float(c[0]), 1e-6),), times=(relaxation,))
+
+            def left(time: float, relaxation: float = relaxation) -> float:
+                return math.exp(-time / relaxation)
+
+            found.append(Proposal(branch, np.zeros(1), np.ones(1), history=left, region="all tissue"))
+        return found
 
     def bind(self, body: Body) -> "ViscoelasticTerm":
         """See `warpbrain.physics.term.Following`."""
