@@ -30,6 +30,8 @@ from warpbrain.estimation.gaussian import Gaussian
 
 Floats = NDArray[np.float64]
 
+#: How much larger an error of registration may be in the first round.
+_ROUGHLY = 5.0
 #: How far tissue and field may go from the middle of their prior in the first round [standard deviations].
 _FARTHEST = 1.5
 
@@ -131,13 +133,18 @@ class BaseFinder:
         self._listener.stage("tissue beside any smooth force")
         rough = self._linearised(first, first, None)
         explanation = rough.explanation.with_more(_any_force(rough.flexible, rough.residual, rough.at))
+        # before points of a surface are compared with the right faces a registration may be wrong by more than it is
+        registration = rough.nuisances.part("registration")
+        explanation = explanation.with_more(_ROUGHLY * rough.nuisances.columns[:, registration])
         kappa = explanation.best_kappa(rough.whitened)
         xi = explanation.nuisances_given(rough.whitened, kappa)
+        z = xi[registration] + _ROUGHLY * xi[-6:]
+        self.states.realign(z * rough.nuisances.registration_sd)
         hypothesis = self._moved(rough.nuisances, xi)
         try:
             second = self.states.solve(hypothesis, first.u)
         except (SolveError, InputError):
-            second = first
+            second = self.states.solve(first.hypothesis, first.u)
         self._listener.stage("the error of the mesh, and the compliance of the body at the sensors")
         return self._linearised(first, second, self._difference(second))
 
@@ -179,6 +186,7 @@ class BaseFinder:
         z = np.zeros(nuisances.columns.shape[1])
         z[nuisances.part("tissue")] = np.linalg.solve(self.prior.factor, theta - self.prior.mean)
         z[nuisances.part("stiffness field")] = state.hypothesis.field
+        z[nuisances.part("registration")] = self.states.motion / nuisances.registration_sd
         residual = sensors.residual - nuisances.mean + nuisances.columns @ z
         noise = known_sigma(sensors, residual, nuisances.columns, np.column_stack(flexible))
         anything = _any_force(flexible, residual, at)

@@ -155,24 +155,26 @@ class Inner:
         widths = np.diff(stack.first)
         self._families = [(int(width), np.flatnonzero(widths == width)) for width in np.unique(widths)]
 
+    def _gram(self, members: Any, width: int) -> Floats:
+        """`G^T G` (v, w, w) of whitened columns."""
+        own = self._columns(self.stack.columns, members, width)
+        return np.asarray(np.einsum("nvi,nvj->vij", own, own, optimize=True))
+
     @cached_property
     def _grams(self) -> dict[int, Floats]:
-        found = {}
-        for width, members in self._families:
-            own = self._columns(self.stack.columns, members, width)
-            found[width] = np.einsum("nvi,nvj->vij", own, own, optimize=True)
-        return found
+        """Of whole families."""
+        return {width: self._gram(members, width) for width, members in self._families}
 
     def _columns(self, rows: Floats, members: Any, width: int) -> Floats:
         at = self.stack.first[members][:, None] + np.arange(width)
         return np.asarray(rows[:, at])
 
-    def moments(self, kappa: float, members: Any, width: int) -> tuple[Floats, Floats]:
+    def _moments(self, kappa: float, members: Any, width: int, gram: Floats) -> tuple[Floats, Floats]:
         """`G^T S^-1 G` (v, w, w) and `G^T S^-1 r` (v, w, b) of effects of one width."""
         k2 = kappa**2
         VG = self._columns(self._VG, members, width)
         weighted = VG / (k2 + self._D)[:, None, None]
-        GSG = (self._grams[width] - np.einsum("qvi,qvj->vij", VG, weighted, optimize=True)) / k2
+        GSG = (gram - np.einsum("qvi,qvj->vij", VG, weighted, optimize=True)) / k2
         at = self.stack.first[members][:, None] + np.arange(width)
         GSr = (self._Gr[at] - np.einsum("qvi,qb->vib", weighted, self._Vr, optimize=True)) / k2
         return GSG, GSr
@@ -181,7 +183,7 @@ class Inner:
         """Log Bayes factor of each effect, (v, b)."""
         found = np.zeros((len(self.stack), self._residuals.shape[1]))
         for width, members in self._families:
-            GSG, GSr = self.moments(kappa, members, width)
+            GSG, GSr = self._moments(kappa, members, width, self._grams[width])
             hh, hr = GSG[:, 0, 0], GSr[:, 0]
             log = hr - 0.5 * hh[:, None]
             if width > 1:
@@ -195,6 +197,7 @@ class Inner:
     def coefficients(self, kappa: float, number: int) -> tuple[Floats, Floats]:
         """Mean (k,) and covariance (k, k) of the `z` of an effect after the first of the residuals."""
         width = int(self.stack.first[number + 1] - self.stack.first[number])
-        GSG, GSr = self.moments(kappa, np.array([number]), width)
+        own = np.array([number])
+        GSG, GSr = self._moments(kappa, own, width, self._gram(own, width))
         covariance = np.asarray(np.linalg.inv(np.eye(width - 1) + GSG[0, 1:, 1:]), dtype=np.float64)
         return covariance @ (GSr[0, 1:, 0] - GSG[0, 1:, 0]), covariance

@@ -73,6 +73,11 @@ class Nuisances:
     anchors: Floats
 
     @property
+    def registration_sd(self) -> Floats:
+        """Standard deviations (6,) of shift [m] and turn [rad]."""
+        return np.repeat([_SHIFT, _TURN], 3)
+
+    @property
     def columns(self) -> Floats:
         """Of all, side by side (n, q)."""
         return np.concatenate([family.columns for family in self.families], axis=1)

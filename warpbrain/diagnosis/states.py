@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case
+from warpbrain.diagnosis.realigned import realigned
 from warpbrain.diagnosis.sensors import Sensors, sensors_at
 from warpbrain.diagnosis.stiffness_field import StiffnessField, stiffness_modes
 from warpbrain.estimation.observations import Observations
@@ -80,6 +81,8 @@ class States:
     ----------
     times : tuple of float
         Recorded ones [s], increasing; infinity alone where no times were recorded, or they do not matter.
+    motion : (6,) array
+        Rigid motion that recordings are taken to have been moved by.
     solves : int
     """
 
@@ -88,10 +91,17 @@ class States:
         self.device = device
         self.parameters = Parameters.of(case)
         self.times = recorded_times(case)
-        self.observations = tuple(Observations.to_fit(case, None if np.isinf(time) else time) for time in self.times)
-        self.centre = self.observations[-1].centre
+        self.motion = np.zeros(6)
+        self.centre = Observations.to_fit(case).centre
+        self.realign(self.motion)
         self.modes = stiffness_modes(case.remaining[0])
         self.solves = 0
+
+    def realign(self, motion: Floats) -> None:
+        """Take recordings for moved by a rigid motion (6,); see `realigned`."""
+        self.motion = motion
+        case = realigned(self.case, motion, self.centre)
+        self.observations = tuple(Observations.to_fit(case, None if np.isinf(time) else time) for time in self.times)
 
     def case_of(self, hypothesis: Hypothesis) -> Case:
         """The case that a user would write for a hypothesis, but for the stiffness field."""
