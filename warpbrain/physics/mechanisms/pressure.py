@@ -85,7 +85,7 @@ class Pressure(Mechanism):
             part = len(cls(nodes=nodes, value=0.0).faces(situation.mesh)) / every
             if part < 0.5:
                 make = partial(_pressing, nodes)
-                found.append(Proposal.of_one(make, 0.0, 200.0, region=nodes))
+                found.append(Proposal.of_one(make, 0.0, 400.0, region=nodes))
         if not found:
             raise NotTestableError("needs a node set with faces of the free surface, such as a ventricle's wall")
         return found
