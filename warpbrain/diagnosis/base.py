@@ -16,6 +16,7 @@ from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.flexible import LENGTHS, flexible_columns
 from warpbrain.diagnosis.gross_errors import ASIDE, gross_errors
 from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.diagnosis.mesh_error import mesh_error
 from warpbrain.diagnosis.nuisances import Nuisances, nuisances_at
 from warpbrain.diagnosis.options import Listener
 from warpbrain.diagnosis.sensing import explanation_of, known_sigma
@@ -24,8 +25,7 @@ from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
 from warpbrain.diagnosis.switching import switched
 from warpbrain.diagnosis.tissue_prior import declared, tissue_prior
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.discretisation import Difference, FinerMesh
-from warpbrain.estimation.forward import State
+from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.gaussian import Gaussian
 
 Floats = NDArray[np.float64]
@@ -164,11 +164,8 @@ class BaseFinder:
     def _difference(self, state: SolvedState) -> Difference | None:
         if not self._mesh_error:
             return None
-        theta = state.hypothesis.theta
         try:
-            finer = FinerMesh(self.states.case, theta, self.states.device)
-            coarse = self.states.solve(Hypothesis(theta, np.zeros_like(state.hypothesis.field)), state.u)
-            return finer.difference(State(theta, coarse.u, coarse.reactions, 0))
+            return mesh_error(self.states, state.hypothesis, state)
         except (SolveError, InputError) as error:
             self._remarks.append(f"the error of the mesh is not known: {error}")
             return None

@@ -114,7 +114,9 @@ class Diagnosing:
 
     def _refits(self, base: Base, candidates: Candidates, screen: Screen, kappa: float) -> dict[str, Refit]:
         """Fits without linearising: of nothing, and of the most probable kinds."""
-        refitting = Refitting(self.states, base.prior, base.nuisances, base.explanation.factor, base.state)
+        refitting = Refitting(
+            self.states, base.prior, base.nuisances, base.explanation.factor, base.state, base.difference
+        )
         stack = base.explanation.stack(candidates.effects)
         order = np.argsort(-screen.log_factors[: len(candidates.kinds), 0]).tolist()
         best = screen.log_factors[order[0], 0] if order else 0.0

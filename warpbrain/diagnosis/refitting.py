@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.evidence import Explanation, kappa_log_prior
 from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.diagnosis.mesh_error import mesh_error
 from warpbrain.diagnosis.nuisances import Nuisances
 from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.discretisation import Difference, Discretisation
 from warpbrain.estimation.gaussian import Gaussian
 
 Floats = NDArray[np.float64]
@@ -78,6 +80,23 @@ class Refit:
         return tuple(effect.coefficients(z) for effect, z in pairs)
 
 
+@dataclass(frozen=True, eq=False)
+class _Share:
+    """What of the mesh's error belongs to a mechanism: `answer (constant + along z)`.
+
+    Attributes
+    ----------
+    answer : (n,) array
+        At the size with which it was computed.
+    along, constant : (k,) and (1,) array
+        Empty if there is none.
+    """
+
+    answer: Floats
+    along: Floats
+    constant: Floats
+
+
 class Refitting:
     """Fits hypotheses of one case.
 
@@ -92,13 +111,22 @@ class Refitting:
         Of the noise.
     start : SolvedState
         Near to the others.
+    difference : Difference or None
+        The error of the mesh there; None: meshes are taken for exact.
     """
 
     def __init__(
-        self, states: States, prior: Gaussian, nuisances: Nuisances, factor: Floats, start: SolvedState
+        self,
+        states: States,
+        prior: Gaussian,
+        nuisances: Nuisances,
+        factor: Floats,
+        start: SolvedState,
+        difference: Difference | None,
     ) -> None:
         self.states, self.prior, self.nuisances, self.factor = states, prior, nuisances, factor
-        self.start = start
+        self.start, self.difference = start, difference
+        self._share = _Share(np.zeros(len(factor)), np.zeros(0), np.zeros(0))
         self._U = nuisances.columns
         self._tissue, self._field = nuisances.part("tissue"), nuisances.part("stiffness field")
         self._linear = np.ones(self._U.shape[1], dtype=bool)
@@ -127,16 +155,58 @@ class Refitting:
         SolveError
             If there is no equilibrium near the beginning.
         """
+        self._share = _Share(np.zeros(len(self.factor)), np.zeros(0), np.zeros(0))
+        columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
+        found = self._descend(effects, self._limited(begin), columns, kappa, self.start, 1)
+        if self.difference is None or not effects:
+            return self._refit(effects, *found)
+        self._share = self._share_of(effects[0], found[0], found[1])
+        state, z, _, columns, _ = found
+        columns = columns.copy()
+        own = slice(self._U.shape[1], self._U.shape[1] + len(self._share.along))
+        columns[:, own] += np.outer(self._share.answer, self._share.along)
+        return self._refit(effects, *self._descend(effects, z, columns, kappa, state, -1))
+
+    def _share_of(self, effect: Effect, state: SolvedState, z: Floats) -> _Share:
+        """What of the mesh's error belongs to the first mechanism, in proportion to its size."""
+        assert self.difference is not None
+        q, size = self._U.shape[1], effect.columns.shape[1]
+        away = effect.coefficients(z[q : q + size]) - effect.proposed.without
+        # along what it is: its coefficients, each in standard deviations
+        scaled = away / effect.proposed.sd
+        length = float(scaled @ scaled)
+        if length < 1e-6 or effect.proposed.history is not None:
+            return _Share(np.zeros(len(self.factor)), np.zeros(size), np.zeros(1))
+        try:
+            error = mesh_error(self.states, state.hypothesis, state)
+        except SolveError:
+            return _Share(np.zeros(len(self.factor)), np.zeros(size), np.zeros(1))
+        sensors = state.sensors
+        du, dR = error.u - self.difference.u, error.reactions - self.difference.reactions
+        answer = sensors.by_displacement @ du.ravel() + sensors.by_reactions @ dR.ravel()
+        mean = (effect.proposed.mean - effect.proposed.without) / effect.proposed.sd
+        along = scaled / length if effect.proposed.follows != "switch" else np.zeros(size)
+        constant = along @ mean if effect.proposed.follows != "switch" else 1.0
+        return _Share(Discretisation().mean * np.asarray(answer), along, np.array([constant]))
+
+    def _descend(
+        self,
+        effects: tuple[Effect, ...],
+        z: Floats,
+        columns: Floats,
+        kappa: float,
+        near: SolvedState,
+        anew: int,
+    ) -> tuple[SolvedState, Floats, Floats, Floats, bool]:
+        """State, coordinates, residual, columns and whether it converged; `anew`: when columns are made anew."""
         from scipy.linalg import solve_triangular
 
         q = self._U.shape[1]
-        columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
-        z = self._limited(begin)
-        state, residual = self._try(effects, z)
+        state, residual = self._try(effects, z, near)
         best = self._objective(residual, z, kappa)
         converged = False
         for iteration in range(_ITERATIONS):
-            if iteration == 1 and effects:
+            if iteration == anew and effects:
                 columns = self._columns_at(state, effects, z[q:], columns)
             white = solve_triangular(self.factor, np.column_stack([residual, columns]), lower=True) / kappa
             gradient = white[:, 1:].T @ white[:, 0] - z
@@ -161,7 +231,7 @@ class Refitting:
                 break
             if converged:
                 break
-        return self._refit(effects, state, z, residual, columns, converged)
+        return state, z, residual, columns, converged
 
     def _limited(self, z: Floats) -> Floats:
         found = z.copy()
@@ -198,6 +268,9 @@ class Refitting:
         at = self._U.shape[1]
         linear = self._U[:, self._linear] @ z[:at][self._linear]
         residual = state.sensors.residual - self.nuisances.mean - linear
+        if len(self._share.constant):
+            own = z[at : at + len(self._share.along)]
+            residual = residual - self._share.answer * float(self._share.constant[0] + self._share.along @ own)
         for effect in effects:
             size = effect.columns.shape[1]
             if effect.proposed.follows == "switch":

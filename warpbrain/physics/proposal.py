@@ -87,6 +87,8 @@ class Proposal:
         One of `Follows`. A smooth one does nothing at `start`; a switch has one coefficient, its share.
     start : (k,) array
         About which a smooth one is differentiated; zero if proportional.
+    nothing : (k,) array
+        Where it does nothing, `start` if not said.
     releases : str
         Node set that is no longer held by the case's own boundaries.
     history : callable, or None
@@ -102,6 +104,7 @@ class Proposal:
     sd: Floats
     follows: Follows = "proportional"
     start: Floats = field(default_factory=lambda: np.zeros(0))
+    nothing: Floats = field(default_factory=lambda: np.zeros(0))
     releases: str = ""
     history: Callable[[float], float] | None = None
     centre: Floats | None = None
@@ -124,6 +127,13 @@ class Proposal:
             return make(float(c[0]))
 
         return cls(made, np.array([mean]), np.array([sd]), follows, np.array([start]), **where)  # type: ignore[arg-type]
+
+    @property
+    def without(self) -> Floats:
+        """Coefficients (k,) with which it does nothing."""
+        if len(self.nothing):
+            return self.nothing
+        return self.start if len(self.start) else np.zeros(len(self))
 
     def __len__(self) -> int:
         return len(self.mean)

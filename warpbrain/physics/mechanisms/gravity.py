@@ -134,7 +134,8 @@ class Gravity(Load, Mechanism):
                 )
 
             sd = np.array([_SHARE, _POSE, _POSE])
-            found.append(Proposal(drained, np.array([1.0, 0.0, 0.0]), sd, "smooth", np.array([1.0, 0.0, 0.0])))
+            usual = np.array([1.0, 0.0, 0.0])
+            found.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(3)))
         return found
 
     def detail(self) -> str:

@@ -1,0 +1,50 @@
+"""The error of the mesh under a hypothesis: the state on elements of half the size, less the state.
+
+Linear tetrahedra answer too little, and to each mechanism in its own measure: a pressure in a cavity moves a coarse mesh
+far less than weight does. So the error is computed with the mechanism that is fitted, not once for all: otherwise its
+size would come out wrong by as much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from warpbrain.diagnosis.states import TOLERANCE, Hypothesis, SolvedState, States
+from warpbrain.estimation.discretisation import Difference
+from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
+from warpbrain.simulation.finer import FinerCase
+from warpbrain.simulation.system import System
+
+#: Out-of-balance force of the finer state, relative: far below the error that is looked for.
+_ROUGH = 10.0 * TOLERANCE
+
+
+def mesh_error(states: States, hypothesis: Hypothesis, near: SolvedState) -> Difference:
+    """The error of a hypothesis without its stiffness field, which it hardly depends on.
+
+    Parameters
+    ----------
+    states : States
+    hypothesis : Hypothesis
+    near : SolvedState
+        A state near to it.
+
+    Raises
+    ------
+    SolveError
+        If there is no equilibrium on the finer mesh.
+    """
+    even = replace(hypothesis, field=np.zeros_like(hypothesis.field))
+    coarse = states.solve(even, near.u)
+    finer = FinerCase(states.case_of(even))
+    model = finer.model(coarse.system.model)
+    external = model.external_forces()
+    system = System(model, states.device)
+    found = EquilibriumSolver(system, EquilibriumOptions(tolerance=_ROUGH)).solve(
+        external, finer.prolongation @ coarse.u
+    )
+    # a reaction between two nodes goes to both of them, so that resultants stay
+    reactions = finer.prolongation.T @ np.where(model.constrained, found.internal - external, 0.0)
+    return Difference(found.u[: len(coarse.u)] - coarse.u, reactions - coarse.reactions, hypothesis.theta)
