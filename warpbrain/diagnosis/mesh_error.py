@@ -1,8 +1,8 @@
 """The error of the mesh under a hypothesis: the state on elements of half the size, less the state.
 
-Linear tetrahedra answer too little, and to each mechanism in its own measure: a pressure in a cavity moves a coarse mesh
-far less than weight does. So the error is computed with the mechanism that is fitted, not once for all: otherwise its
-size would come out wrong by as much.
+Linear tetrahedra answer too little, and to each mechanism in its own measure: a pressure in a cavity moves a coarse
+mesh far less than weight does. So the error is computed with the mechanism that is fitted, not once for all: otherwise
+its size would come out wrong by as much.
 """
 
 from __future__ import annotations
