@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import importlib.metadata
 import shutil
 import subprocess
 import sys
@@ -49,7 +48,7 @@ def run_all(cases: Path, out: Path, device: str | None, workers: int, more: Sequ
     out.mkdir(parents=True, exist_ok=True)
     done = {row["case"]: int(row["status"]) for row in read_runs(out)}
     arguments = [*(["--device", device] if device else []), *more]
-    about = (importlib.metadata.version("warpbrain"), _commit())
+    about = (warpbrain.__version__, _commit())
     with ThreadPoolExecutor(workers) as pool:
         waiting = [folder for folder in folders if folder.name not in done]
         jobs = {pool.submit(_run, folder, out / folder.name, arguments): folder.name for folder in waiting}

@@ -375,7 +375,7 @@ class Diagnosing:
             for number in numbers.tolist():
                 own = gram.stack.columns[:, gram.stack.first[number] : gram.stack.first[number + 1]]
                 effect = candidates.effects[number]
-                switch = effect.proposed.follows == "switch" or effect.proposed.mean.any()
+                switch = effect.proposed.is_there_or_not or effect.proposed.mean.any()
                 lengths.append(gram.explanation.detectability(own[:, 0 if switch else 1], gram.kappa))
             middle = int(np.argsort(lengths)[len(lengths) // 2])
             found[kind] = smallest_of(candidates.effects[numbers[middle]], lengths[middle], SEEN)

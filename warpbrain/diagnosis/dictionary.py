@@ -13,14 +13,16 @@ from warpbrain.cases.case import Case
 from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.sensors import spread_points
 from warpbrain.errors import InputError, SolveError
-from warpbrain.mesh import boundary_faces, face_vectors
+from warpbrain.mesh import TetMesh, boundary_faces, face_vectors, nodes_of
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
+from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 
 Floats = NDArray[np.float64]
 
 #: About how many sites there are in the tissue, and on its surface.
 _VOLUME_SITES, _SURFACE_SITES = 350, 160
+#: Radius [m] of parts of a held set that may let go, and how many of them.
+_PATCH, _PATCHES = 0.035, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +47,13 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
     mesh, _ = case.remaining
     faces = boundary_faces(mesh.tetrahedra)
     used = {boundary.nodes for boundary in case.boundaries}
-    held = tuple(
+    fixed = [
         b.nodes for b in case.boundaries if isinstance(b, Fixed) and mesh.node_sets[b.nodes][faces].all(axis=1).any()
-    )
+    ]
     still = np.zeros(len(mesh.points), dtype=bool)
-    for nodes in held:
+    for nodes in fixed:
         still |= mesh.node_sets[nodes]
+    held = tuple(patch for nodes in fixed for patch in _patches(mesh, nodes))
     free = tuple(
         name
         for name, members in mesh.node_sets.items()
@@ -77,6 +80,23 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
         on_surface[spread_points(on_surface, between)],
         spacing,
     )
+
+
+def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
+    """A held node set, and round parts of it."""
+    on_surface = nodes_of(mesh.boundary, len(mesh.points))
+    members = mesh.node_sets[nodes] & on_surface
+    where = mesh.points[members]
+    size = float(np.linalg.norm(np.ptp(where, axis=0))) / 2.0
+    found = [Patch(nodes, members, where.mean(axis=0), size)]
+    if size > 1.3 * _PATCH:
+        for number in spread_points(where, 0.9 * _PATCH, _PATCHES):
+            near = members & (np.linalg.norm(mesh.points - where[number], axis=1) <= _PATCH)
+            x, y, z = 1000.0 * where[number]
+            # parts that hold no face have no wall
+            if near[mesh.boundary].all(axis=1).any() and not near[members].all():
+                found.append(Patch(f"{nodes}-near-{x:.0f}-{y:.0f}-{z:.0f}", near, where[number], _PATCH))
+    return found
 
 
 def dictionary_of(case: Case, kinds: Sequence[str] | None = None, instants: int = 1) -> Dictionary:
@@ -142,10 +162,10 @@ def candidates_at(
         if on_kind is not None:
             on_kind(kind)
         own: list[Effect] = []
-        smooth = [proposal for proposal in proposals if proposal.follows != "switch"]
+        smooth = [proposal for proposal in proposals if not proposal.is_there_or_not]
         own.extend(effects.of(smooth))
         for proposal in proposals:
-            if proposal.follows == "switch":
+            if proposal.is_there_or_not:
                 try:
                     own.extend(effects.of([proposal]))
                 except (InputError, SolveError) as error:

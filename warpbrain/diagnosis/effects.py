@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 _STEP = 1e-3
 
 #: The answer of a switch: the sensors (n,) of the state with the mechanism, less those without it.
-Switched = Callable[[Mechanism, str], Floats]
+Switched = Callable[[Mechanism], Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ class Effects:
     @staticmethod
     def _points(proposal: Proposal) -> list[Mechanism]:
         """Mechanisms whose answers make the columns."""
-        if proposal.follows == "switch":
+        if proposal.follows in ("switch", "release"):
             return []
         axes = np.diag(proposal.sd)
         if proposal.follows == "proportional":
@@ -116,8 +116,12 @@ class Effects:
         return [proposal.make(proposal.start), *beside]
 
     def _effect(self, proposal: Proposal, answers: Floats) -> Effect:
-        if proposal.follows == "switch":
-            answer = self._switched(proposal.make(proposal.mean), proposal.releases)
+        if proposal.follows in ("switch", "release"):
+            if proposal.follows == "release":
+                assert proposal.patch is not None
+                answer = self.at.released(proposal.patch.members, _lifts(proposal.make(proposal.mean)))
+            else:
+                answer = self._switched(proposal.make(proposal.mean))
             return Effect(proposal, proposal.mean[0] * answer, proposal.sd[0] * answer[:, None])
         if proposal.follows == "proportional":
             return Effect(proposal, answers @ (proposal.mean / proposal.sd), answers)
@@ -198,3 +202,8 @@ class Effects:
         system = self.at.system
         beside = System(replace(model, materials=materials), str(system.device), system.precision.name)
         return self.at.internal_forces(beside) - self._internal
+
+
+def _lifts(mechanism: Mechanism) -> bool:
+    """Whether what lets go can leave the wall too, where it was pulled."""
+    return getattr(mechanism, "state", "") == "lifting"

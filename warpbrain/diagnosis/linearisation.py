@@ -21,12 +21,15 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.errors import SolveError
+from warpbrain.mesh import TetMesh, face_vectors
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
 
 #: Growth by which the derivative of the forces of growing tissue is taken.
 _GROWTH = 1e-4
+#: Stiffness of a wall relative to the stiffest node.
+_WALL = 100.0
 
 
 class Linearisation:
@@ -56,6 +59,7 @@ class Linearisation:
         system.u.assign(self.u)
         K = system.stiffness().tocsr()
         free = ~system.model.constrained.ravel()
+        self._K: Any = K
         self._free, self._held_free = free, K[~free][:, free]
         options = {"SymmetricMode": True}
         try:
@@ -85,6 +89,44 @@ class Linearisation:
         A[:, free] = self._factors.solve(np.ascontiguousarray(dense[different].T)).T[which.ravel()]
         A[:, ~free] = -np.asarray(by_R.todense())
         return A
+
+    def released(self, patch: NDArray[np.bool_], lifts: bool) -> Floats:
+        """What is recorded where held nodes let go, to first order: (n,).
+
+        They slide along the surface; where the skull pulled at them they also leave it, if they can.
+
+        Parameters
+        ----------
+        patch : (N,) bool array
+            Nodes, all of whose components are held.
+        lifts : bool
+        """
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.linalg import splu
+
+        mesh = self.system.model.mesh
+        members = np.flatnonzero(patch)
+        normals = _normals(mesh)[members]
+        pull = np.einsum("ni,ni->n", self.reactions[members], normals)
+        kept = members[(pull <= 0.0) | (not lifts)]
+        along = _normals(mesh)[kept]
+        # the wall as a very stiff spring along its normal
+        stiff = _WALL * float(self._K.diagonal().max())
+        rows = (3 * kept[:, None, None] + np.arange(3)[:, None] + np.zeros((1, 1, 3), dtype=int)).ravel()
+        columns = (3 * kept[:, None, None] + np.arange(3)[None] + np.zeros((1, 3, 1), dtype=int)).ravel()
+        values = (stiff * along[:, :, None] * along[:, None, :]).ravel()
+        wall = coo_matrix((values, (rows, columns)), self._K.shape).tocsr()
+        free = self._free.copy()
+        free.reshape(-1, 3)[members] = True
+        load = np.zeros(len(free))
+        load.reshape(-1, 3)[members] = -self.reactions[members]
+        K = (self._K + wall)[free][:, free].tocsc()
+        options = {"SymmetricMode": True}
+        factors = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        du = np.zeros(len(free))
+        du[free] = factors.solve(load[free])
+        dR = np.where(free, 0.0, self._K @ du)
+        return np.asarray(self.sensors.by_displacement @ du + self.sensors.by_reactions @ dR)
 
     def answers(self, forces: Floats) -> Floats:
         """What nodal forces (..., N, 3) [N] change of what is recorded: (n, ...)."""
@@ -138,3 +180,14 @@ class Linearisation:
         asked.evaluate_forces()
         asked.gather_forces()
         return np.asarray(asked.internal.numpy().astype(np.float64))
+
+
+def _normals(mesh: TetMesh) -> Floats:
+    """Outward unit normals (N, 3) at the nodes of the surface, means over their faces; zero elsewhere."""
+    faces = mesh.boundary
+    vectors = face_vectors(mesh.points, faces)
+    total = np.zeros(mesh.points.shape)
+    for corner in faces.T:
+        np.add.at(total, corner, vectors)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.asarray(total / np.where(length > 0.0, length, 1.0))

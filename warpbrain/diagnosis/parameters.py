@@ -42,7 +42,7 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
 
     The length of a vector follows its components, as `value, size`.
     """
-    if effect.proposed.follows == "switch":
+    if effect.proposed.is_there_or_not:
         return ()
     here = _numbers(effect, z)
     factor = np.linalg.cholesky(covariance + 1e-18 * np.eye(len(z)))
@@ -89,7 +89,7 @@ def smallest_of(effect: Effect, whitened_length: float, wanted: float) -> Smalle
     wanted : float
     """
     factor = wanted / max(whitened_length, 1e-12)
-    if effect.proposed.follows == "switch":
+    if effect.proposed.is_there_or_not:
         return Smallest(factor, "of being there", "share")
     z = np.zeros(effect.columns.shape[1])
     start = -effect.proposed.mean / effect.proposed.sd if effect.proposed.follows == "proportional" else z

@@ -185,8 +185,8 @@ class Refitting:
         du, dR = error.u - self.difference.u, error.reactions - self.difference.reactions
         answer = sensors.by_displacement @ du.ravel() + sensors.by_reactions @ dR.ravel()
         mean = (effect.proposed.mean - effect.proposed.without) / effect.proposed.sd
-        along = scaled / length if effect.proposed.follows != "switch" else np.zeros(size)
-        constant = along @ mean if effect.proposed.follows != "switch" else 1.0
+        along = scaled / length if not effect.proposed.is_there_or_not else np.zeros(size)
+        constant = along @ mean if not effect.proposed.is_there_or_not else 1.0
         return _Share(Discretisation().mean * np.asarray(answer), along, np.array([constant]))
 
     def _descend(
@@ -246,15 +246,15 @@ class Refitting:
         return 0.5 * float(white @ white + z @ z)
 
     def _hypothesis(self, effects: tuple[Effect, ...], z: Floats) -> Hypothesis:
-        mechanisms, releases, at = [], [], self._U.shape[1]
+        mechanisms, patches, at = [], [], self._U.shape[1]
         for effect in effects:
             size = effect.columns.shape[1]
             mechanisms.append(effect.proposed.make(effect.coefficients(z[at : at + size])))
-            if effect.proposed.releases:
-                releases.append(effect.proposed.releases)
+            if effect.proposed.patch is not None:
+                patches.append(effect.proposed.patch)
             at += size
         theta = self.prior.mean + self.prior.factor @ z[self._tissue]
-        return Hypothesis(theta, z[self._field], tuple(mechanisms), tuple(releases))
+        return Hypothesis(theta, z[self._field], tuple(mechanisms), tuple(patches))
 
     def _try(
         self, effects: tuple[Effect, ...], z: Floats, near: SolvedState | None = None
@@ -273,7 +273,7 @@ class Refitting:
             residual = residual - self._share.answer * float(self._share.constant[0] + self._share.along @ own)
         for effect in effects:
             size = effect.columns.shape[1]
-            if effect.proposed.follows == "switch":
+            if effect.proposed.is_there_or_not:
                 # it is there or not: its share only says how exactly it is simulated
                 residual = residual - effect.columns @ z[at : at + size]
             at += size
@@ -282,13 +282,13 @@ class Refitting:
     def _columns_at(self, state: SolvedState, effects: tuple[Effect, ...], z: Floats, columns: Floats) -> Floats:
         """Columns with those of the mechanisms made anew where they act."""
         q = self._U.shape[1]
-        if all(effect.proposed.follows == "switch" for effect in effects):
+        if all(effect.proposed.is_there_or_not for effect in effects):
             return columns
         at = Linearisation(state.system, state.u, state.reactions, state.sensors)
         anew, place, found = Effects(at, _none), 0, [columns[:, :q]]
         for effect in effects:
             size = effect.columns.shape[1]
-            if effect.proposed.follows == "switch":
+            if effect.proposed.is_there_or_not:
                 found.append(effect.columns)
             else:
                 here = effect.coefficients(z[place : place + size])
@@ -339,5 +339,5 @@ class Refitting:
         )
 
 
-def _none(_mechanism: object, _releases: str) -> Floats:
+def _none(_mechanism: object) -> Floats:
     raise AssertionError("switches keep their columns")

@@ -8,14 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.cases.boundary import Fixed
+from warpbrain.cases.boundary import Boundary, Fixed
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.realigned import realigned
 from warpbrain.diagnosis.sensors import Sensors, sensors_at
 from warpbrain.diagnosis.stiffness_field import StiffnessField, stiffness_modes
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
+from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.proposal import Patch
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
@@ -39,14 +41,14 @@ class Hypothesis:
         Of the modes of the stiffness field, in standard deviations.
     mechanisms : tuple of Mechanism
         Beside those of the case.
-    releases : tuple of str
-        Node sets that the case's boundaries no longer hold.
+    patches : tuple of Patch
+        What the case's boundaries no longer hold.
     """
 
     theta: Floats
     field: Floats
     mechanisms: tuple[Mechanism, ...] = ()
-    releases: tuple[str, ...] = ()
+    patches: tuple[Patch, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +108,11 @@ class States:
     def case_of(self, hypothesis: Hypothesis) -> Case:
         """The case that a user would write for a hypothesis, but for the stiffness field."""
         applied = self.parameters.applied(self.case, hypothesis.theta)
-        boundaries = tuple(
-            b for b in applied.boundaries if not (isinstance(b, Fixed) and b.nodes in hypothesis.releases)
-        )
+        mesh, boundaries = _released(applied, hypothesis.patches)
         kept = tuple(
             m for m in applied.mechanisms if all(new.several or new.kind != m.kind for new in hypothesis.mechanisms)
         )
-        return replace(applied, boundaries=boundaries, mechanisms=(*kept, *hypothesis.mechanisms))
+        return replace(applied, mesh=mesh, boundaries=boundaries, mechanisms=(*kept, *hypothesis.mechanisms))
 
     def solve(self, hypothesis: Hypothesis, start: Floats | None = None) -> SolvedState:
         """The equilibrium under a hypothesis, from a displacement (N, 3) [m] that is near to it.
@@ -149,6 +149,29 @@ class States:
         for before, after in itertools.pairwise((0.0, *self.times)):
             found += [before + part * (after - before) for part in ((1.0,) if before == 0.0 else (0.3, 0.6, 1.0))]
         return found
+
+
+def _released(case: Case, patches: tuple[Patch, ...]) -> tuple[TetMesh, tuple[Boundary, ...]]:
+    """Mesh and boundaries of a case that no longer holds some nodes, which are node sets then."""
+    if not patches:
+        return case.mesh, case.boundaries
+    nodes = case.remaining[1]
+    sets = dict(case.mesh.node_sets)
+    loose = np.zeros(len(case.mesh.points), dtype=bool)
+    for patch in patches:
+        sets[patch.name] = np.zeros(len(loose), dtype=bool)
+        sets[patch.name][nodes] = patch.members
+        loose |= sets[patch.name]
+    boundaries = []
+    for boundary in case.boundaries:
+        if not isinstance(boundary, Fixed) or not (sets[boundary.nodes] & loose).any():
+            boundaries.append(boundary)
+            continue
+        still = f"{boundary.nodes}-still-held"
+        sets[still] = sets[boundary.nodes] & ~loose
+        if sets[still].any():
+            boundaries.append(replace(boundary, nodes=still))
+    return replace(case.mesh, node_sets=sets), tuple(boundaries)
 
 
 def recorded_times(case: Case) -> tuple[float, ...]:

@@ -29,10 +29,10 @@ def switched(states: States, state: SolvedState, sensors: Sensors, known: dict[s
         States that were solved already; more are put there.
     """
 
-    def answer(mechanism: Mechanism, releases: str) -> Floats:
-        key = f"{mechanism!r} {releases}"
+    def answer(mechanism: Mechanism) -> Floats:
+        key = repr(mechanism)
         if key not in known:
-            asked = replace(state.hypothesis, mechanisms=(mechanism,), releases=(releases,) if releases else ())
+            asked = replace(state.hypothesis, mechanisms=(mechanism,))
             known[key] = states.solve(asked, state.u)
         du, dR = known[key].u - state.u, known[key].reactions - state.reactions
         return np.asarray(sensors.by_displacement @ du.ravel() + sensors.by_reactions @ dR.ravel())

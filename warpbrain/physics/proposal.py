@@ -21,12 +21,33 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 #: How the effect of a proposal follows its coefficients: in proportion, to first order about a start that does nothing,
-#: or all at once.
-Follows = Literal["proportional", "smooth", "switch"]
+#: all at once, or all at once where something that held it lets go.
+Follows = Literal["proportional", "smooth", "switch", "release"]
 
 
 class NotTestableError(Exception):
     """A mechanism that the data of a case cannot show; the message says what is missing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Some of the nodes that a case holds.
+
+    Attributes
+    ----------
+    name : str
+        Of the node set that they become.
+    members : (n,) bool array
+    centre : (3,) array
+        [m]
+    radius : float
+        [m]
+    """
+
+    name: str
+    members: NDArray[np.bool_]
+    centre: Floats
+    radius: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +65,10 @@ class Situation:
         Kinds of mechanisms that the case assumes.
     laws : frozenset of str
         Of its tissues.
-    held, free : tuple of str
-        Node sets with faces of the surface: those that nothing moves, and those on which nothing is declared.
+    held : tuple of Patch
+        Parts of the surface that nothing moves.
+    free : tuple of str
+        Node sets with faces of the surface on which nothing is declared.
     instants : int
         At how many times something was recorded.
     volume_sites, surface_sites : (k, 3) array
@@ -60,7 +83,7 @@ class Situation:
     poisson: float
     assumed: frozenset[str]
     laws: frozenset[str]
-    held: tuple[str, ...]
+    held: tuple[Patch, ...]
     free: tuple[str, ...]
     instants: int
     volume_sites: Floats
@@ -89,8 +112,8 @@ class Proposal:
         About which a smooth one is differentiated; zero if proportional.
     nothing : (k,) array
         Where it does nothing, `start` if not said.
-    releases : str
-        Node set that is no longer held by the case's own boundaries.
+    patch : Patch or None
+        What the case's own boundaries no longer hold.
     history : callable, or None
         From the time since the load came [s] to the part of its effect that is there; None: all of it, always.
     centre, radius : (3,) array and float, or None
@@ -105,7 +128,7 @@ class Proposal:
     follows: Follows = "proportional"
     start: Floats = field(default_factory=lambda: np.zeros(0))
     nothing: Floats = field(default_factory=lambda: np.zeros(0))
-    releases: str = ""
+    patch: Patch | None = None
     history: Callable[[float], float] | None = None
     centre: Floats | None = None
     radius: float | None = None
@@ -134,6 +157,11 @@ class Proposal:
         if len(self.nothing):
             return self.nothing
         return self.start if len(self.start) else np.zeros(len(self))
+
+    @property
+    def is_there_or_not(self) -> bool:
+        """Whether it has no size, only a share that says how exactly it is simulated."""
+        return self.follows in ("switch", "release")
 
     def __len__(self) -> int:
         return len(self.mean)

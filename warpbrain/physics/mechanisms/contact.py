@@ -112,14 +112,16 @@ class Contact(Mechanism):
         """What is held slides instead, or lifts off."""
         found = [
             Proposal.of_one(
-                lambda _share, nodes=nodes, state=state: cls(nodes=nodes, state=state),
+                lambda _share, name=patch.name, state=state: cls(nodes=name, state=state),
                 1.0,
-                0.3,
-                "switch",
-                releases=nodes,
-                region=nodes,
+                0.5,
+                "release",
+                patch=patch,
+                centre=patch.centre,
+                radius=patch.radius,
+                region=patch.name,
             )
-            for nodes in situation.held
+            for patch in situation.held
             for state in STATES[1:]
         ]
         if not found:
