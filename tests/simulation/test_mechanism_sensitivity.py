@@ -30,6 +30,14 @@ EXAMPLES: dict[str, dict] = {
     "contact fixed": {"nodes": "below", "state": "fixed"},
     "contact sliding": {"nodes": "below", "state": "sliding", "friction": 0.0},
     "contact lifting": {"nodes": "below", "state": "lifting", "friction": 0.2},
+    "drainage": {
+        "permeability": 1e-9,
+        "storage": 1e-5,
+        "pressure": 100.0,
+        "exchange": 1e-8,
+        "capillary_pressure": 400.0,
+        "drained": "wall",
+    },
     "falx": {"nodes": "wall", "stiffness": 3e3, "thickness": 0.1},
     "fibres": {"direction": (1.0, 2.0, 0.5), "stiffness": 500.0, "exponent": 30.0, "dispersion": 0.0},
     "gravity": {"direction": (1.0, 0.3, -2.0), "density": 100.0, "csf_level": 1.4625},
@@ -46,7 +54,7 @@ TIGHT = EquilibriumOptions(tolerance=1e-13, cg_tolerance=1e-3, max_augmentations
 #: Where the skull's spline rounds more than laws do.
 TOUCHING = replace(TIGHT, tolerance=3e-12)
 #: Those whose effect is taken on the other element too.
-AVERAGED = ("cavity", "falx", "pressure", "swelling", "traction")
+AVERAGED = ("cavity", "drainage", "falx", "pressure", "swelling", "traction")
 
 
 def test_every_mechanism_has_an_example() -> None:

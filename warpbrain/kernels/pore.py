@@ -7,6 +7,9 @@ In an element of reference volume `V` with the gradients `g_a` of its shape func
     M_ab = V (1 + delta_ab)/20                     storage and exchange
     N_ab = V/(2 mu) ((1 + delta_ab)/20 - 1/16)     stabilisation
 
+Numbers that a captured graph must see are in an array: the pressure at drained nodes [Pa], the source of each volume
+[1, or 1/s of a steady flow], and 1 or 0, whether a step or a steady flow.
+
 `J C^-1 = cof F^T cof F / J`. `N` is what White and Borja (2008) add to the rate of storage: the product of what of two
 pressures is not constant in an element (Dohrmann and Bochev 2004). It is zero for a uniform pressure, so no fluid is
 lost, and zero in a steady flow, which has no rate.
@@ -166,7 +169,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         taken: wp.array[scalar],
         entries: wp.array2d[scalar],
         beyond: wp.array[scalar],
-        pressure: scalar,
+        numbers: wp.array[scalar],
         scale: wp.array[scalar],
         out: wp.array[scalar],
     ):
@@ -178,7 +181,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
             near = nodes[elements[t]]
             total += taken[t]
             for b in range(4):
-                total += entries[t, places[4 * a + b]] * (beyond[near[b]] + pressure * scale[0])
+                total += entries[t, places[4 * a + b]] * (beyond[near[b]] + numbers[0] * scale[0])
         out[i] = total
 
     @wp.kernel(module=module)
@@ -189,8 +192,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         held: wp.array[scalar],
         lumped: wp.array[scalar],
         closed: wp.array[scalar],
-        memory: scalar,
-        source: scalar,
+        numbers: wp.array[scalar],
         scale: wp.array[scalar],
         out: wp.array[scalar],
     ):
@@ -198,7 +200,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         total = scalar(0.0)
         for c in range(corner_first[i], corner_first[i + 1]):
             total += taken[corners[c] // 4]
-        out[i] = closed[i] * (memory * (held[i] - total) + source * scale[0] * lumped[i])
+        out[i] = closed[i] * (numbers[2] * (held[i] - total) + numbers[1] * scale[0] * lumped[i])
 
     @wp.func
     def mean_pressure(near: wp.vec4i, beyond: wp.array[scalar], pressure: scalar):
@@ -212,7 +214,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         inverse_edges: wp.array[mat33],
         volume: wp.array[scalar],
         beyond: wp.array[scalar],
-        pressure: scalar,
+        numbers: wp.array[scalar],
         scale: wp.array[scalar],
         u: wp.array[vec3],
         element_forces: wp.array2d[vec3],
@@ -220,7 +222,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         t = wp.tid()
         e = elements[t]
         G = inverse_edges[e]
-        p = mean_pressure(nodes[e], beyond, pressure * scale[0])
+        p = mean_pressure(nodes[e], beyond, numbers[0] * scale[0])
         store_forces(-p * volume[t] * cofactor(deformation_gradient(u, nodes[e], G)), G, element_forces, t)
 
     @wp.func
@@ -235,7 +237,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         inverse_edges: wp.array[mat33],
         volume: wp.array[scalar],
         beyond: wp.array[scalar],
-        pressure: scalar,
+        numbers: wp.array[scalar],
         scale: wp.array[scalar],
         u: wp.array[vec3],
         element_forces: wp.array2d[vec3],
@@ -249,7 +251,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         cof = cofactor(F)
         J = wp.dot(F[0], cof[0])
         V = volume[t]
-        p = mean_pressure(nodes[e], beyond, pressure * scale[0])
+        p = mean_pressure(nodes[e], beyond, numbers[0] * scale[0])
         store_forces(-p * V * cof, G, element_forces, t)
         a, b, c = cof * G[0], cof * G[1], cof * G[2]
         s = -p * V / J

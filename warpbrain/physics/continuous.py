@@ -81,7 +81,7 @@ class Continuous:
         expected = says.expectation
         if size == 0.0 and expected is not None:
             size = 0.5 * abs(expected.quantile(0.84) - expected.quantile(0.16)) * says.si
-        size = size or says.si
+        size = size or says.size * says.si
         if length:
             size = min(size, _LENGTH)
         for limit in (says.above, says.below):

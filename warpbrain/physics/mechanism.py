@@ -84,6 +84,8 @@ class Says:
     typical : str
         Range in the literature, with unit.
     source : str
+    size : float
+        By how much it must change to change much where it is zero and nothing is expected of it, in the user's unit.
     method : bool
         It is a setting of the method, no property of a body: never differentiated or estimated.
     """
@@ -100,6 +102,7 @@ class Says:
     expectation: Expectation | None = None
     typical: str = ""
     source: str = ""
+    size: float = 1.0
     method: bool = False
 
 

@@ -136,8 +136,8 @@ class Term(abc.ABC):
     coupling: Coupling | None = None
     #: Names of the arrays that hold what it remembers of earlier steps and augmentations.
     memory: ClassVar[tuple[str, ...]] = ()
-    #: Names of what is of rigid shapes around the body, which no number of a mechanism changes.
-    shapes: ClassVar[tuple[str, ...]] = ()
+    #: Names of what no number of a mechanism changes: rigid shapes around the body, solvers and what they work on.
+    lasting: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, body: Body, stencils: NDArray[np.integer], ramp: Callable[[float], float] | None = None) -> None:
         self.body = body
@@ -217,11 +217,11 @@ class Term(abc.ABC):
     def adopt(self, other: Term) -> None:
         """Become what another term on the same body is, in the same arrays: a captured graph reads these.
 
-        Its ramp and plain values are taken too. What it remembers stays, and so do rigid shapes.
+        Its ramp and plain values are taken too. What it remembers stays, and so does what is `lasting`.
         """
         for name, array in other._arrays().items():
             wp.copy(getattr(self, name), array)
-        kept = (*self.memory, *self.shapes, "body", "scale", "forces", "blocks")
+        kept = (*self.memory, *self.lasting, "body", "scale", "forces", "blocks")
         for name, value in vars(other).items():
             if name not in kept and not isinstance(value, wp.array):
                 setattr(self, name, value)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warpbrain.kernels.coupled import coupled_kernels
 from warpbrain.kernels.linear import ConjugateGradient, LinearResult
@@ -45,6 +46,44 @@ class LinearSolver(Protocol):
 
     def result(self) -> LinearResult:
         """How the last solve ended."""
+
+
+class InTurn:
+    """Solves the system's linear systems for several right-hand sides, one after the other.
+
+    Parameters
+    ----------
+    system : System
+    tolerance : float
+        Relative, of each.
+    max_iterations : int
+    """
+
+    def __init__(self, system: System, tolerance: float, max_iterations: int) -> None:
+        self._system, self._tolerance = system, tolerance
+        self._solver = system.linear_solver(tolerance=tolerance, max_iterations=max_iterations, watch_curvature=True)
+        self._results: list[LinearResult] = []
+
+    def prepare(self) -> None:
+        """Take notice of new values of the matrix, and of what terms keep of their own."""
+        self._solver.prepare()
+
+    def solve(
+        self, right_hand_sides: Sequence[NDArray[np.float64]], tolerance: float | None = None
+    ) -> NDArray[np.float64]:
+        """Solve from zero for right-hand sides (n, 3), which are zero on constrained components: (count, n, 3)."""
+        found, self._results = [], []
+        for b in right_hand_sides:
+            self._system.load.assign(b)
+            self._system.solution.zero_()
+            self._solver.solve(tolerance)
+            self._results.append(self._solver.result())
+            found.append(self._system.solution.numpy().astype(np.float64))
+        return np.array(found)
+
+    def results(self) -> list[LinearResult]:
+        """How the last solve ended, for each right-hand side."""
+        return self._results
 
 
 class CoupledSolver:

@@ -25,12 +25,11 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.kernels.block_linear import BlockConjugateGradient
 from warpbrain.simulation.beside import Beside, ModelOf
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.refinement import lengths, refine
-from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, block_solver
+from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, SeveralSolver, several_solver
 
 Floats = NDArray[np.float64]
 
@@ -76,9 +75,9 @@ class MotionSensitivity:
         simulator.set_time_step(simulator.time_step)
         self._beside = Beside(system, models, theta, scales)
         count = len(self._beside)
-        self._solver: BlockConjugateGradient | None = None
+        self._solver: SeveralSolver | None = None
         if count:
-            self._solver = block_solver(system, count, self._tolerance, max_cg)
+            self._solver = several_solver(system, count, self._tolerance, max_cg)
         self.u, self.v = (np.zeros((count, system.size, 3)) for _ in range(2))
 
     def step(self) -> None:
@@ -106,13 +105,14 @@ class MotionSensitivity:
         system.u.assign(u)
         system.advance()
 
-    def _by_parameters(self, solver: BlockConjugateGradient, u_start: Floats, v_start: Floats, u_end: Floats) -> Floats:
+    def _by_parameters(self, solver: SeveralSolver, u_start: Floats, v_start: Floats, u_end: Floats) -> Floats:
         """Derivatives (p, n, 3) of the velocity at the end of the step."""
         simulator, system, beside = self.simulator, self.simulator.system, self._beside
         h, damping = simulator.time_step, system.model.damping
         v_end = _host(simulator.v)
         linearised = simulator.newton == 1
-        share = h * damping.stiffness + (h * h if linearised else 0.0)
+        undamped = h * h if linearised else 0.0
+        share = h * damping.stiffness + undamped
         loaded = [h * beside.by_loads(k, simulator.time) for k in range(len(beside))]
 
         def unbalanced(start: Floats, v_before: Floats, v: Floats) -> Floats:
@@ -121,7 +121,8 @@ class MotionSensitivity:
             system.evaluate_tangents()
             system.gather_forces()
             inertia = _host(system.mass)[:, None] * ((1.0 + h * damping.mass) * v - v_before)
-            return inertia + share * system.stiffness_times(v) + h * _host(system.internal)
+            # unknowns of a term's own damp by themselves
+            return inertia + system.stiffness_times(v, share, undamped) + h * _host(system.internal)
 
         def along(k: int, dv: Floats) -> Floats:
             def look(offset: float, _: Model) -> Floats:
@@ -132,19 +133,29 @@ class MotionSensitivity:
         def left_of(k: int, dv: Floats) -> Floats:
             return loaded[k] - along(k, dv)
 
-        with beside.here():
+        def stand() -> None:
             system.u.assign(u_start if linearised else u_end)
             system.evaluate_tangents()
-            system.assemble(k=h * damping.stiffness + h * h, m=1.0 + h * damping.mass)
+
+        def correct(left: Floats) -> Floats:
+            if system.coupled:
+                # what terms have of their own is in no matrix, and a look beside changes it
+                with beside.here():
+                    stand()
+            return corrections.correct(left)
+
+        with beside.here():
+            stand()
+            system.assemble(h * damping.stiffness + h * h, 1.0 + h * damping.mass, coupling=h * h)
             inertia = float(np.linalg.norm(_host(system.mass)[:, None] * v_end))
-        corrections = Corrections(solver, system, self._tolerance)
+            corrections = Corrections(solver, system, self._tolerance)
         start = np.zeros_like(self.v)
         left = np.array([left_of(k, dv) for k, dv in enumerate(start)])
         free = ~system.model.constrained
         # differences are exact to the rounding of what is summed over the step of a parameter
         rounding = ROUNDINGS * system.precision.epsilon * (h * system.size_of_forces() + inertia)
         goals = 2.0 * self._tolerance * lengths(left, free) + rounding / beside.steps
-        return refine(left_of, corrections.correct, start, left, goals, free)[0]
+        return refine(left_of, correct, start, left, goals, free)[0]
 
 
 def follow(

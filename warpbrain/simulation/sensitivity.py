@@ -30,12 +30,16 @@ from warpbrain.errors import SolveError
 from warpbrain.kernels.block_linear import BlockConjugateGradient
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.beside import Beside, ModelOf
+from warpbrain.simulation.coupled import InTurn
 from warpbrain.simulation.equilibrium import Equilibrium
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.refinement import lengths, refine
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
+
+#: What solves for several right-hand sides: at once, or in turn where terms have unknowns of their own.
+SeveralSolver = BlockConjugateGradient | InTurn
 
 #: Of each correction but the first: it is not exact anyway.
 _ROUGH = 1e-3
@@ -81,7 +85,7 @@ class SensitivitySolver:
         self.system = system
         self._tolerance = max(tolerance, 20.0 * system.precision.epsilon)
         self._max_cg = max_cg
-        self._solvers: dict[int, BlockConjugateGradient] = {}
+        self._solvers: dict[int, SeveralSolver] = {}
 
     def solve(self, u: ArrayLike, models: ModelOf, theta: ArrayLike, scales: ArrayLike | None = None) -> Sensitivities:
         """Derivatives by each parameter.
@@ -108,8 +112,11 @@ class SensitivitySolver:
             is that of a step in which unknowns of a term's own follow the displacement.
         """
         system = self.system
-        if any(term.coupled for term in system.terms):
-            raise SolveError("sensitivity: fluid flows in this step, and only a steady state has derivatives yet")
+        if system.coupled:
+            raise SolveError(
+                "sensitivity: fluid flows in this step, whose derivatives depend on all before it: follow them from the "
+                "start (warpbrain.simulation.motion_sensitivity)"
+            )
         system.set_load()
         state = np.array(u, dtype=np.float64)
         beside = Beside(system, models, theta, scales)
@@ -180,9 +187,9 @@ class SensitivitySolver:
 
         return beside.derivative(k, internal)
 
-    def _solver(self, count: int) -> BlockConjugateGradient:
+    def _solver(self, count: int) -> SeveralSolver:
         if count not in self._solvers:
-            self._solvers[count] = block_solver(self.system, count, self._tolerance, self._max_cg)
+            self._solvers[count] = several_solver(self.system, count, self._tolerance, self._max_cg)
         return self._solvers[count]
 
 
@@ -191,13 +198,13 @@ class Corrections:
 
     Parameters
     ----------
-    solver : BlockConjugateGradient
+    solver : SeveralSolver
     system : System
     tolerance : float
         Of the first solve; later ones are rough.
     """
 
-    def __init__(self, solver: BlockConjugateGradient, system: System, tolerance: float) -> None:
+    def __init__(self, solver: SeveralSolver, system: System, tolerance: float) -> None:
         self._solver, self._constrained = solver, system.model.constrained
         self._tolerance, self._rough = tolerance, max(tolerance, _ROUGH)
         self._first = True
@@ -216,8 +223,10 @@ class Corrections:
         return np.where(self._constrained, 0.0, solved)
 
 
-def block_solver(system: System, count: int, tolerance: float, max_cg: int) -> BlockConjugateGradient:
-    """A solver for a system's matrix and several right-hand sides."""
+def several_solver(system: System, count: int, tolerance: float, max_cg: int) -> SeveralSolver:
+    """A solver for a system's matrix, with what terms add to it of their own, and several right-hand sides."""
+    if system.coupled:
+        return InTurn(system, tolerance, max_cg)
     return BlockConjugateGradient(
         system.matrix, system.diagonal, count, system.precision, tolerance=tolerance, max_iterations=max_cg
     )

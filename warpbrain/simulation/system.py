@@ -441,6 +441,11 @@ class System:
         values = self.matrix.values.numpy().astype(np.float64)
         return bsr_matrix((values, self.matrix.columns.numpy(), self.matrix.offsets.numpy()))
 
+    @property
+    def coupled(self) -> bool:
+        """Whether unknowns of a term's own follow the displacement in the coming steps."""
+        return any(term.coupled for term in self._coupled)
+
     def add_coupling(self, x: wp.array, factor: float, y: wp.array) -> None:
         """Add to `y` a factor times what of `K x` is not in blocks; constrained components are left out."""
         for term in self.terms:
@@ -470,8 +475,11 @@ class System:
             self.load,
         )
 
-    def stiffness_times(self, increment: Floats) -> Floats:
-        """`K increment` [N] on every component, constrained ones included, shape (n, 3)."""
+    def stiffness_times(self, increment: Floats, k: float = 1.0, coupling: float | None = None) -> Floats:
+        """`k K increment` [N] on every component, constrained ones included, shape (n, 3).
+
+        What of `K` is not in blocks counts `coupling` times, `k` times if absent.
+        """
         self.increment.assign(increment)
         self.load.zero_()
         self._launch(
@@ -485,11 +493,12 @@ class System:
             self._flat_blocks,
             self.increment,
             self._all_components,
-            self.precision.scalar(-1.0),
+            self.precision.scalar(-k),
             self.load,
         )
-        for term in self.terms:
-            term.add_stiffness(self.increment, 1.0, self.load, self._all_components, self._all_components)
+        factor = k if coupling is None else coupling
+        for term in self.terms if factor != 0.0 else ():
+            term.add_stiffness(self.increment, factor, self.load, self._all_components, self._all_components)
         return self.load.numpy().astype(np.float64)
 
     def linear_solver(

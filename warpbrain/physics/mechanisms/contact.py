@@ -153,7 +153,7 @@ class ContactTerm(Term):
     """`Contact` on a device; a stencil is a node."""
 
     memory = ("_found", "_pressing", "_directions")
-    shapes = ("_field",)
+    lasting = ("_field",)
 
     def __init__(self, body: Body, contact: Contact) -> None:
         members = np.flatnonzero(body.mesh.node_sets[contact.nodes])

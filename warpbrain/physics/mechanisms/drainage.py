@@ -81,6 +81,8 @@ class Drainage(Mechanism):
         default=0.0,
         unit="1/Pa",
         above=-1e-30,
+        # as much as a skeleton of 10 kPa gives way
+        size=1e-4,
     )
     drained: str = parameter(
         "Node set on whose faces the fluid is free to leave; the whole surface if empty.", default="", kind="node set"
@@ -93,6 +95,8 @@ class Drainage(Mechanism):
         default=0.0,
         unit="1/(Pa s)",
         above=-1e-30,
+        # as much in 100 s
+        size=1e-6,
     )
     capillary_pressure: float = parameter(
         "Pressure at which nothing is exchanged with the blood vessels; lower under mannitol, higher in oedema.",
@@ -140,6 +144,8 @@ class DrainageTerm(Term):
         `1/(2 mu)` of each element [1/Pa], of the stabilisation.
     """
 
+    memory = ("_held", "_shape", "_beyond")
+    lasting = ("coupling", "_solver", "_change")
     coupling: Coupling
 
     def __init__(self, body: Body, mechanism: Drainage) -> None:
@@ -152,7 +158,7 @@ class DrainageTerm(Term):
         volumes = body.mesh.volumes[elements]
         self._elements = self.array(elements, int)
         self._volume = self.array(volumes, scalar)
-        self.softness = self.array(0.5 / body.shear_moduli[elements], scalar)
+        self._numbers = self.array(np.zeros(3), scalar)
         self._closed = self.array(~mechanism.open_nodes(body.mesh), scalar)
         lumped = np.bincount(self.stencils.ravel(), np.repeat(0.25 * volumes, 4), minlength=size)
         self._lumped = self.array(lumped, scalar)
@@ -161,7 +167,7 @@ class DrainageTerm(Term):
         def zeros(*shape: int, dtype: object = scalar) -> wp.array:
             return wp.zeros(shape, dtype=dtype, device=body.device)
 
-        self._storage, self._entries = zeros(count, 10), zeros(count, 10)
+        self.softness, self._storage, self._entries = zeros(count), zeros(count, 10), zeros(count, 10)
         self._element_coupling = zeros(count, 4, dtype=vec3)
         self._taken, self._held, self._diagonal = zeros(count), zeros(size), zeros(size)
         self._shape = zeros(size, dtype=vec3)
@@ -181,8 +187,7 @@ class DrainageTerm(Term):
         self._solver, self._change = solvers
         self._beyond = self._solver.x
         self._tolerance = max(1e-12, 20.0 * body.precision.epsilon)
-        self._storage_entries()
-        self._renew()
+        self.take_moduli()
 
     def _place_rows(self, size: int) -> None:
         """Sparse rows over the nodes, and who contributes to each entry: `16 e + 4 a + b` for node pairs (a, b)."""
@@ -224,12 +229,17 @@ class DrainageTerm(Term):
             scalar(self.mechanism.permeability), scalar(mass), scalar(stabilisation), scalar(flow), self._shape, out,
         )  # fmt: skip
 
-    def _storage_entries(self) -> None:
+    def take_moduli(self) -> None:
+        self.softness.assign(0.5 / self.body.shear_moduli[self._elements.numpy()])
         self._element_compliance(self.mechanism.storage, 1.0, 0.0, self._storage)
+        self._renew()
 
     def _renew(self) -> None:
-        """`A`, for the time step and the shape at the beginning of it."""
+        """`A` and the numbers, for the time step and the shape at the beginning of it."""
         steady, m = not self.coupled, self.mechanism
+        exchanged = m.exchange * (m.capillary_pressure - m.pressure)
+        source = exchanged if steady else self._h * exchanged - m.storage * m.pressure
+        self._numbers.assign([m.pressure, source, 0.0 if steady else 1.0])
         mass = m.exchange if steady else m.storage + self._h * m.exchange
         self._element_compliance(mass, 0.0 if steady else 1.0, 1.0 if steady else self._h, self._entries)
         self._launch(
@@ -241,13 +251,10 @@ class DrainageTerm(Term):
 
     def _solve(self, u: wp.array) -> None:
         """The pressure at a displacement."""
-        scalar, m, steady = self.body.precision.scalar, self.mechanism, not self.coupled
         self._launch(self._kernels.volumes, len(self.stencils), *self._geometry, u, self._taken)
-        exchanged = m.exchange * (m.capillary_pressure - m.pressure)
-        source = exchanged if steady else self._h * exchanged - m.storage * m.pressure
         self._launch(
             self._kernels.supply, len(self._held), self._corner_first, self._corners, self._taken, self._held,
-            self._lumped, self._closed, scalar(0.0 if steady else 1.0), scalar(source), self.scale, self._solver.b,
+            self._lumped, self._closed, self._numbers, self.scale, self._solver.b,
         )  # fmt: skip
         self._solver.solve(self._tolerance)
 
@@ -276,11 +283,9 @@ class DrainageTerm(Term):
 
     def advance(self, u: wp.array) -> None:
         self._solve(u)
-        scalar = self.body.precision.scalar
         self._launch(
             self._kernels.content, len(self._held), self._corner_first, self._corners, self._elements,
-            self.body.nodes, self._taken, self._storage, self._beyond, scalar(self.mechanism.pressure), self.scale,
-            self._held,
+            self.body.nodes, self._taken, self._storage, self._beyond, self._numbers, self.scale, self._held,
         )  # fmt: skip
         wp.copy(self._shape, u)
         self._renew()
@@ -289,6 +294,15 @@ class DrainageTerm(Term):
         self._held.zero_()
         self._shape.zero_()
         self._beyond.zero_()
+        self._renew()
+
+    def recall(self, remembered: tuple[wp.array, ...]) -> None:
+        super().recall(remembered)
+        self._renew()
+
+    def adopt(self, other: Term) -> None:
+        # with the other's time step too, but for the shape that this one remembers
+        super().adopt(other)
         self._renew()
 
     def augment(self, u: wp.array) -> bool:
@@ -305,8 +319,8 @@ class DrainageTerm(Term):
     # -- forces ---------------------------------------------------------------------------------------------------
 
     def _act(self, kernel: object, u: wp.array, *outputs: wp.array) -> None:
-        pressure = self.body.precision.scalar(self.mechanism.pressure)
-        self._launch(kernel, len(self.stencils), *self._geometry, self._beyond, pressure, self.scale, u, *outputs)
+        inputs = (self._beyond, self._numbers, self.scale, u)
+        self._launch(kernel, len(self.stencils), *self._geometry, *inputs, *outputs)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self._solve(u)
