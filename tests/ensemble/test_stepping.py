@@ -68,17 +68,19 @@ def test_rest_is_that_of_the_relaxation(moves: bool, device: str, precision) -> 
     model = shaken_block(LAWS["neo-hookean"], moves=moves)
     samples = samples_of(model, MODULI[:3])
     system = System(model, device, precision.name)
-    course = Resting(model, RelaxationOptions(), precision)
-    outcomes = computed(system, course, samples, 2)
-    for sample in samples:
-        alone = relax_to_rest(System(replace(model, materials=sample.materials), device, precision.name))
-        outcome = outcomes[sample.number]
-        assert not outcome.failed
-        assert outcome.residual <= alone.tolerance
-        size = np.abs(alone.u).max()
-        np.testing.assert_allclose(outcome.u, alone.u, rtol=0, atol=NEAR[precision.name] * size)
-        if precision.name == "double":
-            assert (outcome.steps, outcome.time) == (len(alone.history), alone.history[-1].time)
+    # a solve to 1e-3 can end an iteration earlier for one rounding, and then both are at rest as nearly as was asked,
+    # and not as nearly as they do the same arithmetic: that shows where more is asked
+    near = NEAR[precision.name]
+    for options, apart in ((RelaxationOptions(), max(near, 1e-7)), (RelaxationOptions(tolerance=1e-11), near)):
+        outcomes = computed(system, Resting(model, options, precision), samples, 2)
+        for sample in samples:
+            alone = relax_to_rest(System(replace(model, materials=sample.materials), device, precision.name), options)
+            outcome = outcomes[sample.number]
+            assert not outcome.failed
+            assert outcome.residual <= alone.tolerance
+            np.testing.assert_allclose(outcome.u, alone.u, rtol=0, atol=apart * np.abs(alone.u).max())
+            if precision.name == "double" and options == RelaxationOptions():
+                assert (outcome.steps, outcome.time) == (len(alone.history), alone.history[-1].time)
 
 
 @pytest.mark.parametrize("course", ["motion", "rest"])

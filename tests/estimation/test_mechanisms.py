@@ -22,6 +22,7 @@ EXAMPLES: dict[str, dict] = {
     "cavity": {"elements": "part", "pressure": 20.0, "left": 0.2},
     "compressibility": {"poisson": 0.4},
     "contact": {"nodes": "wall", "state": "lifting", "friction": 0.1},
+    "drainage": {"permeability": 1e-9, "exchange": 1e-6, "capillary_pressure": 200.0},
     "falx": {"nodes": "sheet", "stiffness": 1e5},
     "fibres": {"direction": (1.0, 0.0, 1.0), "stiffness": 500.0},
     "gravity": {"direction": (1.0, 0.0, -1.0), "density": 1000.0, "csf_level": 0.02},
@@ -69,7 +70,7 @@ def test_the_error_of_the_mesh_is_the_difference_of_two_meshes(kind: str) -> Non
     assert np.isfinite(difference.u).all() and difference.size < 0.5 * np.sqrt(np.mean(np.sum(state.u**2, axis=1)))
 
 
-@pytest.mark.parametrize("kind", ["compressibility", "contact", "pressure", "swelling"])
+@pytest.mark.parametrize("kind", ["compressibility", "contact", "drainage", "pressure", "swelling"])
 def test_derivatives_by_tissue_with_a_mechanism(kind: str) -> None:
     """A state that is not the last one has its own contacts again."""
     forward = Forward(case_with(kind), THETA, "cpu")

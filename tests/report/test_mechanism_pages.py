@@ -9,7 +9,7 @@ import pytest
 from warpbrain.cases.assuming import assume
 from warpbrain.cases.shipped import find_case
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import PLAIN, read_costs, row_of, sentences, table
+from warpbrain.report.mechanisms.cost import PLAIN, read_costs, reasons, row_of, sentences, table
 from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
 from warpbrain.report.mechanisms.index import index
 from warpbrain.report.mechanisms.page import page
@@ -74,11 +74,18 @@ def test_costs_in_words():
     kind, other = list(mechanisms())[:2]
     twice = {"plain": [10.0, 20.0, 30.0], "with": [20.0, 40.0, 45.0]}
     counts = {"plain": [4, 4], "with": [6, 6]}
-    row = {"kind": kind, "step": twice, "newton": twice, "cg_iterations": counts, "newton_iterations": counts}
+    row = {"kind": kind, "example": mechanisms()[kind].example, "step": twice, "newton": twice}
+    row |= {"cg_iterations": counts, "newton_iterations": counts}
     same = {**row, "kind": PLAIN, "step": {"plain": [1.0], "with": [1.0]}}
     costs = {"device": "a machine", "date": "2026-01-02", "rows": [same, row]}
     [line] = sentences([costs], kind)
-    assert "a machine, 2026-01-02" in line and "2.00 times" in line and "6 iterations of conjugate" in line
+    assert "a machine, 2026-01-02" in line and "2.00 times" in line and "6 iterations of the linear solver" in line
+    assert reasons([costs]) == []
+    [long] = reasons([{**costs, "rows": [{**row, "example": "another", "step": {"plain": [1.0], "with": [6.0]}}]}])
+    assert long == (
+        f"- {kind}, a machine, 2026-01-02 (`another`): 6.0 times. The linear solver takes 6 iterations for 4, and 4.0 "
+        "times as long for each."
+    )
     assert row_of(costs, other) is None and sentences([costs], other) == []
     head, _, first, second, third = table([costs], [kind, other])
     assert head.count("a machine, 2026-01-02") == 2

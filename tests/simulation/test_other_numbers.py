@@ -152,14 +152,16 @@ def test_a_captured_step_follows(device: str) -> None:
     np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-12 * np.abs(found[0]).max())
 
 
-def test_what_a_term_remembers_stays(device: str) -> None:
-    first = model_of(FIRST[-1:])
+@pytest.mark.parametrize("kind", ["drainage", "viscoelasticity"])
+def test_what_a_term_remembers_stays(kind: str, device: str) -> None:
+    [place] = [place for place, mechanism in enumerate(FIRST) if mechanism.kind == kind]
+    first = model_of(FIRST[place : place + 1])
     system = System(first, device)
     system.set_time_step(0.05)
     system.u.assign(at(system))
     system.advance()
     [remembered] = [[array.numpy().copy() for array in own] for own in system.remembered()]
-    system.set_model(replace(model_of(SECOND[-1:]), mesh=first.mesh))
+    system.set_model(replace(model_of(SECOND[place : place + 1]), mesh=first.mesh))
     for array, before in zip(system.remembered()[0], remembered, strict=True):
         np.testing.assert_array_equal(array.numpy(), before)
     assert all(np.abs(before).max() > 0.0 for before in remembered)

@@ -91,16 +91,22 @@ class Continuous:
         return size
 
 
+def smooth_parameters(mechanism: type[Mechanism]) -> dict[str, Says]:
+    """What is known of the parameters of a kind of mechanism that are numbers, by name, in the order of its fields."""
+    known = mechanism.parameters().items()
+    return {key: says for key, says in known if says.kind in (*_ONE, *_SEVERAL) and not says.method}
+
+
 def continuous(mechanism: Mechanism) -> tuple[Continuous, ...]:
     """Every number that a mechanism can be differentiated by, in the order of its fields."""
     found: list[Continuous] = []
-    for key, says in mechanism.parameters().items():
+    for key, says in smooth_parameters(type(mechanism)).items():
         value: Any = getattr(mechanism, key)
-        if value is None or says.method:
+        if value is None:
             continue
         if says.kind in _ONE:
             found.append(Continuous(mechanism.kind, key, None, says))
-        elif says.kind in _SEVERAL:
+        else:
             found += [Continuous(mechanism.kind, key, component, says) for component in range(len(value))]
     return tuple(found)
 

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.boundary import Contact, Displaced, Fixed, Forced, Pressed, Sliding
-from warpbrain.cases.case import Case, Tissue
+from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
-from warpbrain.physics.mechanism import Mechanism, Substituting
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.contact import Contact as SkullContact
 from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.simulation.assumed import with_mechanisms
@@ -78,12 +78,3 @@ def plain_model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
     except InputError as error:
         raise InputError(f"{case.path}: [tissue] {error}") from None
     return Model(mesh, materials, case.density, constrained, prescribed, loads, mechanisms, motions), nodes
-
-
-def material_of(case: Case, label: int, tissue: Tissue) -> Material:
-    """The material of a tissue, as mechanisms that say something of it have it."""
-    law, poisson, formulation = tissue.known_law, case.poisson, tissue.formulation
-    for mechanism in case.mechanisms:
-        if isinstance(mechanism, Substituting):
-            law, poisson, formulation = mechanism.substitute(label, law, poisson, formulation)
-    return Material(law, poisson, formulation)

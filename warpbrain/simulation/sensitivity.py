@@ -114,7 +114,7 @@ class SensitivitySolver:
         system = self.system
         if system.coupled:
             raise SolveError(
-                "sensitivity: fluid flows in this step, whose derivatives depend on all before it: follow them from the "
+                "sensitivity: fluid flows in this step, whose derivatives depend on all before: follow them from the "
                 "start (warpbrain.simulation.motion_sensitivity)"
             )
         system.set_load()

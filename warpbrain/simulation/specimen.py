@@ -22,14 +22,13 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.mechanism import Mechanism, Substituting
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.recordings.comparison import Comparison, Error
 from warpbrain.recordings.recording import TestRecording
+from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.history import History, history_of
-from warpbrain.simulation.model import Model
-from warpbrain.simulation.of_case import material_of
+from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
@@ -417,8 +416,7 @@ def _model(case: Case, specimen: Specimen, mesh: TetMesh) -> Model:
         constrained[1, 1] = True
     [(label, tissue)] = case.tissues.items()
     try:
-        material = material_of(case, label, tissue)
+        material = Material(tissue.known_law, case.poisson, tissue.formulation)
+        return with_mechanisms(Model(mesh, {label: material}, case.density, constrained), case.mechanisms)
     except InputError as error:
         raise InputError(f"{case.path}: [tissue.{label}] {error}") from None
-    acting: list[Mechanism] = [m for m in case.mechanisms if not isinstance(m, Substituting)]
-    return Model(mesh, {label: material}, case.density, constrained, mechanisms=acting)

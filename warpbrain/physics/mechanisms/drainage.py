@@ -106,7 +106,7 @@ class Drainage(Mechanism):
     )
     elements: str = parameter("Element set that has pores; all if empty.", default="", kind="element set")
     kind: ClassVar[str] = "drainage"
-    example: ClassVar[str] = "drainage:permeability=1e-9"
+    example: ClassVar[str] = "drainage:permeability=1e-9,exchange=1e-6,capillary_pressure=1000"
     sentence: ClassVar[str] = "Fluid in the tissue carries load at first, and flows away over minutes."
     confused_with: ClassVar[tuple[str, ...]] = ("viscoelasticity", "compressibility", "swelling")
     needs: ClassVar[tuple[str, ...]] = ("two times or more", "a change of volume, or bodies of two sizes")

@@ -8,8 +8,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from warpbrain.physics.mechanisms import mechanisms
+
 #: The row of the plain model beside itself.
 PLAIN = "plain"
+#: How many times as long as a plain step is called long, and a plain iteration of the linear solver.
+_LONG, _HARD = 3.0, 1.5
 Costs = Mapping[str, Any]
 
 
@@ -39,14 +43,42 @@ def sentences(measured: Sequence[Costs], kind: str) -> list[str]:
     for costs in measured:
         row = row_of(costs, kind)
         if row is not None:
-            cg = [statistics.median(row["cg_iterations"][which]) for which in ("plain", "with")]
-            newton = [statistics.median(row["newton_iterations"][which]) for which in ("plain", "with")]
+            linear, newton = _medians(row["cg_iterations"]), _medians(row["newton_iterations"])
             lines.append(
-                f"- {machine(costs)}: a time step takes {ratio(row['step']):.2f} times that of the plain model "
-                f"({cg[1]:g} iterations of conjugate gradients for {cg[0]:g}), an iteration of Newton's method "
-                f"{ratio(row['newton']):.2f} times ({newton[1]:g} iterations to equilibrium for {newton[0]:g})."
+                f"- {machine(costs)}{_other_example(row)}: a time step takes {ratio(row['step']):.2f} times that of "
+                f"the plain model ({linear[1]:g} iterations of the linear solver for {linear[0]:g}), an iteration "
+                f"of Newton's method {ratio(row['newton']):.2f} times ({newton[1]:g} iterations to equilibrium for "
+                f"{newton[0]:g})."
             )
     return lines
+
+
+def reasons(measured: Sequence[Costs]) -> list[str]:
+    """Why steps with some mechanisms take long, a line a machine and mechanism; none if none does."""
+    lines = []
+    for costs in measured:
+        for row in costs["rows"]:
+            longer = ratio(row["step"])
+            if longer < _LONG:
+                continue
+            plain, taken = _medians(row["cg_iterations"])
+            line = f"- {row['kind']}, {machine(costs)}{_other_example(row)}: {longer:.1f} times. "
+            line += f"The linear solver takes {taken:g} iterations for {plain:g}"
+            each = longer * plain / taken
+            line += f", and {each:.1f} times as long for each" if each > _HARD else ""
+            lines.append(f"{line}.")
+    return lines
+
+
+def _medians(samples: Mapping[str, Sequence[float]]) -> tuple[float, float]:
+    """Without and with a mechanism."""
+    return statistics.median(samples["plain"]), statistics.median(samples["with"])
+
+
+def _other_example(row: Mapping[str, Any]) -> str:
+    """What was measured, where that is not the mechanism's present example."""
+    known = mechanisms().get(row["kind"])
+    return f" (`{row['example']}`)" if known is not None and row["example"] != known.example else ""
 
 
 def table(measured: Sequence[Costs], kinds: Sequence[str]) -> list[str]:

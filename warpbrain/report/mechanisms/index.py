@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import Costs, machine, ratio, row_of, table
+from warpbrain.report.mechanisms.cost import Costs, machine, ratio, reasons, row_of, table
 from warpbrain.report.mechanisms.effect import Effect
 
 _HEAD = """# Mechanisms
@@ -24,7 +24,8 @@ warpbrain run --case 0529 --with gravity:level=60 --with swelling:amount=-3
 ```
 
 Each is one file of [physics/mechanisms](../../warpbrain/physics/mechanisms); these pages are made from the files by
-`python docs/make_mechanisms.py`.
+`python docs/make_mechanisms.py`. How states and motions are differentiated by their numbers:
+[solvers.md](../solvers.md#derivatives).
 """
 
 _EFFECT = """The effect is the largest that its example has on a displacement of the phantom under a light load,
@@ -41,7 +42,9 @@ Each mechanism's example on `phantom-loaded` (coarse mesh, grey and white matter
 A time step is 1 ms, linearised, conjugate gradients to 1e-6; an iteration of Newton's method is that of an equilibrium,
 its line search included. Steps with and without take turns in one process, in processor time on a CPU. Each number is
 the median of the ratios of neighbours in time; that of the plain model beside itself says how far to trust the others.
-A mechanism that makes the matrix worse conditioned costs iterations of conjugate gradients, which is in these numbers.
+A mechanism that makes the matrix worse conditioned, as a stiff membrane does, costs iterations of conjugate gradients,
+which is in these numbers; where fluid flows MINRES takes their place, for displacement and pressure together
+([solvers.md](../solvers.md#linear-systems)).
 
 What is off is not there: a model without mechanisms has no terms to sum, and each phase of its step takes as long as
 before there were mechanisms ([benchmarks.md](../benchmarks.md)).
@@ -71,4 +74,6 @@ def index(effects: Mapping[str, Effect], measured: Sequence[Costs]) -> str:
             cost,
         ]
         lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join([*lines, "", _EFFECT.format(where=where), _COST, *table(measured, list(mechanisms())), ""])
+    lines += ["", _EFFECT.format(where=where), _COST, *table(measured, list(mechanisms())), ""]
+    long = reasons(measured)
+    return "\n".join([*lines, *(["What makes steps long:", "", *long, ""] if long else [])])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import sys
 
+from warpbrain.physics.continuous import smooth_parameters
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Mechanism
 from warpbrain.physics.mechanisms import mechanisms
@@ -30,6 +31,7 @@ def page(kind: str, effect: Effect, costs: list[str]) -> str:
     lines += ["## Parameters", "", *_table(mechanism), ""]
     lines += ["## What it does to the phantom", "", *_picture(mechanism, effect), ""]
     lines += ["## What it is taken for", "", *confusions(mechanism), ""]
+    lines += ["## Derivatives", "", *derivatives(mechanism), ""]
     lines += ["## Cost", "", *(costs or ["Not measured yet."]), ""]
     lines += [f"[{source.rsplit('/', 1)[1]}]({source}), [all mechanisms](index.md)", ""]
     return "\n".join(lines)
@@ -47,6 +49,25 @@ def confusions(mechanism: type[Mechanism]) -> list[str]:
     if mechanism.needs:
         return [*lines, f"Told apart by {', '.join(mechanism.needs)}."]
     return [*lines, *(["One deformed state tells them apart."] if others else [])]
+
+
+def derivatives(mechanism: type[Mechanism]) -> list[str]:
+    """How a state is differentiated by its parameters: by differences along the way, or not, where one switches."""
+    lines = []
+    numbers = [f"`{key}`" for key in smooth_parameters(mechanism)]
+    if numbers:
+        lines.append(
+            f"By {', '.join(numbers)}: the implicit function theorem, with five-point differences of what it does "
+            "([solvers](../solvers.md#derivatives))."
+        )
+    for key, says in mechanism.parameters().items():
+        if says.choices:
+            lines.append(
+                f"`{key}` is one of {', '.join(says.choices)}, and nothing between them: a secant, not a derivative."
+            )
+    if mechanism.switches:
+        lines.append("It is there or not: a secant, the difference that it makes, not a derivative.")
+    return lines
 
 
 def _table(mechanism: type[Mechanism]) -> list[str]:
