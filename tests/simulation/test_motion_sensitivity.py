@@ -19,9 +19,10 @@ from warpbrain.physics.mechanisms.traction import Traction
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.dynamics import Simulator
-from warpbrain.simulation.equilibrium import solve_equilibrium
+from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Damping, Material, Model
 from warpbrain.simulation.motion_sensitivity import MotionSensitivity, follow
+from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.sensitivity import sensitivities
 from warpbrain.simulation.system import System
 
@@ -124,6 +125,25 @@ def test_against_motions_beside(
         total = total / (12.0 * 2e-3 * scales[k])
         for at in range(2):
             assert relative(found[at, k], total[at]) < 1e-6
+
+
+def test_over_minutes_they_are_those_of_equilibria_in_a_row(device: str) -> None:
+    """Without inertia, by another solver: Newton's method with a line search, a step of fluid and stress at a time."""
+    still = block()
+    still = replace(still, prescribed=np.zeros_like(still.prescribed), density=1e-6, damping=Damping(0.0, 0.0))
+    models, theta, scales = by_numbers(still, (SLOW_FLUID, SLOW, Pressure(nodes="wall", value=80.0)))
+    times = [1.0, 2.0, 3.0, 4.0]
+    found = follow(simulator_of(models(theta), 8, 1.0, device), models, theta, times, scales)[-1]
+    system = System(models(theta), device)
+    options = EquilibriumOptions(tolerance=1e-12, cg_tolerance=1e-3)
+    # along one direction that has all of them in it
+    direction = scales * np.random.default_rng(0).normal(size=len(theta))
+    total = np.zeros(())
+    for distance, weight in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0)):
+        system.set_model(models(theta + 1e-3 * distance * direction))
+        *_, last = follow_slowly(system, times, options)
+        total = total + weight * last.state.u / 12e-3
+    assert relative(np.tensordot(direction, found, 1), total) < 1e-6
 
 
 def test_what_has_relaxed_is_the_equilibrium(device: str) -> None:
