@@ -10,8 +10,8 @@
    may act where a case does not declare it (`proposals`).
 
 Its derivatives by its parameters are nobody's work: `warpbrain.simulation.beside` differences what it does. For that a
-`Following` one's term names the arrays of what it remembers (`Term.memory`) and takes the body's moduli in
-`Term.take_moduli`, if it has either.
+`Following` one's term names the arrays of what it remembers (`Term.memory`), keeps solvers and rigid shapes as they are
+(`Term.lasting`) and takes the body's moduli in `Term.take_moduli`, if it has any of these.
 
 Whoever lists mechanisms (reading, writing, simulation, diagnosis, docs) walks the registry,
 `warpbrain.physics.mechanisms`.
