@@ -32,6 +32,8 @@ Floats = NDArray[np.float64]
 
 #: How much larger an error of registration may be in the first round.
 _ROUGHLY = 5.0
+#: How often an undeclared noise is found anew without the gross errors that it shows.
+_NOISE_ROUNDS = 3
 #: How far tissue and field may go from the middle of their prior in the first round [standard deviations].
 _FARTHEST = 1.5
 
@@ -185,11 +187,18 @@ class BaseFinder:
         z[nuisances.part("stiffness field")] = state.hypothesis.field
         z[nuisances.part("registration")] = self.states.motion / nuisances.registration_sd
         residual = sensors.residual - nuisances.mean + nuisances.columns @ z
-        noise = known_sigma(sensors, residual, nuisances.columns, np.column_stack(flexible))
         anything = _any_force(flexible, residual, at)
-        looser = explanation_of(sensors, noise, np.column_stack([nuisances.columns, anything]))
-        kappa = max(1.15, looser.best_kappa(looser.whitened(residual)))
-        aside = gross_errors(sensors, looser, kappa, residual)
+        loose = np.column_stack([nuisances.columns, anything])
+        aside = np.zeros(len(sensors), dtype=bool)
+        for _ in range(_NOISE_ROUNDS):
+            noise = known_sigma(sensors, residual, nuisances.columns, np.column_stack(flexible), aside)
+            looser = explanation_of(sensors, np.where(aside, ASIDE * noise, noise), loose)
+            kappa = max(1.15, looser.best_kappa(looser.whitened(residual)))
+            found = gross_errors(sensors, explanation_of(sensors, noise, loose), kappa, residual)
+            if not np.any(found & ~aside) or not np.isnan(sensors.sigma).any():
+                aside = found
+                break
+            aside = found
         sigma = np.where(aside, ASIDE * noise, noise)
         explanation = explanation_of(sensors, sigma, nuisances.columns)
         return Base(

@@ -39,6 +39,8 @@ Floats = NDArray[np.float64]
 _REFITTED, _BEHIND = 3, 12.0
 #: How many patterns a mechanism that is scanned competes with, and one that is not.
 _TRIES_SCANNED, _TRIES = 12, 2
+#: Width of the interval of the held-out gain that a name needs to be above zero.
+_LIKELY = 0.8
 
 
 class Diagnosing:
@@ -166,10 +168,12 @@ class Diagnosing:
             )
         )
         best = ranking[0].kind if ranking[0].kind in fits else next((r.kind for r in ranking if r.kind in fits), "none")
-        gain, placebo_p, adequacy_p, size = (0.0, 0.0, 0.0), 1.0, 1.0, 0.0
+        gain = likely = (0.0, 0.0, 0.0)
+        placebo_p, adequacy_p, size = 1.0, 1.0, 0.0
         ceiling = self._ceiling(base, held_out, linear, columns)
         if best != "none" and best in predicted:
             gain = predicted[best].improvement(without, rng)
+            likely = predicted[best].improvement(without, rng, _LIKELY)
             scanned = len(candidates.of_kind[best]) > 20
             freedom = fits[best].effects[0].columns.shape[1]
             noise = float(np.median(base.noise[sensors.is_displacement]))
@@ -180,7 +184,7 @@ class Diagnosing:
             placebo_p = float((1 + np.sum(patterns <= predicted[best].rmse)) / (1 + len(patterns)))
             adequacy_p = self._adequacy(base, fits[best], candidates, rng)
             size = float(np.abs(fits[best].coefficients[0]).max())
-        verdict = decide(Evidence(options.alpha, p_value, ranking, gain, placebo_p, adequacy_p, size))
+        verdict = decide(Evidence(options.alpha, p_value, ranking, likely, placebo_p, adequacy_p, size))
         named = tuple(r for r in ranking if r.kind in verdict.kinds) if "named" in verdict.verdict else ()
         explained = self._explained(fits, named)
         fit = self._fit(base, fits, without, held_out, predicted, named, gain, placebo_p, ceiling)
@@ -218,7 +222,8 @@ class Diagnosing:
         screened = dict(zip(screen.kinds, screen.log_factors[:, 0].tolist(), strict=True))
         if "none" not in fits:
             return screened
-        none = fits["none"].log_evidence
+        # a search that ended too early must not make everything else look better
+        none = max(fits["none"].log_evidence, float(screen.none[0]))
         found: dict[str, float] = {}
         for kind, value in screened.items():
             if kind in fits:

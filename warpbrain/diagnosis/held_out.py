@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Blocks, and draws of the bootstrap over them.
-_BLOCKS, _DRAWS = 12, 2000
+_BLOCKS, _DRAWS = 24, 2000
 
 
 def spatial_blocks(sensors: Sensors) -> Ints:
@@ -52,14 +52,14 @@ class Predicted:
         """Root mean square of the rows [m]."""
         return float(np.sqrt(np.mean(self.errors**2)))
 
-    def improvement(self, over: Predicted, rng: np.random.Generator) -> tuple[float, float, float]:
-        """Part of another's mean square error that is gone, and its 95 % interval (bootstrap over blocks)."""
+    def improvement(self, over: Predicted, rng: np.random.Generator, sure: float = 0.95) -> tuple[float, float, float]:
+        """Part of another's root mean square error that is gone, and its interval (bootstrap over blocks)."""
         names = np.unique(self.blocks)
         own = np.array([np.sum(self.errors[self.blocks == b] ** 2) for b in names])
         other = np.array([np.sum(over.errors[over.blocks == b] ** 2) for b in names])
         chosen = rng.integers(len(names), size=(_DRAWS, len(names)))
         parts = 1.0 - np.sqrt(own[chosen].sum(axis=1) / other[chosen].sum(axis=1))
-        low, high = np.quantile(parts, [0.025, 0.975])
+        low, high = np.quantile(parts, [0.5 - 0.5 * sure, 0.5 + 0.5 * sure])
         return float(1.0 - np.sqrt(own.sum() / other.sum())), float(low), float(high)
 
 

@@ -29,7 +29,9 @@ Floats = NDArray[np.float64]
 #: Growth by which the derivative of the forces of growing tissue is taken.
 _GROWTH = 1e-4
 #: Stiffness of a wall relative to the stiffest node.
-_WALL = 100.0
+_WALL = 10.0
+#: Relative residual of what lets go.
+_RELEASE = 1e-4
 
 
 class Linearisation:
@@ -102,7 +104,7 @@ class Linearisation:
         lifts : bool
         """
         from scipy.sparse import coo_matrix
-        from scipy.sparse.linalg import splu
+        from scipy.sparse.linalg import LinearOperator, cg
 
         mesh = self.system.model.mesh
         members = np.flatnonzero(patch)
@@ -120,11 +122,21 @@ class Linearisation:
         free.reshape(-1, 3)[members] = True
         load = np.zeros(len(free))
         load.reshape(-1, 3)[members] = -self.reactions[members]
-        K = (self._K + wall)[free][:, free].tocsc()
-        options = {"SymmetricMode": True}
-        factors = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        K = (self._K + wall)[free][:, free].tocsr()
+        # what was free before is solved with the factors that there are; few iterations do for the rest
+        inner = self._free[free]
+        diagonal = K.diagonal()
+
+        def precondition(r: Floats) -> Floats:
+            z = np.asarray(r / diagonal)
+            z[inner] = self._factors.solve(np.ascontiguousarray(r[inner]))
+            return z
+
         du = np.zeros(len(free))
-        du[free] = factors.solve(load[free])
+        approximate = LinearOperator(K.shape, precondition)
+        du[free], info = cg(K, load[free], rtol=_RELEASE, maxiter=300, M=approximate)
+        if info:
+            raise SolveError(f"letting go of {len(members)} nodes: conjugate gradients did not converge")
         dR = np.where(free, 0.0, self._K @ du)
         return np.asarray(self.sensors.by_displacement @ du + self.sensors.by_reactions @ dR)
 

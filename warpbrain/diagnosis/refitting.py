@@ -204,6 +204,15 @@ class Refitting:
         q = self._U.shape[1]
         state, residual = self._try(effects, z, near)
         best = self._objective(residual, z, kappa)
+        # far from the base the linear model may have gone too far
+        base = self._at_base(z)
+        for part in (0.5, 0.0) if anew >= 0 else ():
+            between = base + part * (z - base)
+            beside, left = self._try(effects, between, near)
+            value = self._objective(left, between, kappa)
+            if value >= best:
+                break
+            state, residual, z, best = beside, left, between, value
         converged = False
         for iteration in range(_ITERATIONS):
             if iteration == anew and effects:
@@ -232,6 +241,14 @@ class Refitting:
             if converged:
                 break
         return state, z, residual, columns, converged
+
+    def _at_base(self, z: Floats) -> Floats:
+        """The same coordinates, but with tissue and field of the base."""
+        found = z.copy()
+        known = self.coordinates_of(self.start.hypothesis)
+        for part in (self._tissue, self._field):
+            found[part] = known[part]
+        return found
 
     def _limited(self, z: Floats) -> Floats:
         found = z.copy()

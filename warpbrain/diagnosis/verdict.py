@@ -46,7 +46,7 @@ class Evidence:
     ranking : tuple of Ranked
         The most probable first.
     gain : (part, low, high)
-        Of the held-out error by the most probable one.
+        Of the held-out error by the most probable one, with its 80 % interval.
     placebo_p, adequacy_p : float
         Of it.
     size : float

@@ -95,7 +95,7 @@ class Viscoelasticity(Mechanism):
             def left(time: float, relaxation: float = relaxation) -> float:
                 return math.exp(-time / relaxation)
 
-            found.append(Proposal(branch, np.zeros(1), np.ones(1), history=left, region="all tissue"))
+            found.append(Proposal(branch, np.zeros(1), np.full(1, 2.0), history=left, region="all tissue"))
         return found
 
     def bind(self, body: Body) -> "ViscoelasticTerm":
