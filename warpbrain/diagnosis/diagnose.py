@@ -18,7 +18,7 @@ from warpbrain.diagnosis.confounding import SEEN, Gram
 from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
 from warpbrain.diagnosis.evidence import Inner, kappa_log_prior
 from warpbrain.diagnosis.flexible import SCALES
-from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo
+from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo, scattered_blocks, spatial_blocks
 from warpbrain.diagnosis.locating import ScoreMap, score_map
 from warpbrain.diagnosis.measuring import next_measurements
 from warpbrain.diagnosis.observable import require_observable
@@ -152,11 +152,14 @@ class Diagnosing:
         sensors = base.at.sensors
         log_evidence = self._log_evidence(base, candidates, screen, fits)
         chances = probabilities(log_evidence, candidates.alternatives)
-        held_out = HeldOut(sensors, base.sigma, ~base.aside)
+        regions = HeldOut(sensors, base.sigma, ~base.aside, spatial_blocks(sensors))
+        scattered = HeldOut(sensors, base.sigma, ~base.aside, scattered_blocks(sensors))
         none = fits.get("none")
         linear, columns = (base.residual, base.nuisances.columns) if none is None else (none.linear, none.columns)
-        without = held_out.predict(linear, columns)
-        predicted = {kind: held_out.predict(fit.linear, fit.columns) for kind, fit in fits.items() if kind != "none"}
+        ways = {kind: scattered if _is_local(fit) else regions for kind, fit in fits.items()}
+        without = {way: way.predict(linear, columns) for way in (regions, scattered)}
+        predicted = {kind: ways[kind].predict(f.linear, f.columns) for kind, f in fits.items() if kind != "none"}
+        beside = {kind: without[ways[kind]] for kind in fits}
         gram = Gram(base.explanation, screening.stack, kappa)
         ranking = tuple(
             sorted(
@@ -170,15 +173,16 @@ class Diagnosing:
         best = ranking[0].kind if ranking[0].kind in fits else next((r.kind for r in ranking if r.kind in fits), "none")
         gain = likely = (0.0, 0.0, 0.0)
         placebo_p, adequacy_p, size = 1.0, 1.0, 0.0
-        ceiling = self._ceiling(base, held_out, linear, columns)
+        way = ways.get(best, regions)
+        ceiling = self._ceiling(base, way, linear, columns)
         if best != "none" and best in predicted:
-            gain = predicted[best].improvement(without, rng)
-            likely = predicted[best].improvement(without, rng, _LIKELY)
+            gain = predicted[best].improvement(without[way], rng)
+            likely = predicted[best].improvement(without[way], rng, _LIKELY)
             scanned = len(candidates.of_kind[best]) > 20
             freedom = fits[best].effects[0].columns.shape[1]
             noise = float(np.median(base.noise[sensors.is_displacement]))
             patterns = placebo(
-                held_out, linear, columns, base.flexible[-1], freedom,
+                way, linear, columns, base.flexible[-1], freedom,
                 _TRIES_SCANNED if scanned else _TRIES, 4.0 * noise, rng,
             )  # fmt: skip
             placebo_p = float((1 + np.sum(patterns <= predicted[best].rmse)) / (1 + len(patterns)))
@@ -187,7 +191,7 @@ class Diagnosing:
         verdict = decide(Evidence(options.alpha, p_value, ranking, likely, placebo_p, adequacy_p, size))
         named = tuple(r for r in ranking if r.kind in verdict.kinds) if "named" in verdict.verdict else ()
         explained = self._explained(fits, named)
-        fit = self._fit(base, fits, without, held_out, predicted, named, gain, placebo_p, ceiling)
+        fit = self._fit(base, fits, without[way], predicted, named, gain, placebo_p, ceiling)
         smallest = self._smallest(candidates, gram)
         physical = [r.kind for r in ranking if r.physics and r.kind in candidates.of_kind][:2]
         measurements = next_measurements(base, candidates, screening, screen, physical, fits, kappa)
@@ -267,7 +271,7 @@ class Diagnosing:
         chance: float,
         gram: Gram,
         predicted: dict[str, Predicted],
-        without: Predicted,
+        without: dict[str, Predicted],
     ) -> Ranked:
         from scipy.special import softmax
 
@@ -285,7 +289,7 @@ class Diagnosing:
             z, covariance = inner.coefficients(gram.kappa, number)
         d = base.explanation.detectability(own[:, 0] + own[:, 1:] @ z, gram.kappa)
         centre, radius = _place(candidates, screen, kind)
-        change = predicted[kind].rmse - without.rmse if kind in predicted else None
+        change = predicted[kind].rmse - without[kind].rmse if kind in predicted else None
         why = "" if kind in fits else "less probable than what was refitted"
         own_places = candidates.of_kind[kind]
         scanned = [candidates.effects[k] for k in own_places.tolist()]
@@ -333,7 +337,6 @@ class Diagnosing:
         base: Base,
         fits: dict[str, Refit],
         without: Predicted,
-        held_out: HeldOut,
         predicted: dict[str, Predicted],
         named: tuple[Ranked, ...],
         gain: tuple[float, float, float],
@@ -421,3 +424,8 @@ def _place(candidates: Candidates, screen: Screen, kind: str) -> tuple[Floats | 
     order = np.argsort(apart)
     at = min(int(np.searchsorted(np.cumsum(weights[order]), 0.9)), len(order) - 1)
     return centre, max(float(apart[order][at]), float(best.radius or 0.0))
+
+
+def _is_local(fit: Refit) -> bool:
+    """Whether what was fitted acts in one place."""
+    return any(effect.proposed.centre is not None for effect in fit.effects)

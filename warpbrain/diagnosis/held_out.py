@@ -1,7 +1,8 @@
 """What a hypothesis predicts of points that it was not fitted to.
 
-Points are put into spatial blocks before anything is fitted; each block is predicted from all others. Only mechanics
-predicts: the means of the nuisances and of the mechanism given the rest, no interpolation of residuals.
+Points are put into blocks before anything is fitted; each block is predicted from all others. Blocks are regions. What
+acts in one place only cannot be predicted from everywhere else: for that, points are held out here and there. Only
+mechanics predicts: the means of the nuisances and of the mechanism given the rest, no interpolation of residuals.
 """
 
 from __future__ import annotations
@@ -31,6 +32,11 @@ def spatial_blocks(sensors: Sensors) -> Ints:
     found[rows] = np.argmin(np.linalg.norm(where[:, None] - where[order][None], axis=2), axis=1)
     found[~rows] = len(order)
     return found
+
+
+def scattered_blocks(sensors: Sensors) -> Ints:
+    """Block (n,) of each row: points here and there, by their numbers."""
+    return sensors.groups % _BLOCKS
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +79,11 @@ class HeldOut:
         Noise of each row; rows that are set aside have a very large one.
     counted : (n,) bool array
         Rows that errors are counted of.
+    blocks : (n,) int array
     """
 
-    def __init__(self, sensors: Sensors, sigma: Floats, counted: NDArray[np.bool_]) -> None:
-        self.blocks = spatial_blocks(sensors)
+    def __init__(self, sensors: Sensors, sigma: Floats, counted: NDArray[np.bool_], blocks: Ints) -> None:
+        self.blocks = blocks
         self.sigma = sigma
         self._counted = counted & sensors.is_displacement
 
