@@ -164,7 +164,7 @@ class Diagnosing:
         ranking = tuple(
             sorted(
                 (
-                    self._ranked(kind, base, candidates, screen, fits, value, chances[kind], gram, predicted, without)
+                    self._ranked(kind, base, candidates, screen, fits, value, chances[kind], gram, predicted, beside)
                     for kind, value in log_evidence.items()
                 ),
                 key=lambda ranked: -ranked.probability,
