@@ -60,6 +60,7 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.diagnosis.diagnose import Diagnosing
     from warpbrain.report.diagnosis.description import describe_diagnosis
     from warpbrain.report.diagnosis.files import write_explained, write_map
+    from warpbrain.report.diagnosis.points import write_points
     from warpbrain.report.diagnosis.text import diagnosis_lines
     from warpbrain.report.files import write_summary
     from warpbrain.simulation.system import find_device
@@ -83,7 +84,8 @@ def _run(options: argparse.Namespace) -> None:
     said = describe_diagnosis(found, asked, device.alias)
     say("", *diagnosis_lines(said), sep="\n")
     write_map(out / "map.vtu", found)
-    written = ["map.vtu"]
+    write_points(out / "points.csv", found)
+    written = ["map.vtu", "points.csv"]
     if found.explained is not None:
         write_explained(out / "explained", found.explained)
         written.append("explained")

@@ -173,6 +173,7 @@ class Diagnosing:
         best = ranking[0].kind if ranking[0].kind in fits else next((r.kind for r in ranking if r.kind in fits), "none")
         gain = likely = (0.0, 0.0, 0.0)
         placebo_p, adequacy_p, size = 1.0, 1.0, 0.0
+        band = None
         way = ways.get(best, regions)
         ceiling = self._ceiling(base, way, linear, columns)
         if best != "none" and best in predicted:
@@ -185,13 +186,14 @@ class Diagnosing:
                 way, linear, columns, base.flexible[-1], freedom,
                 _TRIES_SCANNED if scanned else _TRIES, 4.0 * noise, rng,
             )  # fmt: skip
+            band = (float(np.quantile(patterns, 0.05)), float(np.quantile(patterns, 0.95)))
             placebo_p = float((1 + np.sum(patterns <= predicted[best].rmse)) / (1 + len(patterns)))
             adequacy_p = self._adequacy(base, fits[best], candidates, rng)
             size = float(np.abs(fits[best].coefficients[0]).max())
         verdict = decide(Evidence(options.alpha, p_value, ranking, likely, placebo_p, adequacy_p, size))
         named = tuple(r for r in ranking if r.kind in verdict.kinds) if "named" in verdict.verdict else ()
         explained = self._explained(fits, named)
-        fit = self._fit(base, fits, without[way], predicted, named, gain, placebo_p, ceiling)
+        fit = self._fit(base, fits, without[way], predicted, named, gain, placebo_p, band, ceiling)
         smallest = self._smallest(candidates, gram)
         physical = [r.kind for r in ranking if r.physics and r.kind in candidates.of_kind][:2]
         measurements = next_measurements(base, candidates, screening, screen, physical, fits, kappa)
@@ -207,6 +209,7 @@ class Diagnosing:
             where,
             base,
             fits,
+            {"none": without[way], **predicted},
             explained,
             smallest,
             {},
@@ -341,6 +344,7 @@ class Diagnosing:
         named: tuple[Ranked, ...],
         gain: tuple[float, float, float],
         placebo_p: float,
+        band: tuple[float, float] | None,
         ceiling: float,
     ) -> Fit:
         rows = base.at.sensors.is_displacement & ~base.aside
@@ -353,7 +357,14 @@ class Diagnosing:
             explained = (float(np.sqrt(np.mean(own.residual[rows] ** 2))), predicted[named[0].kind].rmse)
             improvement, chance = gain, placebo_p
         return Fit(
-            (raw, raw), (inside, without.rmse), explained, improvement, chance, ceiling, self._check(base, fits, named)
+            (raw, raw),
+            (inside, without.rmse),
+            explained,
+            improvement,
+            chance,
+            band,
+            ceiling,
+            self._check(base, fits, named),
         )
 
     def _check(self, base: Base, fits: dict[str, Refit], named: tuple[Ranked, ...]) -> tuple[float, ...] | None:

@@ -48,10 +48,13 @@ class Predicted:
     errors : (n,) array
         What was recorded less what was predicted from the other blocks [m]; of displacements.
     blocks : (n,) int array
+    rows : (n,) int array
+        Of the sensors.
     """
 
     errors: Floats
     blocks: Ints
+    rows: Ints
 
     @property
     def rmse(self) -> float:
@@ -106,7 +109,7 @@ class HeldOut:
             own = self.blocks == block
             z = cho_solve(cho_factor(whole - W[own].T @ W[own], check_finite=False), right - W[own].T @ w[own])
             errors[own] = residual[own] - columns[own] @ z
-        return Predicted(errors[self._counted], self.blocks[self._counted])
+        return Predicted(errors[self._counted], self.blocks[self._counted], np.flatnonzero(self._counted))
 
 
 def placebo(

@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 
 #: A force is detectable if it is found with this probability at the level of the map.
 POWER = 0.9
+#: The data are blind where a force must be so many times larger than where they see best.
+BLIND = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,11 @@ class ScoreMap:
     def significant(self) -> bool:
         """Whether the largest score is above the threshold."""
         return bool(self.scores[self.best] > self.threshold)
+
+    @property
+    def blind_above(self) -> float:
+        """Force [N]: where no smaller one would be found, the data cannot see."""
+        return BLIND * float(self.detectable.min())
 
     @property
     def centre(self) -> Floats:

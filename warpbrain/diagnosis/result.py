@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.base import Base
+from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.refitting import Refit
 
@@ -128,6 +129,8 @@ class Fit:
         Of the refitted case's held-out error that is gone, with its 95 % interval.
     placebo_p : float or None
         Probability that a pattern that means nothing does as well.
+    placebo : (low, high) or None
+        Held-out errors between which nine of ten such patterns are.
     ceiling : float or None
         Held-out error with any smooth force.
     check : tuple of float, or None
@@ -139,6 +142,7 @@ class Fit:
     explained: tuple[float, float] | None
     improvement: tuple[float, float, float] | None
     placebo_p: float | None
+    placebo: tuple[float, float] | None
     ceiling: float | None
     check: tuple[float, ...] | None = None
 
@@ -166,6 +170,8 @@ class Diagnosis:
     base : Base
     fits : dict of str to Refit
         By kind; ``"none"`` without any.
+    held_out : dict of str to Predicted
+        What each of these predicts of points that it was not fitted to.
     explained : Case or None
         The case with what was named, ready to run.
     smallest : dict of str to Smallest
@@ -187,6 +193,7 @@ class Diagnosis:
     map: ScoreMap
     base: Base
     fits: dict[str, Refit]
+    held_out: dict[str, Predicted]
     explained: Case | None
     smallest: dict[str, Smallest]
     confusion: dict[str, Any]

@@ -26,6 +26,8 @@ class Sensors:
     ----------
     residual : (n,) array
         What was recorded less what was computed [m] or [N].
+    computed : (n,) array
+        What was computed; of surfaces the displacement along their normals.
     by_displacement, by_reactions : (n, 3 N) SciPy CSR
         Derivatives of what was computed by displacement and reactions.
     rigid : (n, 6) array
@@ -47,6 +49,7 @@ class Sensors:
     """
 
     residual: Floats
+    computed: Floats
     by_displacement: Any
     by_reactions: Any
     rigid: Floats
@@ -76,6 +79,7 @@ def sensors_at(instants: Sequence[Instant], centre: Floats) -> Sensors:
     from scipy.sparse import vstack
 
     parts = [one for time, observations, u, R in instants for one in _rows(time, observations, u, R, centre)]
+    states = [(u, R) for _, observations, u, R in instants for _ in observations.each]
     first = np.cumsum([0, *(len(part.values) for _, _, part in parts)])
     sizes = [part.values.size for _, _, part in parts]
     repeat = [one.size for _, one, _ in parts]
@@ -86,6 +90,12 @@ def sensors_at(instants: Sequence[Instant], centre: Floats) -> Sensors:
     numbers = [start + np.arange(len(part.values)) for start, (_, _, part) in zip(first, parts, strict=False)]
     return Sensors(
         np.concatenate([part.values.ravel() for _, _, part in parts]),
+        np.concatenate(
+            [
+                part.by_displacement @ u.ravel() + part.by_reactions @ R.ravel()
+                for (_, _, part), (u, R) in zip(parts, states, strict=True)
+            ]
+        ),
         vstack([part.by_displacement for _, _, part in parts]).tocsr(),
         vstack([part.by_reactions for _, _, part in parts]).tocsr(),
         rigid,
@@ -114,6 +124,7 @@ def tracked_points(mesh: TetMesh, points: Floats, centre: Floats) -> Sensors:
     by_displacement = kron(matrix, eye(3), format="csr")
     count = 3 * len(points)
     return Sensors(
+        np.zeros(count),
         np.zeros(count),
         by_displacement,
         csr_matrix(by_displacement.shape),

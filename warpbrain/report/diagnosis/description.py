@@ -31,6 +31,14 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
         },
         "confusion": found.confusion,
         "fit": _fit(found),
+        "map": {
+            "threshold": found.map.threshold,
+            "largest": float(found.map.scores.max()),
+            "patch_m": found.map.length,
+            "blind_above_n": found.map.blind_above,
+            "places": len(found.map.sites),
+            "significant": found.map.significant,
+        },
         "assumptions": list(found.assumptions),
         "remarks": list(found.remarks),
         "case": {"name": found.case.name, "title": found.case.title, "origin": found.case.origin},
@@ -121,4 +129,5 @@ def _fit(found: Diagnosis) -> dict[str, Any]:
         if improvement is None
         else {"part": improvement[0], "interval_95": [improvement[1], improvement[2]]},
         "placebo_p": fit.placebo_p,
+        "placebo_heldout_rmse_m": None if fit.placebo is None else list(fit.placebo),
     }

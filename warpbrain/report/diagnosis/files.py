@@ -19,7 +19,7 @@ def write_map(path: Path, found: Diagnosis) -> None:
 
     Point arrays: ``score`` (chi-squared of three degrees of freedom of the nearest place), ``significant`` (above the
     threshold of all places), ``region`` (cannot be told from the best place), ``detectable_force`` [mN] and
-    ``displacement`` of the base state [mm].
+    ``blind`` (no force of the size that is seen elsewhere would be), ``displacement`` of the base state [mm].
     """
     import meshio
     from scipy.spatial import cKDTree
@@ -35,6 +35,7 @@ def write_map(path: Path, found: Diagnosis) -> None:
             "significant": (scores > where.threshold).astype(np.uint8),
             "region": (where.region[nearest] & where.significant).astype(np.uint8),
             "detectable_force": 1000.0 * where.detectable[nearest],
+            "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
             "displacement": found.base.at.u * MILLIMETRES,
         },
         cell_data={"tissue": [mesh.tissue]},

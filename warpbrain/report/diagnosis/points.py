@@ -1,0 +1,79 @@
+"""Everything that was recorded beside what was computed of it, as a table: what the figures of a report are drawn from."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.atomic import whole_file
+from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.report.files import MILLIMETRES
+
+Floats = NDArray[np.float64]
+
+#: Columns of `points.csv`; a number is a component of a point, a distance to a surface, or a component of a force.
+COLUMNS = (
+    *("recording", "point", "time_s", "unit", "x_mm", "y_mm", "z_mm", "direction_x", "direction_y", "direction_z"),
+    *("observed", "declared", "refitted", "explained", "heldout_error_refitted", "heldout_error_explained", "set_aside"),
+)
+
+
+def write_points(path: Path, found: Diagnosis) -> None:
+    """Write one row for each number that was recorded, lengths in mm, forces in N, axes RAS.
+
+    `observed` is along `direction`; `declared`, `refitted` and `explained` are what was computed of it: in the case as
+    declared, with its tissue refitted beside all that is no physics, and with what is named. A held-out error is what
+    was observed less what is predicted without the point and those around it. What does not apply is empty.
+    """
+    sensors = found.base.declared.sensors
+    observed = sensors.computed + sensors.residual
+    nothing = np.full(len(sensors), np.nan)
+    # with the tissue refitted nothing else is missing from the base, should its own refit have failed
+    refitted = found.fits["none"].residual if "none" in found.fits else found.base.residual
+    own = found.named[0].kind if found.named else ""
+    explained = found.fits[own].residual if own in found.fits else nothing
+    factors = np.where(sensors.is_displacement, MILLIMETRES, 1.0)
+    numbers = [
+        factors * values
+        for values in (
+            observed,
+            sensors.computed,
+            observed - refitted,
+            observed - explained,
+            _held_out(found, "none"),
+            _held_out(found, own),
+        )
+    ]
+    times = np.where(np.isfinite(sensors.times), sensors.times, np.nan)
+    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+        rows = csv.writer(stream)
+        rows.writerow(COLUMNS)
+        for k in range(len(sensors)):
+            rows.writerow(
+                [
+                    sensors.names[sensors.recordings[k]],
+                    sensors.groups[k],
+                    _number(times[k]),
+                    "mm" if sensors.is_displacement[k] else "N",
+                    *(_number(MILLIMETRES * value) for value in sensors.positions[k]),
+                    *(_number(value) for value in sensors.directions[k]),
+                    *(_number(values[k]) for values in numbers),
+                    int(found.base.aside[k]),
+                ]
+            )
+
+
+def _held_out(found: Diagnosis, kind: str) -> Floats:
+    """Errors (n,) of a hypothesis, NaN where there are none."""
+    errors = np.full(len(found.base.at.sensors), np.nan)
+    if kind in found.held_out:
+        predicted = found.held_out[kind]
+        errors[predicted.rows] = predicted.errors
+    return errors
+
+
+def _number(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.6g}"
