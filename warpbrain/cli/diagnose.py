@@ -16,7 +16,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "diagnose",
         help="say what physics a case leaves out",
         description="Locates where simulation and recordings differ, names the physics that was left out, models it, "
-        "and shows the fit improve on data it was not fitted to. Writes diagnosis.json, map.vtu and explained/.",
+        "and shows the fit improve on data it was not fitted to. Writes report.html, diagnosis.json, map.vtu, points.csv and explained/.",
     )
     add = parser.add_argument
     add("--case", required=True, metavar="NAME", help="0529, ... (see warpbrain cases), or the path of a case folder")
@@ -60,6 +60,7 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.diagnosis.diagnose import Diagnosing
     from warpbrain.report.diagnosis.description import describe_diagnosis
     from warpbrain.report.diagnosis.files import write_explained, write_map
+    from warpbrain.report.diagnosis.html import write_page
     from warpbrain.report.diagnosis.points import write_points
     from warpbrain.report.diagnosis.text import diagnosis_lines
     from warpbrain.report.files import write_summary
@@ -89,9 +90,10 @@ def _run(options: argparse.Namespace) -> None:
     if found.explained is not None:
         write_explained(out / "explained", found.explained)
         written.append("explained")
-    # last: whoever finds it finds the others
+    # after all that it speaks of: whoever finds it finds the others
     write_summary(out / "diagnosis.json", said)
-    say("", f"written to {out}: diagnosis.json, {', '.join(written)}", sep="\n")
+    write_page(out)
+    say("", f"written to {out}: report.html, diagnosis.json, {', '.join(written)}", sep="\n")
 
 
 def _silent(*_values: object, **_options: object) -> None:

@@ -200,7 +200,7 @@ class Diagnosing:
         return Diagnosis(
             self.case,
             verdict.verdict,
-            sentence_of(verdict, ranking, p_value, smallest, fit),
+            sentence_of(verdict, ranking, p_value, smallest, fit, self.case.gravity_axis),
             p_value,
             named,
             verdict.kinds if not named else (),

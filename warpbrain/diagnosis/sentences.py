@@ -20,61 +20,91 @@ from warpbrain.diagnosis.result import (
     Smallest,
 )
 from warpbrain.diagnosis.verdict import Verdict
+from warpbrain.diagnosis.words import size_in_words, smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
 
 
 def sentence_of(
-    verdict: Verdict, ranking: Sequence[Ranked], p_value: float, smallest: Mapping[str, Smallest], fit: Fit
+    verdict: Verdict,
+    ranking: Sequence[Ranked],
+    p_value: float,
+    smallest: Mapping[str, Smallest],
+    fit: Fit,
+    gravity_axis: tuple[float, float, float] | None = None,
 ) -> str:
-    """The verdict for people."""
-    best = ranking[0]
+    """The verdict for people: whole sentences, in millimetres, pascals, percent and degrees."""
     if verdict.verdict == NOTHING:
-        seen = "; ".join(f"{kind} {_size(one)}" for kind, one in smallest.items() if one.unit != "of being there")
+        seen = "; ".join(f"{kind} {smallest_in_words(kind, one)}" for kind, one in smallest.items())
         return (
-            f"No missing physics is detected (p = {p_value:.2g}). The smallest effects that these data would have "
-            f"shown are {seen or 'none of those that were looked for'}."
+            f"No missing physics is detected ({_chance(p_value)}). What these data would have shown: "
+            f"{seen or 'nothing was looked for'}."
         )
     if verdict.verdict in (NAMED, NAMED_AND_REST):
-        said = mechanisms()[best.kind].sentence
-        rest = " Something else is left, which these words do not explain." if verdict.verdict == NAMED_AND_REST else ""
-        return (
-            f"{said} {_values(best)}{_where(best)} Probability {best.probability:.2f}; points that were held out: "
-            f"{1e3 * fit.refitted[1]:.2f} mm without it, "
-            f"{1e3 * (fit.explained[1] if fit.explained else fit.refitted[1]):.2f} mm with it.{rest}"
-        )
+        best = next(ranked for ranked in ranking if ranked.kind == verdict.kinds[0])
+        rest = " Something else is left, which this does not explain." if verdict.verdict == NAMED_AND_REST else ""
+        return f"{effect_sentence(best, gravity_axis)} {_grounds(best, fit)}{rest}"
     if verdict.verdict == GROUP:
-        chances = ", ".join(f"{r.kind} {r.probability:.2f}" for r in ranking if r.kind in verdict.kinds)
-        return (
-            f"Something is missing (p = {p_value:.2g}), and it is one of: {chances}. These data do not tell them apart."
-        )
+        members = [ranked for ranked in ranking if ranked.kind in verdict.kinds]
+        said = "; or ".join(f"{_said(one).rstrip('.')} ({_percent(one.probability)})" for one in members)
+        return f"Something is missing ({_chance(p_value)}), and these data do not tell which of these it is: {said}."
     if verdict.verdict == UNKNOWN:
         return (
-            f"Something is missing (p = {p_value:.2g}) that none of the mechanisms explains: a force without a name "
-            "fits better than all of them."
+            f"Something is missing ({_chance(p_value)}) that none of the known mechanisms explains: a force without a "
+            "name fits better than all of them."
         )
     if verdict.verdict == NOT_PHYSICS:
-        return f"{SENTENCES[verdict.kinds[0]]} That explains the mismatch better than any physics does."
+        said = SENTENCES[verdict.kinds[0]]
+        return f"It is not physics that is missing ({_chance(p_value)}). {said} That explains the mismatch better."
     assert verdict.verdict == CANNOT_SAY
-    why = f" ({verdict.why})" if verdict.why else ""
-    return f"Something is missing (p = {p_value:.2g}), but these data do not say what{why}."
+    why = f": {verdict.why}" if verdict.why else ""
+    perhaps = [_said(one).rstrip(".") for one in ranking if one.kind in verdict.kinds and one.physics][:2]
+    guess = f" Perhaps: {'; or '.join(perhaps)}." if perhaps else ""
+    return f"Something is missing ({_chance(p_value)}), but these data cannot say what{why}.{guess}"
 
 
-def _size(smallest: Smallest) -> str:
-    return f"{smallest.size:.2g} {smallest.unit}".rstrip()
+def effect_sentence(ranked: Ranked, gravity_axis: tuple[float, float, float] | None = None) -> str:
+    """What a mechanism is, how large it was found to be, and where."""
+    sizes = "; ".join(size_in_words(ranked.kind, ranked.values, gravity_axis))
+    found = [_said(ranked).rstrip(".")]
+    if sizes:
+        found.append(f": {sizes}")
+    return f"{''.join(found)}.{_where(ranked)}"
 
 
-def _values(ranked: Ranked) -> str:
-    if not ranked.values:
-        return ""
-    shown = [value for value in ranked.values if not value.name.startswith(("direction", "imaged"))][:4]
-    return ", ".join(f"{v.name} {v.value:.3g} ± {v.sd:.2g} {v.unit}".rstrip() for v in shown) + "."
+def _said(ranked: Ranked) -> str:
+    known = mechanisms()
+    if ranked.kind in known:
+        return known[ranked.kind].sentence
+    return SENTENCES.get(ranked.kind, "A force without a name acts.")
 
 
 def _where(ranked: Ranked) -> str:
     if ranked.centre is None:
-        return f" In: {ranked.region}." if ranked.region else ""
+        return f" Where: {ranked.region}." if ranked.region else ""
     x, y, z = 1e3 * ranked.centre
-    return f" About ({x:.0f}, {y:.0f}, {z:.0f}) mm, within {1e3 * (ranked.radius or 0.0):.0f} mm."
+    within = f", within {1e3 * ranked.radius:.0f} mm" if ranked.radius else ""
+    return f" It lies about ({x:z.0f}, {y:z.0f}, {z:z.0f}) mm{within}."
+
+
+def _grounds(best: Ranked, fit: Fit) -> str:
+    before = 1e3 * fit.refitted[1]
+    probable = f"Its probability is {_percent(best.probability)}"
+    if fit.explained is None:
+        return f"{probable}."
+    after = 1e3 * fit.explained[1]
+    return (
+        f"{probable}; points that were held out are predicted to {after:.2f} mm with it, to {before:.2f} mm without it."
+    )
+
+
+def _chance(p_value: float) -> str:
+    return f"p = {p_value:.2g}"
+
+
+def _percent(probability: float) -> str:
+    if probability > 0.995:
+        return "above 99 %"
+    return "below 1 %" if probability < 0.005 else f"{100.0 * probability:.0f} %"
 
 
 def assumptions_of(case: Case, base: Base, kappa: float) -> tuple[str, ...]:

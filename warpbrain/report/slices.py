@@ -24,11 +24,14 @@ class Cut:
         Element of each polygon.
     values : (k,) array
         Mean of the nodal values over the corners of each polygon.
+    corners : list of (3 or 4,) arrays
+        Values at the corners of each polygon.
     """
 
     polygons: list[Floats]
     elements: NDArray[np.int64]
     values: Floats
+    corners: list[Floats]
 
 
 def cut(points: Floats, tetrahedra: NDArray[np.integer], values: Floats, axis: int, position: float) -> Cut:
@@ -48,7 +51,7 @@ def cut(points: Floats, tetrahedra: NDArray[np.integer], values: Floats, axis: i
     crossing = above[tetrahedra].any(axis=1) & ~above[tetrahedra].all(axis=1)
     elements = np.flatnonzero(crossing)
     plane_axes = [k for k in range(3) if k != axis]
-    polygons, means = [], []
+    polygons, found = [], []
     for tetrahedron in tetrahedra[elements]:
         ends = tetrahedron[_EDGES]
         ends = ends[above[ends[:, 0]] != above[ends[:, 1]]]
@@ -58,8 +61,22 @@ def cut(points: Floats, tetrahedra: NDArray[np.integer], values: Floats, axis: i
         centre = corners.mean(axis=0)
         around = np.argsort(np.arctan2(corners[:, 1] - centre[1], corners[:, 0] - centre[0]))
         polygons.append(corners[around])
-        means.append(np.mean(values[ends[:, 0]] + t * (values[ends[:, 1]] - values[ends[:, 0]])))
-    return Cut(polygons, elements, np.array(means))
+        found.append((values[ends[:, 0]] + t * (values[ends[:, 1]] - values[ends[:, 0]]))[around])
+    return Cut(polygons, elements, np.array([corners.mean() for corners in found]), found)
+
+
+def level_line(section: Cut, level: float) -> Floats:
+    """Segments in the plane of a cut along which the values are at a level, shape (k, 2, 2)."""
+    segments = []
+    for polygon, values in zip(section.polygons, section.corners, strict=True):
+        nearby, beyond = np.roll(polygon, -1, axis=0), np.roll(values, -1)
+        crossed = (values > level) != (beyond > level)
+        if crossed.sum() < 2:
+            continue
+        t = (level - values[crossed]) / (beyond[crossed] - values[crossed])
+        ends = polygon[crossed] + t[:, None] * (nearby[crossed] - polygon[crossed])
+        segments.append(ends[:2])
+    return np.array(segments).reshape(-1, 2, 2)
 
 
 def outline(points: Floats, faces: NDArray[np.integer], axis: int, position: float) -> Floats:

@@ -6,6 +6,9 @@ from typing import Any
 
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis, Ranked, Value
+from warpbrain.diagnosis.sentences import effect_sentence
+from warpbrain.diagnosis.words import smallest_in_words
+from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
 
@@ -22,12 +25,18 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
         "parameters": _values(best.values) if best else {},
         "where": _where(found, best),
         "when": None,
-        "ranking": [_ranked(ranked) for ranked in found.ranking]
+        "ranking": [_ranked(ranked, found.case.gravity_axis) for ranked in found.ranking]
         + [_rejected(kind, why) for kind, why in found.rejected.items()],
         "group": list(found.group),
         "next_measurement": [{"what": m.what, "expected_nats": m.expected_nats} for m in found.next_measurement],
         "smallest_detectable": {
-            kind: {"size": one.size, "unit": one.unit, "parameter": one.name} for kind, one in found.smallest.items()
+            kind: {
+                "size": one.size,
+                "unit": one.unit,
+                "parameter": one.name,
+                "says": smallest_in_words(kind, one),
+            }
+            for kind, one in found.smallest.items()
         },
         "confusion": found.confusion,
         "fit": _fit(found),
@@ -82,9 +91,10 @@ def _where(found: Diagnosis, best: Ranked | None) -> dict[str, Any] | None:
     }
 
 
-def _ranked(ranked: Ranked) -> dict[str, Any]:
+def _ranked(ranked: Ranked, gravity_axis: tuple[float, float, float] | None) -> dict[str, Any]:
     return {
         "mechanism": ranked.kind,
+        "says": effect_sentence(ranked, gravity_axis),
         "physics": ranked.physics,
         "log_evidence": ranked.log_evidence,
         "probability": ranked.probability,
@@ -100,6 +110,7 @@ def _ranked(ranked: Ranked) -> dict[str, Any]:
 def _rejected(kind: str, why: str) -> dict[str, Any]:
     return {
         "mechanism": kind,
+        "says": mechanisms()[kind].sentence,
         "physics": True,
         "log_evidence": None,
         "probability": 0.0,

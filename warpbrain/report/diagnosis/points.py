@@ -1,4 +1,4 @@
-"""Everything that was recorded beside what was computed of it, as a table: what the figures of a report are drawn from."""
+"""Everything that was recorded beside what was computed of it, as a table: what figures are drawn from."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ Floats = NDArray[np.float64]
 #: Columns of `points.csv`; a number is a component of a point, a distance to a surface, or a component of a force.
 COLUMNS = (
     *("recording", "point", "time_s", "unit", "x_mm", "y_mm", "z_mm", "direction_x", "direction_y", "direction_z"),
-    *("observed", "declared", "refitted", "explained", "heldout_error_refitted", "heldout_error_explained", "set_aside"),
+    *("observed", "declared", "refitted", "explained"),
+    *("heldout_error_refitted", "heldout_error_explained", "set_aside"),
 )
 
 

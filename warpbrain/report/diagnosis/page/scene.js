@@ -244,7 +244,13 @@
   const redraw = () => { if (!waiting) { waiting = true; requestAnimationFrame(draw); } };
   const rotate = (dx, dy) => { eye.R = times(about(0, dy), times(about(1, dx), eye.R)); redraw(); };
   const pan = (dx, dy) => { eye.shift = [eye.shift[0] + dx, eye.shift[1] - dy]; redraw(); };
-  const zoom = (factor) => { eye.zoom = Math.max(0.3, Math.min(30, eye.zoom * factor)); redraw(); };
+  const zoom = (factor) => {
+    const before = eye.zoom;
+    eye.zoom = Math.max(0.3, Math.min(30, before * factor));
+    // the middle of the picture stays where it is
+    eye.shift = eye.shift.map((value) => (value * eye.zoom) / before);
+    redraw();
+  };
   const look = (name) => { Object.assign(eye, { R: VIEWS[name] || START, zoom: 1, shift: [0, 0] }); redraw(); };
 
   const held = new Map();

@@ -1,0 +1,1 @@
+"""The still figures of a diagnosis."""

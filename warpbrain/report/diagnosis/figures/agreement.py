@@ -1,0 +1,44 @@
+"""Observed beside computed, before and after."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from warpbrain.report.diagnosis.figures.drawing import COLOURS, MARKERS, TEXT, inlined, panels
+from warpbrain.report.diagnosis.saved import STATES, Rows
+from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.generative.page import BLACK
+
+
+def agreement_figure(said: dict[str, Any], rows: Rows) -> str:
+    """One panel a state, on common scales: every component of a displacement that was recorded."""
+    shown = [state for state in STATES if rows.has(state)]
+    counted = rows.lengths & ~(rows["set_aside"] > 0.0)
+    figure, axes = panels(3.1, len(shown), sharex=True, sharey=True, width=2.75 * len(shown))
+    observed = rows["observed"][counted]
+    computed = {state: rows[state][counted] for state in shown}
+    ends = np.concatenate([observed, *computed.values()])
+    margin = 0.05 * float(np.ptp(ends)) or 1.0
+    low, high = float(ends.min()) - margin, float(ends.max()) + margin
+    errors = []
+    for panel, state in zip(axes, shown, strict=True):
+        colour = COLOURS[state]
+        face = {} if MARKERS[state] in "x+" else {"facecolors": "none", "edgecolors": colour}
+        colours = {"color": colour} if not face else face
+        panel.scatter(computed[state], observed, s=14, marker=MARKERS[state], linewidths=0.8, **colours)
+        panel.plot([low, high], [low, high], color=BLACK, linewidth=0.8)
+        panel.set_xlim(low, high)
+        panel.set_ylim(low, high)
+        panel.set_aspect("equal")
+        rmse = MILLIMETRES * said["fit"]["rmse_m"][state]
+        errors.append(f"{STATES[state]} {rmse:.2f} mm")
+        panel.set_title(f"{STATES[state]}\nRMSE {rmse:.2f} mm", fontsize=TEXT)
+        panel.set_xlabel("computed [mm]", fontsize=TEXT)
+    axes[0].set_ylabel("observed [mm]", fontsize=TEXT)
+    caption = (
+        "Every component of displacement that was recorded, beside what was computed of it; on the line they agree. The "
+        "refitted ones have registration and the error of the mesh taken off."
+    )
+    return inlined(figure, f"Observed beside computed displacements; RMSE {', '.join(errors)}.", caption)

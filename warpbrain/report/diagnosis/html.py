@@ -1,0 +1,214 @@
+"""`report.html`: one file that says what a diagnosis found, made from the files beside it; it needs no network."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from warpbrain.atomic import whole_file
+from warpbrain.diagnosis.result import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
+from warpbrain.report.diagnosis.figures.agreement import agreement_figure
+from warpbrain.report.diagnosis.figures.candidates import candidates_figure
+from warpbrain.report.diagnosis.figures.curves import curves_figure
+from warpbrain.report.diagnosis.figures.held_out import held_out_figure
+from warpbrain.report.diagnosis.figures.map import map_figure
+from warpbrain.report.diagnosis.figures.residuals import residuals_figure
+from warpbrain.report.diagnosis.saved import Saved, read_saved
+from warpbrain.report.diagnosis.tables import (
+    aside_table,
+    candidates_table,
+    confusion_table,
+    fit_table,
+    next_table,
+    rejected_table,
+    smallest_table,
+    table,
+    text,
+)
+from warpbrain.report.diagnosis.units import unit_of
+from warpbrain.report.diagnosis.viewer import asset, viewer
+from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.generative.page import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY
+
+#: Ground and text of each verdict's badge; the word says it too.
+_BADGES = {
+    NOTHING: (GREEN, "#ffffff"),
+    NAMED: (BLUE, "#ffffff"),
+    NAMED_AND_REST: (BLUE, "#ffffff"),
+    GROUP: (SKY, BLACK),
+    UNKNOWN: (PURPLE, BLACK),
+    NOT_PHYSICS: (ORANGE, BLACK),
+    CANNOT_SAY: (QUIET, "#ffffff"),
+}
+
+
+def write_page(folder: Path) -> None:
+    """Write `report.html` of the diagnosis that lies in a folder.
+
+    Raises
+    ------
+    InputError
+        If there is none in it.
+    """
+    page = page_of(read_saved(folder))
+    with whole_file(folder / "report.html") as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def page_of(saved: Saved) -> str:
+    """The page."""
+    said = saved.said
+    ground, letters = _BADGES[said["verdict"]]
+    sections = [
+        _verdict(said),
+        _before_and_after(saved),
+        _view(saved),
+        _section("Candidates", candidates_figure(said), candidates_table(said)),
+        _where(saved),
+        _apart(said),
+        _section("What to measure next", _next(said)),
+        _section(
+            "What these data would have shown",
+            "<p>The smallest effect of each mechanism that would be found, at a middling place.</p>",
+            smallest_table(said),
+        )
+        if said["smallest_detectable"]
+        else "",
+        _assumptions(saved),
+    ]
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<link rel="icon" href="data:,">
+<title>{text(said["verdict"])}: {text(said["case"]["title"])}</title>
+<style>{asset("page.css")}
+:root {{ --badge: {ground}; --badge-text: {letters}; }}</style>
+</head>
+<body>
+<main>
+{"".join(sections)}
+</main>
+</body>
+</html>
+"""
+
+
+def _section(title: str, *parts: str) -> str:
+    return f"<section><h2>{text(title)}</h2>{''.join(parts)}</section>\n"
+
+
+def _verdict(said: dict[str, Any]) -> str:
+    facts = [("p, nothing missing", f"{said['p_value']:.2g}")]
+    if said["mechanism"]:
+        facts.insert(0, ("mechanism", text(said["mechanism"])))
+        facts.append(("probability", f"{said['probability']:.3f}"))
+    unit = unit_of(said)
+    held = said["fit"][f"heldout_rmse_{unit.suffix}"]
+    if held.get("refitted") is not None:
+        before = f"{unit.factor * held['refitted']:.3g}"
+        after = f" → {unit.factor * held['explained']:.3g}" if held.get("explained") is not None else ""
+        facts.append(("held-out error", f"{before}{after} {unit.name}"))
+    improvement = said["fit"]["improvement"]
+    if improvement is not None:
+        low, high = (100.0 * value for value in improvement["interval_95"])
+        facts.append(("of it gone (95 %)", f"{100.0 * improvement['part']:.0f} % ({low:.0f} to {high:.0f})"))
+    shown = "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in facts)
+    return (
+        f'<header><h1>{text(said["case"]["title"])}</h1><div class="verdict"><span class="badge">{text(said["verdict"])}'
+        f'</span><p class="sentence">{text(said["sentence"])}</p><dl class="facts">{shown}</dl></div></header>\n'
+    )
+
+
+def _before_and_after(saved: Saved) -> str:
+    said = saved.said
+    parts = []
+    if saved.anatomy is not None and saved.rows is not None and saved.rows.lengths.any():
+        parts.append(residuals_figure(said, saved.anatomy, saved.rows))
+    if saved.curves is not None:
+        parts.append(curves_figure(saved.curves))
+    parts.append(held_out_figure(said))
+    parts.append(fit_table(said))
+    placebo = said["fit"]["placebo_p"]
+    if placebo is not None:
+        parts.append(f"<p>A pattern that means nothing does as well with p = {placebo:.2g}.</p>")
+    if saved.rows is not None and saved.rows.lengths.any():
+        parts.append(agreement_figure(said, saved.rows))
+    return _section("Before and after", *parts)
+
+
+def _view(saved: Saved) -> str:
+    if saved.anatomy is None:
+        return ""
+    rows = saved.rows if saved.rows is not None and saved.rows.lengths.any() else None
+    return _section("In three dimensions", viewer(saved.said, saved.anatomy, rows))
+
+
+def _where(saved: Saved) -> str:
+    said, where = saved.said, saved.said["where"]
+    parts = []
+    if where is None:
+        parts.append("<p>No place stands out: the mismatch is everywhere a little, or nothing is missing.</p>")
+    elif "centre_m" in where:
+        x, y, z = (MILLIMETRES * value for value in where["centre_m"])
+        parts.append(
+            f"<p>The mismatch is largest about ({x:z.1f}, {y:z.1f}, {z:z.1f}) mm in RAS, within "
+            f"{MILLIMETRES * where['radius_m']:.1f} mm; p = {where['global_p']:.2g}, looking everywhere.</p>"
+        )
+    else:
+        low, high = where["strain"]
+        parts.append(
+            f"<p>It shows most in {text(where['test'])} ({text(where['mode'])}), {text(where['segment'])}, at stretches or "
+            f"shears from {low:.3g} to {high:.3g}.</p>"
+        )
+    if said.get("when") is not None:
+        first, last = said["when"]["seconds"]
+        parts.append(f"<p>When: {first:.3g} to {last:.3g} s.</p>")
+    if saved.anatomy is not None:
+        parts.append(map_figure(said, saved.anatomy))
+    return _section("Where", *parts)
+
+
+def _apart(said: dict[str, Any]) -> str:
+    if said["group"]:
+        chances = {one["mechanism"]: one["probability"] for one in said["ranking"]}
+        members = "".join(
+            f"<li><b>{text(kind)}</b>: probability {chances.get(kind, 0.0):.2f}</li>" for kind in said["group"]
+        )
+        first = f"<p>These data do not tell these apart:</p><ul>{members}</ul>"
+    else:
+        first = "<p>No two mechanisms that could be told apart by other data are equally likely here.</p>"
+    return _section("What cannot be told apart", first, confusion_table(said), rejected_table(said))
+
+
+def _next(said: dict[str, Any]) -> str:
+    if not said["next_measurement"]:
+        return "<p>There are no two mechanisms between which a measurement would decide.</p>"
+    return (
+        "<p>By how much each is expected to tell the two most probable mechanisms apart: a log Bayes factor of 3 is strong, "
+        f"of 5 decisive.</p>{next_table(said)}"
+    )
+
+
+def _assumptions(saved: Saved) -> str:
+    said = saved.said
+    assumed = "".join(f"<li>{text(one)}</li>" for one in said["assumptions"])
+    remarks = "".join(f"<li>{text(one)}</li>" for one in said["remarks"])
+    files = table(("file", "SHA-256"), [[text(k), f"<code>{text(v)}</code>"] for k, v in said["inputs_sha256"].items()])
+    options = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in said["options"].items())
+    versions = ", ".join(f"{key} {value}" for key, value in said["versions"].items())
+    seconds = sum(said["seconds"].values())
+    return _section(
+        "What was assumed",
+        f"<ul>{assumed}</ul>",
+        f"<h3>Remarks</h3><ul>{remarks}</ul>" if remarks else "",
+        aside_table(saved.rows),
+        "<h3>How it was made</h3>",
+        f"<p>Options: {text(options)}.<br>Versions: {text(versions)}.<br>{seconds:.0f} s on {text(said['device'])}.</p>",
+        files,
+        '<p class="note">All numbers of this page: <code>diagnosis.json</code>, <code>points.csv</code> and '
+        "<code>map.vtu</code> beside it.</p>"
+        if saved.anatomy is not None
+        else '<p class="note">All numbers of this page: <code>diagnosis.json</code> beside it.</p>',
+    )

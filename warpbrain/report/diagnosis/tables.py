@@ -1,0 +1,143 @@
+"""The tables of a report, as HTML."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from warpbrain.report.diagnosis.saved import STATES, Rows
+from warpbrain.report.diagnosis.units import unit_of
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = (), caption: str = "") -> str:
+    """A table of HTML cells; columns of numbers are set to the right."""
+    kinds = ["number" if k in numbers else "" for k in range(len(head))]
+    top = "".join(f'<th scope="col" class="{kind}">{name}</th>' for name, kind in zip(head, kinds, strict=True))
+    lines = [
+        "<tr>" + "".join(f'<td class="{kind}">{cell}</td>' for cell, kind in zip(row, kinds, strict=True)) + "</tr>"
+        for row in rows
+    ]
+    said = f"<caption>{caption}</caption>" if caption else ""
+    return f'<div class="wide"><table>{said}<thead><tr>{top}</tr></thead><tbody>{"".join(lines)}</tbody></table></div>'
+
+
+def text(value: Any) -> str:
+    """Words of a case or a diagnosis as HTML."""
+    return html.escape(str(value))
+
+
+def candidates_table(said: dict[str, Any]) -> str:
+    """Every candidate that was tried, the most probable first."""
+    unit = unit_of(said)
+    change = "heldout_rmse_change" + ("" if unit.suffix == "m" else "_pa")
+    rows = []
+    for one in said["ranking"]:
+        if one["log_evidence"] is None:
+            continue
+        held = one.get(change)
+        seen = one["detectability"]
+        rows.append(
+            [
+                f"<b>{text(one['mechanism'])}</b>",
+                f"{one['probability']:.3f}",
+                f"{one['log_evidence']:+.1f}",
+                f"{seen:.1f}" if one["physics"] and seen is not None else "",
+                "" if held is None else f"{unit.factor * held:+.2g} {unit.name}",
+                text(estimate_of(one)),
+                text(one["rejected_because"]),
+            ]
+        )
+    head = ("candidate", "probability", "log evidence", "d", "held-out error", "what it says", "why it is behind")
+    return table(head, rows, numbers=(1, 2, 3, 4))
+
+
+def estimate_of(one: dict[str, Any]) -> str:
+    """What a candidate says: its sentence, else its numbers."""
+    if "says" in one:
+        return str(one["says"])
+    values = (f"{name} {v['value']:.3g} ± {v['sd']:.2g} {v['unit']}".rstrip() for name, v in one["estimate"].items())
+    return ", ".join(values)
+
+
+def rejected_table(said: dict[str, Any]) -> str:
+    """What was not tried, and why; empty if everything was."""
+    rows = [
+        [text(one["mechanism"]), text(one["rejected_because"])]
+        for one in said["ranking"]
+        if one["log_evidence"] is None
+    ]
+    return table(("not tried", "why"), rows) if rows else ""
+
+
+def fit_table(said: dict[str, Any]) -> str:
+    """Errors of each state, at what was fitted, held out, and only checked."""
+    unit, fit = unit_of(said), said["fit"]
+    rows = []
+    for state, name in STATES.items():
+        if fit[f"rmse_{unit.suffix}"].get(state) is None:
+            continue
+        cells = [name]
+        for key in ("rmse", "heldout_rmse", "check_rmse"):
+            value = (fit.get(f"{key}_{unit.suffix}") or {}).get(state)
+            cells.append(_error(value, unit.factor))
+        rows.append(cells)
+    head = ("", f"fitted [{unit.name}]", f"held out [{unit.name}]", f"check [{unit.name}]")
+    return table(head, rows, numbers=(1, 2, 3), caption="Root mean square errors")
+
+
+def _error(value: Any, factor: float) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, dict):
+        return ", ".join(f"{text(name)} {factor * one:.3g}" for name, one in value.items())
+    return f"{factor * value:.3g}"
+
+
+def next_table(said: dict[str, Any]) -> str:
+    """What to measure next, the most telling first."""
+    rows = [[text(one["what"]), f"{one['expected_nats']:.1f}"] for one in said["next_measurement"]]
+    return table(("measurement", "expected log Bayes factor"), rows, numbers=(1,))
+
+
+def smallest_table(said: dict[str, Any]) -> str:
+    """What these data would have shown of each mechanism."""
+    rows = []
+    for kind, one in said["smallest_detectable"].items():
+        size = "" if one["size"] is None else f"{one['parameter']} {one['size']:.2g} {one['unit']}"
+        rows.append([text(kind), text(one.get("says", size))])
+    return table(("mechanism", "is seen"), rows)
+
+
+def aside_table(rows: Rows | None) -> str:
+    """Points that were set aside as gross errors, with their places; empty if there are none."""
+    if rows is None:
+        return ""
+    aside = rows["set_aside"] > 0.0
+    found = []
+    for point in np.unique(rows["point"][aside]):
+        first = int(np.flatnonzero(rows["point"] == point)[0])
+        where = ", ".join(f"{rows[f'{axis}_mm'][first]:.1f}" for axis in "xyz")
+        found.append([text(rows["recording"][first]), f"{point:.0f}", where])
+    if not found:
+        return ""
+    return table(
+        ("recording", "point", "place, RAS [mm]"), found, caption="Set aside: they contradict what surrounds them"
+    )
+
+
+def confusion_table(said: dict[str, Any]) -> str:
+    """How often each mechanism would be taken for another with these data; empty if it was not computed."""
+    confusion = said.get("confusion") or {}
+    rows = confusion.get("rows") if isinstance(confusion.get("rows"), dict) else confusion
+    if not rows or not all(isinstance(row, dict) for row in rows.values()):
+        return ""
+    kinds = list(dict.fromkeys(kind for row in rows.values() for kind in row))
+    lines = [[f"<b>{text(true)}</b>", *(_part(row.get(kind)) for kind in kinds)] for true, row in rows.items()]
+    return table(("true, below; said, right", *map(text, kinds)), lines, numbers=range(1, len(kinds) + 1))
+
+
+def _part(value: Any) -> str:
+    return f"{value:.2f}" if isinstance(value, int | float) and value >= 0.005 else ""

@@ -1,0 +1,32 @@
+"""In which unit the errors of a diagnosis are: lengths of a body, stresses of a specimen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from warpbrain.report.files import MILLIMETRES
+
+
+@dataclass(frozen=True)
+class Unit:
+    """How errors are shown.
+
+    Attributes
+    ----------
+    name : str
+    factor : float
+        From what is saved.
+    suffix : str
+        Of the keys of `diagnosis.json`.
+    """
+
+    name: str
+    factor: float
+    suffix: str
+
+
+def unit_of(said: Mapping[str, Any]) -> Unit:
+    """That of the errors of a diagnosis."""
+    return Unit("mm", MILLIMETRES, "m") if "rmse_m" in said["fit"] else Unit("Pa", 1.0, "pa")
