@@ -16,7 +16,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "diagnose",
         help="say what physics a case leaves out",
         description="Locates where simulation and recordings differ, names the physics that was left out, models it, "
-        "and shows the fit improve on data it was not fitted to. Writes report.html, diagnosis.json, map.vtu, points.csv and explained/.",
+        "and shows the fit improve on data it was not fitted to. Writes "
+        "report.html, diagnosis.json, map.vtu, points.csv and explained/.",
     )
     add = parser.add_argument
     add("--case", required=True, metavar="NAME", help="0529, ... (see warpbrain cases), or the path of a case folder")

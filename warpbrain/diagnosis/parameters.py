@@ -45,7 +45,9 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
     if effect.proposed.is_there_or_not:
         return ()
     here = _numbers(effect, z)
-    factor = np.linalg.cholesky(covariance + 1e-18 * np.eye(len(z)))
+    # a covariance that rounding has left not quite positive is no reason to fail
+    spread, along = np.linalg.eigh(covariance)
+    factor = along * np.sqrt(np.maximum(spread, 1e-18))
     beside = [(_numbers(effect, z + 0.1 * column), _numbers(effect, z - 0.1 * column)) for column in factor.T]
     found = []
     for name, (value, unit) in here.items():

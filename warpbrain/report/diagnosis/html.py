@@ -116,8 +116,10 @@ def _verdict(said: dict[str, Any]) -> str:
         facts.append(("of it gone (95 %)", f"{100.0 * improvement['part']:.0f} % ({low:.0f} to {high:.0f})"))
     shown = "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in facts)
     return (
-        f'<header><h1>{text(said["case"]["title"])}</h1><div class="verdict"><span class="badge">{text(said["verdict"])}'
-        f'</span><p class="sentence">{text(said["sentence"])}</p><dl class="facts">{shown}</dl></div></header>\n'
+        f'<header><h1>{text(said["case"]["title"])}</h1><div class="verdict">'
+        f'<span class="badge">{text(said["verdict"])}</span><p class="sentence">'
+        f"{text(said['sentence'])}</p>"
+        f'<dl class="facts">{shown}</dl></div></header>\n'
     )
 
 
@@ -159,8 +161,8 @@ def _where(saved: Saved) -> str:
     else:
         low, high = where["strain"]
         parts.append(
-            f"<p>It shows most in {text(where['test'])} ({text(where['mode'])}), {text(where['segment'])}, at stretches or "
-            f"shears from {low:.3g} to {high:.3g}.</p>"
+            f"<p>It shows most in {text(where['test'])} ({text(where['mode'])}), {text(where['segment'])}, at "
+            f"stretches or shears from {low:.3g} to {high:.3g}.</p>"
         )
     if said.get("when") is not None:
         first, last = said["when"]["seconds"]
@@ -186,8 +188,8 @@ def _next(said: dict[str, Any]) -> str:
     if not said["next_measurement"]:
         return "<p>There are no two mechanisms between which a measurement would decide.</p>"
     return (
-        "<p>By how much each is expected to tell the two most probable mechanisms apart: a log Bayes factor of 3 is strong, "
-        f"of 5 decisive.</p>{next_table(said)}"
+        "<p>By how much each is expected to tell the two most probable mechanisms apart: a log Bayes factor of 3 is "
+        f"strong, of 5 decisive.</p>{next_table(said)}"
     )
 
 
@@ -205,7 +207,8 @@ def _assumptions(saved: Saved) -> str:
         f"<h3>Remarks</h3><ul>{remarks}</ul>" if remarks else "",
         aside_table(saved.rows),
         "<h3>How it was made</h3>",
-        f"<p>Options: {text(options)}.<br>Versions: {text(versions)}.<br>{seconds:.0f} s on {text(said['device'])}.</p>",
+        f"<p>Options: {text(options)}.<br>Versions: {text(versions)}.<br>{seconds:.0f} s on "
+        f"{text(said['device'])}.</p>",
         files,
         '<p class="note">All numbers of this page: <code>diagnosis.json</code>, <code>points.csv</code> and '
         "<code>map.vtu</code> beside it.</p>"

@@ -26,11 +26,12 @@ def describe_scene(said: dict[str, Any], anatomy: Anatomy, rows: Rows | None) ->
     if where is not None and "centre_m" in where:
         centre = [MILLIMETRES * value for value in where["centre_m"]]
         ball = {"centre": centre, "radius": MILLIMETRES * where["radius_m"]}
-    recorded, arrows = np.zeros((0, 3)), []
+    recorded, arrows, enlarged = np.zeros((0, 3)), [], 1
     if rows is not None:
         vectors = rows.vectors
         counted = ~vectors.aside
         recorded = vectors.where[counted]
+        enlarged = _enlarged(vectors.left["declared"][counted], anatomy)
         arrows = [
             {
                 "name": STATES[state],
@@ -48,10 +49,17 @@ def describe_scene(said: dict[str, Any], anatomy: Anatomy, rows: Rows | None) ->
         "fields": _fields(said, anatomy, used),
         "recorded": _packed(MILLIMETRES * recorded),
         "arrows": arrows,
-        "enlarged": 5,
+        "enlarged": enlarged,
         "ball": ball,
         "colours": np.round(255.0 * stops).astype(int).tolist(),
     }
+
+
+def _enlarged(left: Floats, anatomy: Anatomy) -> int:
+    """How many times as long as they are arrows are drawn at first: a large one is a tenth of the body."""
+    large = float(np.quantile(np.linalg.norm(left, axis=1), 0.95))
+    size = float(np.ptp(anatomy.mesh.points, axis=0).max())
+    return int(np.clip(round(0.1 * size / max(large, 1e-9)), 1, 40))
 
 
 def scene_json(scene: dict[str, Any]) -> str:
@@ -59,7 +67,7 @@ def scene_json(scene: dict[str, Any]) -> str:
     return json.dumps(scene, allow_nan=False).replace("</", "<\\/")
 
 
-def _fields(said: dict[str, Any], anatomy: Anatomy, used: NDArray[np.int64]) -> list[dict[str, Any]]:
+def _fields(said: dict[str, Any], anatomy: Anatomy, used: NDArray[np.integer]) -> list[dict[str, Any]]:
     score = np.asarray(anatomy.fields["score"])[used]
     force = np.asarray(anatomy.fields["detectable_force"])[used]
     moved = np.linalg.norm(np.asarray(anatomy.fields["displacement"])[used], axis=1)

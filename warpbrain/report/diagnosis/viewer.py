@@ -9,6 +9,9 @@ from warpbrain.report.diagnosis.saved import Anatomy, Rows
 from warpbrain.report.diagnosis.scene import describe_scene, scene_json
 from warpbrain.report.diagnosis.tables import text
 
+#: What the buttons of views say.
+_VIEWS = {"start": "start", "front": "from the front", "left": "from the left", "above": "from above"}
+
 
 def asset(name: str) -> str:
     """A file that lies beside the page's templates."""
@@ -19,7 +22,8 @@ def viewer(said: dict[str, Any], anatomy: Anatomy, rows: Rows | None) -> str:
     """The view; where a browser has no WebGL it says so, and the pictures above and below remain."""
     scene = describe_scene(said, anatomy, rows)
     fields = "".join(
-        f'<label><input type="radio" name="field" value="{k}"{" checked" if k == 0 else ""}>{text(field["name"])}</label>'
+        f'<label><input type="radio" name="field" value="{k}"{" checked" if k == 0 else ""}>'
+        f"{text(field['name'])}</label>"
         for k, field in enumerate(scene["fields"])
     )
     arrows = "".join(
@@ -35,10 +39,7 @@ def viewer(said: dict[str, Any], anatomy: Anatomy, rows: Rows | None) -> str:
         else ""
     )
     ball = '<label><input type="checkbox" name="ball" checked>located ball</label>' if scene["ball"] else ""
-    views = "".join(
-        f'<button type="button" data-view="{view}">{name}</button>'
-        for view, name in (("start", "start"), ("front", "from the front"), ("left", "from the left"), ("above", "from above"))
-    )  # fmt: skip
+    views = "".join(f'<button type="button" data-view="{view}">{name}</button>' for view, name in _VIEWS.items())
     triad = "".join(
         f'<line class="line-{letter}" x1="40" y1="40"/><text class="text-{letter}">{letter}</text>' for letter in "RAS"
     )
@@ -48,7 +49,7 @@ def viewer(said: dict[str, Any], anatomy: Anatomy, rows: Rows | None) -> str:
 <fieldset><legend>surface</legend>{fields}</fieldset>
 <label>opacity <input type="range" name="opacity" min="0.1" max="1" step="0.05" value="0.45"></label>
 {left}{ball}
-<span>{views}</span>
+<span class="views">{views}</span>
 </div>
 <div class="stage">
 <canvas tabindex="0" role="img" aria-label="3-D view of the anatomy with recorded points; arrow keys turn it, plus and
@@ -59,8 +60,8 @@ minus zoom, shift and arrow keys move it, 0 goes back"></canvas>
 <div class="scale" style="background:linear-gradient(to right, {stops})"><span class="mark" hidden></span></div>
 <div class="mark-text"></div></div>
 <p class="missing">This browser shows no WebGL, which the 3-D view needs; the pictures of this page hold the same.</p>
-<p class="note">Drag to turn, shift and drag to move, wheel to zoom; keys: arrows, + and -, 0. R, A, S: right, front, top
-of the patient. Surface in mm; arrows go from the computed to the observed place.</p>
+<p class="note">Drag to turn, shift and drag to move, wheel to zoom; keys: arrows, + and -, 0. R, A, S: right, front,
+top of the patient. Surface in mm; arrows go from the computed to the observed place.</p>
 </div>
 <script type="application/json" id="scene-data">{scene_json(scene)}</script>
 <script>{asset("scene.js")}</script>"""

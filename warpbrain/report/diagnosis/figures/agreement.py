@@ -14,9 +14,11 @@ from warpbrain.report.generative.page import BLACK
 
 def agreement_figure(said: dict[str, Any], rows: Rows) -> str:
     """One panel a state, on common scales: every component of a displacement that was recorded."""
+    from matplotlib.ticker import MaxNLocator
+
     shown = [state for state in STATES if rows.has(state)]
     counted = rows.lengths & ~(rows["set_aside"] > 0.0)
-    figure, axes = panels(3.1, len(shown), sharex=True, sharey=True, width=2.75 * len(shown))
+    figure, axes = panels(3.6, len(shown), sharex=True, sharey=True, width=2.75 * len(shown))
     observed = rows["observed"][counted]
     computed = {state: rows[state][counted] for state in shown}
     ends = np.concatenate([observed, *computed.values()])
@@ -25,20 +27,28 @@ def agreement_figure(said: dict[str, Any], rows: Rows) -> str:
     errors = []
     for panel, state in zip(axes, shown, strict=True):
         colour = COLOURS[state]
-        face = {} if MARKERS[state] in "x+" else {"facecolors": "none", "edgecolors": colour}
-        colours = {"color": colour} if not face else face
-        panel.scatter(computed[state], observed, s=14, marker=MARKERS[state], linewidths=0.8, **colours)
+        panel.plot(
+            computed[state],
+            observed,
+            MARKERS[state],
+            markersize=4.0,
+            color=colour,
+            fillstyle="none",
+            markeredgewidth=0.8,
+        )
         panel.plot([low, high], [low, high], color=BLACK, linewidth=0.8)
         panel.set_xlim(low, high)
         panel.set_ylim(low, high)
         panel.set_aspect("equal")
+        for axis in (panel.xaxis, panel.yaxis):
+            axis.set_major_locator(MaxNLocator(5))
         rmse = MILLIMETRES * said["fit"]["rmse_m"][state]
         errors.append(f"{STATES[state]} {rmse:.2f} mm")
         panel.set_title(f"{STATES[state]}\nRMSE {rmse:.2f} mm", fontsize=TEXT)
         panel.set_xlabel("computed [mm]", fontsize=TEXT)
     axes[0].set_ylabel("observed [mm]", fontsize=TEXT)
     caption = (
-        "Every component of displacement that was recorded, beside what was computed of it; on the line they agree. The "
-        "refitted ones have registration and the error of the mesh taken off."
+        "Every component of displacement that was recorded, beside what was computed of it; on the line they agree. "
+        "The refitted ones have registration and the error of the mesh taken off."
     )
     return inlined(figure, f"Observed beside computed displacements; RMSE {', '.join(errors)}.", caption)

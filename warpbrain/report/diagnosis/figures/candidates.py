@@ -40,8 +40,8 @@ def candidates_figure(said: dict[str, Any]) -> str:
     chances.set_xlabel("probability", fontsize=TEXT)
     evidence.set_xlabel("log evidence against nothing missing", fontsize=TEXT)
     caption = (
-        "Left: probability among all candidates; dotted: 0.9, which a name needs. Right: logarithm of the evidence. Blue: "
-        "named, or of the group; dotted bars: no physics, or a force without a name."
+        "Left: probability among all candidates; dotted: 0.9, which a name needs. Right: logarithm of the evidence. "
+        "Blue: named, or of the group; dotted bars: no physics, or a force without a name."
     )
     said_best = ", ".join(f"{one['mechanism']} {one['probability']:.2f}" for one in tried[:3])
     return inlined(figure, f"Probabilities of the candidates as bars: {said_best}.", caption)

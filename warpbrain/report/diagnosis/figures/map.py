@@ -35,9 +35,11 @@ def map_figure(said: dict[str, Any], anatomy: Anatomy) -> str:
         panel.add_collection(tint)
         where = said["where"]
         if where is not None and "centre_m" in where:
-            middle = in_view(centre[view.plane])
+            across, up = in_view(centre[view.plane]).tolist()
             radius = MILLIMETRES * where["radius_m"]
-            panel.add_patch(Circle(middle, radius, facecolor="none", edgecolor=BLACK, linestyle="--", linewidth=1.3))
+            panel.add_patch(
+                Circle((across, up), radius, facecolor="none", edgecolor=BLACK, linestyle="--", linewidth=1.3)
+            )
         panel.set_title(f"{view.name}, {'xyz'[view.axis]} = {millimetres(place)}", fontsize=TEXT)
         frame_slice(panel, anatomy, view)
     bar = figure.colorbar(tint, ax=axes, orientation="horizontal", shrink=0.5, aspect=40, pad=0.02)
@@ -47,8 +49,9 @@ def map_figure(said: dict[str, Any], anatomy: Anatomy) -> str:
     blind = said["map"]["blind_above_n"]
     verdict = "is" if said["map"]["significant"] else "is not"
     caption = (
-        f"How strongly a force at each place would explain the mismatch. The largest score, {said['map']['largest']:.1f}, "
-        f"{verdict} above the threshold of {threshold:.1f} that pays for looking at {said['map']['places']} places (bar; green "
-        f"line). Dashed: the ball that was located. Hatched: a force of {blind:.2g} N would not be found."
+        "How strongly a force at each place would explain the mismatch. The largest score, "
+        f"{said['map']['largest']:.1f}, {verdict} above the threshold of {threshold:.1f} that pays for looking at "
+        f"{said['map']['places']} places (bar; green line). Dashed: the ball that was located. Hatched: a force of "
+        f"{blind:.2g} N would not be found."
     )
     return inlined(figure, "Three cuts with the score of a force at every place.", caption)

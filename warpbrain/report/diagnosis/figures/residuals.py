@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from warpbrain.diagnosis.words import number
 from warpbrain.report.diagnosis.figures.drawing import COLOURS, TEXT, inlined, panels
 from warpbrain.report.diagnosis.figures.slices import centre_of, draw_slice, frame_slice, millimetres
 from warpbrain.report.diagnosis.saved import STATES, Anatomy, Rows
@@ -31,7 +32,8 @@ def residuals_figure(said: dict[str, Any], anatomy: Anatomy, rows: Rows) -> str:
     size = float(np.ptp(anatomy.mesh.points, axis=0).max())
     large = float(np.quantile(np.linalg.norm(first, axis=1), 0.95)) or 1e-3
     enlarged = _LONG * size / large
-    figure, axes = panels(3.6, len(shown), width=3.0 * len(shown))
+    across, high = np.ptp(anatomy.mesh.points[:, view.plane], axis=0)
+    figure, axes = panels(0.9 + 2.8 * float(high / across), len(shown), width=3.0 * len(shown))
     errors = []
     for panel, state in zip(axes, shown, strict=True):
         draw_slice(panel, anatomy, view, place, said["map"]["threshold"])
@@ -52,9 +54,9 @@ def residuals_figure(said: dict[str, Any], anatomy: Anatomy, rows: Rows) -> str:
     plane = f"{view.name}, {'xyz'[view.axis]} = {millimetres(place)}"
     hidden = f" {int(vectors.aside.sum())} set aside: cross." if vectors.aside.any() else ""
     caption = (
-        f"What is left at each of {len(vectors.where)} recorded points: arrows from the computed to the observed place, "
-        f"{enlarged:.0f} times as long as they are, on a common scale, all points seen in the plane of a cut ({plane}).{hidden} "
-        "Green line: around what is significant. Hatched: the data cannot see a force there."
+        f"What is left at each of {len(vectors.where)} recorded points: arrows from the computed to the observed "
+        f"place, {number(enlarged, 2)} times as long as they are, on a common scale, all points seen in the plane of a "
+        f"cut ({plane}).{hidden} Green: where a force is significant. Hatched: the data cannot see a force there."
     )
     return inlined(figure, f"Arrows of what is left at recorded points; RMSE {', '.join(errors)}.", caption)
 

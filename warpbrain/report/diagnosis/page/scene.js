@@ -23,7 +23,8 @@
     high[i % 3] = Math.max(high[i % 3], points[i]);
   }
   const middle = low.map((value, k) => (value + high[k]) / 2);
-  const size = Math.hypot(...low.map((value, k) => high[k] - value)) / 2;
+  let size = 1e-6;
+  for (let i = 0; i < points.length; i += 3) size = Math.max(size, Math.hypot(...middle.map((value, k) => points[i + k] - value)));
 
   // small linear algebra: rotations as rows of three vectors
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -209,7 +210,7 @@
     gl.clearColor(0, 0, 0, 0);
     gl.depthMask(true);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    const least = Math.min(w, h), scale = (eye.zoom * least) / (1.04 * size);
+    const least = Math.min(w, h), scale = (eye.zoom * least) / (1.06 * size);
     gl.uniform2f(uniform("scale"), scale / w, scale / h);
     gl.uniform2f(uniform("shift"), (2 * eye.shift[0]) / w, (2 * eye.shift[1]) / h);
     gl.uniform3fv(uniform("middle"), middle);
@@ -224,7 +225,7 @@
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.depthMask(false);
-    if (said.ball && state.ball) ball.draw(0.3);
+    if (said.ball && state.ball) ball.draw(0.55);
     if (!solid) {
       // what is farther first: back faces, then front faces
       gl.enable(gl.CULL_FACE);
