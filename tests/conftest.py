@@ -1,11 +1,17 @@
 """What all tests share: a quiet Warp, and the devices and precisions that a test runs on."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 import warp as wp
 
 from warpbrain.kernels.precision import PRECISIONS, Precision
+
+if TYPE_CHECKING:
+    from warpbrain.diagnosis.result import Diagnosis
 
 wp.config.log_level = wp.LOG_WARNING
 
@@ -31,3 +37,11 @@ def _default_device(request: pytest.FixtureRequest) -> Iterator[None]:
     name = request.getfixturevalue("device") if "device" in request.fixturenames else "cpu"
     with wp.ScopedDevice(name):
         yield
+
+
+@pytest.fixture(scope="session")
+def small_diagnosis(tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
+    """A block of gel that sinks, diagnosed once for all tests (`sinking_block`)."""
+    from sinking_block import diagnose_sinking
+
+    return diagnose_sinking(tmp_path_factory.mktemp("sinking") / "case")

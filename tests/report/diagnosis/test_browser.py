@@ -1,0 +1,94 @@
+"""The page in a browser: headless Chromium, where there is one, without a network."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+CHROMIUM = next(
+    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
+
+#: Runs before all else in the page, and collects what goes wrong.
+_LISTEN = """<script>
+window.wrong = [];
+window.addEventListener("error", (e) => window.wrong.push(String(e.message)));
+console.error = console.warn = (...said) => window.wrong.push(said.join(" "));
+</script>"""
+
+#: Runs after all else: pixels of the canvas, what switches change, what was fetched.
+_LOOK = """<script>
+window.addEventListener("load", () => {
+  const canvas = document.querySelector("#scene canvas"), gl = canvas.getContext("webgl2");
+  const pixels = () => {
+    const data = new Uint8Array(4 * canvas.width * canvas.height);
+    gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, data);
+    let drawn = 0, sum = 0;
+    for (let i = 0; i < data.length; i += 4) { if (data[i + 3]) drawn++; sum = (sum * 31 + data[i] + 7 * data[i + 1] + 13 * data[i + 2]) % 1000003; }
+    return { part: drawn / (data.length / 4), sum };
+  };
+  const acts = {
+    start: () => {},
+    field: () => document.querySelectorAll("input[name=field]")[2].click(),
+    arrows: () => document.querySelectorAll("input[name=arrows]")[0].click(),
+    ball: () => document.querySelector("input[name=ball]").click(),
+    view: () => document.querySelector("button[data-view=above]").click(),
+    keys: () => canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft" })),
+    wheel: () => canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: 300 })),
+  };
+  const seen = {}, names = Object.keys(acts);
+  const next = () => {
+    const name = names.shift();
+    if (!name) {
+      const fetched = performance.getEntriesByType("resource").map((one) => one.name).filter((one) => !one.startsWith("data:"));
+      const said = { wrong: window.wrong, fetched, seen, label: document.querySelector(".bar .label").textContent, error: gl.getError(), top: document.querySelector(".badge").getBoundingClientRect().top };
+      document.body.insertAdjacentHTML("beforeend", "<pre id='found'></pre>");
+      document.getElementById("found").textContent = JSON.stringify(said);
+      return;
+    }
+    acts[name]();
+    setTimeout(() => { seen[name] = pixels(); next(); }, 120);
+  };
+  setTimeout(next, 200);
+});
+</script>"""
+
+
+def opened(page, tmp_path, *options):
+    """The document after its scripts ran."""
+    path = tmp_path / "page.html"
+    path.write_text(page, encoding="utf-8")
+    done = subprocess.run(
+        [CHROMIUM, "--headless", "--no-sandbox", "--disable-dev-shm-usage", f"--user-data-dir={tmp_path / 'profile'}",
+         "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=1200,900",
+         "--virtual-time-budget=8000", "--run-all-compositor-stages-before-draw", *options, "--dump-dom", path.as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    return done.stdout
+
+
+def test_the_view_draws_and_switches(diagnosed, tmp_path):
+    page = (diagnosed / "report.html").read_text(encoding="utf-8")
+    document = opened(page.replace("<head>", "<head>" + _LISTEN).replace("</body>", _LOOK + "</body>"), tmp_path)
+    found = json.loads(html.unescape(re.search(r"<pre id=.found.>(.*?)</pre>", document, re.S)[1]))
+    assert found["wrong"] == [] and found["fetched"] == [] and found["error"] == 0
+    assert 0.05 < found["seen"]["start"]["part"] < 0.9
+    sums = [one["sum"] for one in found["seen"].values()]
+    # each act changes the picture
+    assert all(before != after for before, after in zip(sums, sums[1:], strict=False))
+    assert found["seen"]["wheel"]["part"] < found["seen"]["keys"]["part"]
+    assert found["label"] == "displacement of the base state [mm]"
+    assert 0 < found["top"] < 300
+
+
+def test_without_webgl_the_page_says_so(diagnosed, tmp_path):
+    page = (diagnosed / "report.html").read_text(encoding="utf-8")
+    listening = page.replace("<head>", "<head>" + _LISTEN.replace("window.wrong = [];", "window.wrong = [];"
+                             "HTMLCanvasElement.prototype.getContext = () => null;"))  # fmt: skip
+    looking = "<script>document.body.dataset.wrong = window.wrong.length;document.body.dataset.shown = getComputedStyle(document.querySelector('.missing')).display;</script>"
+    document = opened(listening.replace("</body>", looking + "</body>"), tmp_path)
+    assert 'data-wrong="0"' in document and 'data-shown="block"' in document

@@ -1,0 +1,59 @@
+"""Every verdict is described with the same keys: the contract of `diagnosis.json`."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from sinking_block import OPTIONS
+
+from warpbrain.diagnosis.result import VERDICTS
+from warpbrain.report.diagnosis.description import describe_diagnosis
+from warpbrain.report.files import write_summary
+
+KEYS = {
+    *("verdict", "sentence", "p_value", "mechanism", "probability", "parameters", "where", "when", "ranking", "group"),
+    *("next_measurement", "smallest_detectable", "confusion", "fit", "map", "assumptions", "remarks", "case"),
+    *("inputs_sha256", "options", "seconds", "equilibria", "device", "versions"),
+}
+FIT = {
+    *("rmse_m", "heldout_rmse_m", "check_rmse_m", "ceiling_heldout_rmse_m", "noise_m", "improvement", "placebo_p"),
+    "placebo_heldout_rmse_m",
+}
+RANKED = {
+    *("mechanism", "says", "physics", "log_evidence", "probability", "heldout_rmse_change", "detectability"),
+    *("estimate", "where", "region", "rejected_because"),
+}
+
+
+def verdict_of(found, verdict):
+    """The diagnosis as if another verdict had been given."""
+    if verdict.startswith("named"):
+        return replace(found, verdict=verdict)
+    fit = replace(found.fit, explained=None, improvement=None, placebo_p=None)
+    group = ("gravity", "swelling") if verdict == "group" else ()
+    return replace(found, verdict=verdict, named=(), group=group, explained=None, fit=fit)
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_keys_are_complete(small_diagnosis, verdict, tmp_path):
+    said = describe_diagnosis(verdict_of(small_diagnosis, verdict), OPTIONS, "cpu")
+    write_summary(tmp_path / "diagnosis.json", said)
+    read = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))
+    assert set(read) == KEYS
+    assert set(read["fit"]) == FIT
+    assert all(set(one) == RANKED for one in read["ranking"])
+    assert (read["mechanism"] == "gravity") == verdict.startswith("named")
+
+
+def test_what_was_not_tried_is_in_the_ranking(diagnosed):
+    ranking = json.loads((diagnosed / "diagnosis.json").read_text(encoding="utf-8"))["ranking"]
+    assert {"gravity", "pressure", "swelling", "falx", "unknown"} <= {one["mechanism"] for one in ranking}
+    rejected = [one for one in ranking if one["log_evidence"] is None]
+    assert rejected and all(one["rejected_because"] for one in rejected)
+
+
+def test_the_docs_know_every_key():
+    text = (Path(__file__).parents[3] / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    for key in KEYS | FIT | RANKED:
+        assert f"`{key}`" in text, key

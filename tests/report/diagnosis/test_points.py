@@ -1,0 +1,48 @@
+"""`points.csv` says again, number by number, what the errors of `diagnosis.json` are made of."""
+
+
+import meshio
+import numpy as np
+import pytest
+
+from warpbrain.report.diagnosis.saved import read_saved
+
+
+@pytest.fixture(scope="module")
+def saved(diagnosed):
+    return read_saved(diagnosed)
+
+
+@pytest.mark.parametrize("state", ["declared", "refitted", "explained"])
+def test_errors_at_what_was_fitted(saved, state):
+    rows = saved.rows
+    counted = rows.lengths & (rows["set_aside"] == 0.0)
+    errors = (rows["observed"] - rows[state])[counted]
+    assert np.sqrt(np.mean(errors**2)) == pytest.approx(1000.0 * saved.said["fit"]["rmse_m"][state], rel=1e-4)
+
+
+@pytest.mark.parametrize("state", ["refitted", "explained"])
+def test_errors_at_what_was_held_out(saved, state):
+    errors = saved.rows[f"heldout_error_{state}"]
+    expected = 1000.0 * saved.said["fit"]["heldout_rmse_m"][state]
+    assert np.sqrt(np.nanmean(errors**2)) == pytest.approx(expected, rel=1e-4)
+
+
+def test_observed_is_what_was_recorded(saved, small_diagnosis):
+    recording = small_diagnosis.case.recordings[0]
+    observed = saved.rows["observed"].reshape(-1, 3)
+    np.testing.assert_allclose(observed, 1000.0 * recording.displacement, atol=1e-5)
+
+
+def test_vectors_are_what_is_left_of_points(saved, small_diagnosis):
+    vectors = saved.rows.vectors
+    recording = small_diagnosis.case.recordings[0]
+    np.testing.assert_allclose(vectors.left["declared"], recording.displacement, atol=1e-8)
+    assert len(vectors.where) == len(recording.points)
+
+
+def test_map_says_where_the_data_are_blind(diagnosed, saved):
+    fields = meshio.read(diagnosed / "map.vtu").point_data
+    above = 1000.0 * saved.said["map"]["blind_above_n"]
+    np.testing.assert_array_equal(fields["blind"] == 1, fields["detectable_force"] > above)
+    np.testing.assert_array_equal(fields["significant"] == 1, fields["score"] > saved.said["map"]["threshold"])
