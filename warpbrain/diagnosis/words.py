@@ -42,7 +42,7 @@ def measured(value: float, sd: float, unit: str = "") -> str:
         text = f"{value:.1e} ± {sd:.0e}"
     else:
         first = math.floor(math.log10(sd))
-        decimals = max(0, -first + (1 if sd / 10.0**first < 3.0 else 0))
+        decimals = max(0, -first + (1 if sd / 10.0**first < 2.95 else 0))
         text = f"{value:z.{decimals}f} ± {sd:.{decimals}f}"
     return f"{text} {unit}".rstrip()
 
@@ -123,7 +123,8 @@ def _inclusion(values: Values) -> list[str]:
         if ratio.value >= 1.0:
             found.append(f"it is {measured(ratio.value, ratio.sd)} times as stiff as the tissue around")
         else:
-            times, spread = 1.0 / ratio.value, ratio.sd / ratio.value**2
+            times = 1.0 / ratio.value
+            spread = times * ratio.sd / ratio.value
             found.append(f"it is {measured(times, spread)} times as soft as the tissue around")
     return found + _radius(values)
 
@@ -166,9 +167,22 @@ def _traction(values: Values) -> list[str]:
     return [f"it acts with {measured(size.value, size.sd, 'Pa')}", *_radius(values)]
 
 
+def _fibres(values: Values) -> list[str]:
+    found = []
+    for name, words, unit in (
+        ("stiffness", "their stiffness is", "Pa"),
+        ("exponent", "the exponent with which they stiffen is", ""),
+        ("dispersion", "their scatter, from 0 all parallel to 1/3 no direction, is", ""),
+    ):
+        if name in values:
+            found.append(f"{words} {measured(values[name].value, values[name].sd, unit)}")
+    return found
+
+
 _PHRASES: dict[str, Callable[[Values], list[str]]] = {
     "swelling": lambda values: _swelling(values) + _radius(values),
     "inclusion": _inclusion,
+    "fibres": _fibres,
     "viscoelasticity": _viscoelasticity,
     "pressure": _pressure,
     "traction": _traction,

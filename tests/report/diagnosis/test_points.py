@@ -1,6 +1,5 @@
 """`points.csv` says again, number by number, what the errors of `diagnosis.json` are made of."""
 
-
 import meshio
 import numpy as np
 import pytest

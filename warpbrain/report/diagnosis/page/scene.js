@@ -196,7 +196,7 @@
     ball.faces(new Uint32Array(faces));
   }
 
-  const state = { opacity: 0.45, ball: true };
+  const state = { opacity: 0.35, ball: true };
   const triad = holder.querySelector(".triad");
   let waiting = false;
   const draw = () => {
