@@ -68,16 +68,17 @@ window.addEventListener("load", () => {
 </script>"""
 
 
-def opened(page, tmp_path, *options):
+def opened(page, tmp_path):
     """The document after its scripts ran."""
     path = tmp_path / "page.html"
     path.write_text(page, encoding="utf-8")
-    done = subprocess.run(
-        [CHROMIUM, "--headless", "--no-sandbox", "--disable-dev-shm-usage", f"--user-data-dir={tmp_path / 'profile'}",
-         "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=1200,900",
-         "--virtual-time-budget=8000", "--run-all-compositor-stages-before-draw", *options, "--dump-dom", path.as_uri()],
-        capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
+    options = (
+        *("--headless", "--no-sandbox", "--disable-dev-shm-usage", f"--user-data-dir={tmp_path / 'profile'}"),
+        *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=1200,900"),
+        *("--virtual-time-budget=8000", "--dump-dom"),
+    )
+    arguments = [CHROMIUM, *options, path.as_uri()]
+    done = subprocess.run(arguments, capture_output=True, text=True, timeout=120, check=True)
     return done.stdout
 
 
