@@ -124,6 +124,8 @@ def test_gravity_has_a_level_in_millimetres_and_a_tilt_in_degrees():
         (one("pressure", ("value", -480.0, 20.0, "Pa")), "it is 480 ± 20 Pa lower there than elsewhere"),
         (one("traction", ("value_size", 2130.0, 50.0, "Pa")), "it acts with 2.13 ± 0.05 kPa"),
         (one("fibres", ("stiffness", 260.0, 40.0, "Pa")), "their stiffness is 260 ± 40 Pa"),
+        (one("asymmetry", ("exponent", -17.0, 3.0, "")), "tension: Ogden's exponent is -17 ± 3."),
+        (one("compressibility", ("poisson", 0.425, 0.016, "")), "its Poisson ratio at rest is 0.425 ± 0.016"),
         (one("falx", ("thickness", 1.2, 0.3, "mm")), "its thickness is 1.2 ± 0.3 mm"),
         (
             one("inclusion", ("ratio", 2.6, 0.4, ""), centre=np.array([0.01, -0.02, 0.0]), radius=0.018),

@@ -32,7 +32,7 @@ def test_number():
 @pytest.mark.parametrize(
     ("kind", "smallest", "said"),
     [
-        ("gravity", Smallest(0.0077, "", "share"), "from 0.77 % of it"),
+        ("gravity", Smallest(0.0077, "", "share"), "from 0.77 % of its full size"),
         ("pressure", Smallest(327.0, "Pa", "value"), "from 327 Pa"),
         ("traction", Smallest(2338.0, "Pa", "value_x"), "from 2.3 kPa"),
         ("swelling", Smallest(4.2, "%", "amount"), "from 4.2 %"),

@@ -7,6 +7,7 @@ of themselves (`warpbrain.physics.mechanism.Says`), so that a new mechanism need
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -14,6 +15,8 @@ import numpy as np
 from warpbrain.diagnosis.result import Smallest, Value
 from warpbrain.physics.mechanisms import mechanisms
 
+#: How labels begin that keep their capital.
+_NAMES = ("Poisson", "Young's", "Ogden's")
 #: Values by name, as a phrase gets them.
 Values = dict[str, Value]
 #: An effect that is seen only this improbably far out of what is expected [part] is no effect that is seen.
@@ -75,7 +78,7 @@ def smallest_in_words(kind: str, smallest: Smallest) -> str:
     if not math.isfinite(size) or _implausible(kind, smallest):
         return "would not have been seen, whatever its size"
     if smallest.name == "share":
-        return f"from {number(100.0 * size)} % of it"
+        return f"from {number(100.0 * size)} % of its full size"
     if kind == "inclusion":
         return f"from {number(1.0 + size)} times the stiffness around it"
     if kind == "viscoelasticity":
@@ -84,7 +87,7 @@ def smallest_in_words(kind: str, smallest: Smallest) -> str:
         return f"from {number(1e-3 * size)} kPa"
     if smallest.unit:
         return f"from {number(size)} {smallest.unit}"
-    return f"from a change of {number(size)} of its {_label(kind, smallest.name)}"
+    return f"from a change of {number(size)} in {_label(kind, smallest.name)}"
 
 
 def _gravity(values: Values, axis: tuple[float, float, float] | None) -> tuple[str, ...]:
@@ -198,18 +201,18 @@ def _others(kind: str, values: Values) -> list[str]:
     known = mechanisms()[kind].parameters() if kind in mechanisms() else {}
     for name, value in values.items():
         if name in known and known[name].kind in ("number", "numbers"):
-            found.append(f"its {_label(kind, name)} is {measured(value.value, value.sd, value.unit)}")
+            label = _label(kind, name)
+            whose = "" if "'" in label.split(" ")[0] else "its "
+            found.append(f"{whose}{label} is {measured(value.value, value.sd, value.unit)}")
     return found
 
 
 def _label(kind: str, name: str) -> str:
-    """What a parameter is, from the first clause of what it says of itself."""
+    """What a parameter is, from the first clause of what it says of itself that is more than a symbol."""
     doc = mechanisms()[kind].parameters()[name.removesuffix("_size")].doc
-    clause = doc.rstrip(".")
-    for mark in (";", ":", ","):
-        clause = clause.split(mark)[0]
-    # a name of somebody keeps its capital
-    return clause if "'" in clause.split(" ")[0] or clause[1:2].isupper() else clause[0].lower() + clause[1:]
+    clauses = [clause.strip() for clause in re.split("[;:,]", doc.rstrip("."))]
+    clause = next((clause for clause in clauses if len(clause) > 3), clauses[0])
+    return clause if clause.startswith(_NAMES) else clause[0].lower() + clause[1:]
 
 
 def _implausible(kind: str, smallest: Smallest) -> bool:

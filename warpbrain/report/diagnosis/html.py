@@ -22,6 +22,7 @@ from warpbrain.report.diagnosis.tables import (
     next_table,
     rejected_table,
     smallest_table,
+    stages_table,
     table,
     text,
 )
@@ -63,7 +64,7 @@ def page_of(saved: Saved) -> str:
         _verdict(said),
         _before_and_after(saved),
         _view(saved),
-        _section("Candidates", candidates_figure(said), candidates_table(said)),
+        _section("Candidates", candidates_figure(said), candidates_table(said), stages_table(said)),
         _where(saved),
         _apart(said),
         _section("What to measure next", _next(said)),

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from warpbrain.diagnosis.result import Value
+from warpbrain.diagnosis.words import measured, size_in_words
 from warpbrain.report.diagnosis.saved import STATES, Rows
 from warpbrain.report.diagnosis.units import unit_of
 
@@ -58,8 +60,10 @@ def estimate_of(one: dict[str, Any]) -> str:
     """What a candidate says: its sentence, else its numbers."""
     if "says" in one:
         return str(one["says"])
-    values = (f"{name} {v['value']:.3g} ± {v['sd']:.2g} {v['unit']}".rstrip() for name, v in one["estimate"].items())
-    return ", ".join(values)
+    values = [Value(name, v["value"], v["sd"], v["unit"]) for name, v in one["estimate"].items()]
+    known = size_in_words(one["mechanism"], values)
+    # what is a mechanism of specimens alone has no other words than its own
+    return "; ".join(known or (f"{v.name} {measured(v.value, v.sd, v.unit)}" for v in values))
 
 
 def rejected_table(said: dict[str, Any]) -> str:
@@ -70,6 +74,24 @@ def rejected_table(said: dict[str, Any]) -> str:
         if one["log_evidence"] is None
     ]
     return table(("not tried", "why"), rows) if rows else ""
+
+
+def stages_table(said: dict[str, Any]) -> str:
+    """One mechanism after the other, as they were added to a specimen; empty of a body."""
+    rows = []
+    for stage in said.get("stages", ()):
+        best = stage["candidates"][0] if stage["candidates"] else None
+        rows.append(
+            [
+                text(" and ".join(stage["with"]) or "nothing added"),
+                f"{stage['p_value']:.2g}",
+                "" if best is None else f"{text(best['mechanism'])} ({best['probability']:.2f})",
+                text(stage["added"] or ""),
+                text(stage["why_not"]),
+            ]
+        )
+    head = ("with", "p, nothing is left", "most probable", "added", "why not")
+    return table(head, rows, numbers=(1,), caption="One after the other") if rows else ""
 
 
 def fit_table(said: dict[str, Any]) -> str:
