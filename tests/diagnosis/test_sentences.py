@@ -106,7 +106,7 @@ def test_gravity_has_a_level_in_millimetres_and_a_tilt_in_degrees():
         ("direction_x", math.sin(math.radians(5.0)), math.radians(1.0), ""),
     )
     text = effect_sentence(found, (0.0, 0.0, -1.0))
-    assert "its surface is 138 ± 6 mm above the lowest point" in text
+    assert "the fluid's surface is 138 ± 6 mm above the lowest point" in text
     assert "104 ± 6 % of that weight acts" in text
     assert "tilted by 5.0 ± 1.0 degrees" in text
 

@@ -94,7 +94,9 @@ def _gravity(values: Values, axis: tuple[float, float, float] | None) -> tuple[s
     found = []
     if "csf_level" in values:
         level = values["csf_level"]
-        found.append(f"its surface is {measured(level.value, level.sd, 'mm')} above the lowest point of the anatomy")
+        found.append(
+            f"the fluid's surface is {measured(level.value, level.sd, 'mm')} above the lowest point of the anatomy"
+        )
     if "share" in values:
         share = values["share"]
         found.append(f"{measured(100.0 * share.value, 100.0 * share.sd)} % of that weight acts")

@@ -42,6 +42,12 @@ _BADGES = {
     CANNOT_SAY: (QUIET, "#ffffff"),
 }
 
+_CANDIDATES = (
+    '<p class="note">d says how visible an effect of the size that was fitted is in these data, in standard deviations '
+    "of noise and all that is no physics: below about 4 nothing is found. Held-out error: its change against the refitted "
+    "tissue alone; only the most probable are refitted without linearising.</p>"
+)
+
 
 def write_page(folder: Path) -> None:
     """Write `report.html` of the diagnosis that lies in a folder.
@@ -64,7 +70,7 @@ def page_of(saved: Saved) -> str:
         _verdict(said),
         _before_and_after(saved),
         _view(saved),
-        _section("Candidates", candidates_figure(said), candidates_table(said), stages_table(said)),
+        _section("Candidates", candidates_figure(said), _CANDIDATES, candidates_table(said), stages_table(said)),
         _where(saved),
         _apart(said),
         _section("What to measure next", _next(said)),
@@ -181,7 +187,7 @@ def _apart(said: dict[str, Any]) -> str:
         )
         first = f"<p>These data do not tell these apart:</p><ul>{members}</ul>"
     else:
-        first = "<p>No two mechanisms that could be told apart by other data are equally likely here.</p>"
+        first = "<p>No few mechanisms share the probability among them.</p>"
     return _section("What cannot be told apart", first, confusion_table(said), rejected_table(said))
 
 

@@ -47,7 +47,7 @@ def viewer(said: dict[str, Any], anatomy: Anatomy, rows: Rows | None) -> str:
     return f"""<div id="scene">
 <div class="controls">
 <fieldset><legend>surface</legend>{fields}</fieldset>
-<label>opacity <input type="range" name="opacity" min="0.1" max="1" step="0.05" value="0.35"></label>
+<label>opacity <input type="range" name="opacity" min="0.1" max="1" step="0.05" value="0.3"></label>
 {left}{ball}
 <span class="views">{views}</span>
 </div>

@@ -56,7 +56,7 @@
     precision mediump float;
     in vec3 n; in vec4 c; uniform float opacity; out vec4 found;
     void main() {
-      float light = 0.42 + 0.58 * abs(normalize(n).z);
+      float light = 0.55 + 0.45 * abs(normalize(n).z);
       float a = c.a * opacity;
       found = vec4(c.rgb * light * a, a);
     }`;
@@ -173,7 +173,7 @@
       if (!one.shown) continue;
       for (let i = 0; i < where.length; i += 3) {
         const vector = [0, 1, 2].map((k) => enlarged * one.vectors[i + k]);
-        if (Math.hypot(...vector) > 1e-3 * size) arrow([...where.slice(i, i + 3)], vector, one.colour, 0.005 * size);
+        if (Math.hypot(...vector) > 1e-3 * size) arrow([...where.slice(i, i + 3)], vector, one.colour, 0.007 * size);
       }
     }
     shapes.places(new Float32Array(shape.places));
@@ -196,7 +196,7 @@
     ball.faces(new Uint32Array(faces));
   }
 
-  const state = { opacity: 0.35, ball: true };
+  const state = { opacity: 0.3, ball: true };
   const triad = holder.querySelector(".triad");
   let waiting = false;
   const draw = () => {
