@@ -21,6 +21,8 @@ FIGURES = Path(__file__).parent / "figures"
 RUNS = {"0529.png": ["--case", "0529"]}
 ENSEMBLES = {"0529-spread.png": ["--case", "0529", "--tissue", "single", "--grid"]}
 CASES = {"0529-case.png": ["0529"]}
+#: The diagnosis of which the top of the report is shown.
+DIAGNOSED = ["--case", "0529", "--tissue", "single"]
 #: Colours that are left of a picture of curves, and its width [pixel]: a screen's, and a fraction of the bytes.
 PALETTE, WIDTH = 48, 1280
 #: Figures of an estimate and of a sweep of the same case, by file.
@@ -46,6 +48,29 @@ def main() -> None:
     for name, arguments in CASES.items():
         _warpbrain("cases", "show", *arguments, "--out", str(FIGURES / name))
     draw_generative_model()
+    draw_report()
+
+
+def draw_report() -> None:
+    """Photograph the top of a report; takes minutes, and a Chromium."""
+    with tempfile.TemporaryDirectory() as folder:
+        _warpbrain("diagnose", *DIAGNOSED, "--out", folder)
+        photograph(Path(folder) / "report.html", FIGURES / "diagnosis.png")
+
+
+def photograph(page: Path, picture: Path) -> None:
+    """Take a picture of what a screen shows of a page first."""
+    options = (
+        "--headless",
+        "--no-sandbox",
+        "--hide-scrollbars",
+        "--window-size=1200,900",
+        "--virtual-time-budget=5000",
+    )
+    subprocess.run(["chromium", *options, f"--screenshot={picture}", page.resolve().as_uri()], check=True)
+    with Image.open(picture) as image:
+        colours = image.convert("RGB").quantize(2 * PALETTE, dither=Image.Dither.NONE)
+    colours.save(picture, optimize=True)
 
 
 def draw_generative_model() -> None:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from shapes import box, disc, distorted, swept, tetrahedron
 
 from warpbrain.mesh import TetMesh, boundary_faces
-from warpbrain.report.slices import cut, outline
+from warpbrain.report.slices import cut, level_line, outline
 
 Floats = NDArray[np.float64]
 OTHERS = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
@@ -121,3 +121,16 @@ def test_nothing_to_cut():
     assert section.polygons == []
     assert len(section.elements) == len(section.values) == 0
     assert outline(mesh.points, boundary_faces(mesh.tetrahedra), 0, 5.0).shape == (0, 2, 2)
+
+
+def test_level_line_is_the_circle_of_a_distance():
+    mesh = box((12, 12, 12))
+    away = np.linalg.norm(mesh.points - 0.5, axis=1)
+    section = cut(mesh.points, mesh.tetrahedra, away, 2, 0.53)
+    segments = level_line(section, 0.3)
+    # the sphere of radius 0.3 is cut 0.03 off its middle; interpolation in elements of 1/12 rounds it off
+    radii = np.linalg.norm(segments.reshape(-1, 2) - 0.5, axis=1)
+    np.testing.assert_allclose(radii, np.sqrt(0.3**2 - 0.03**2), atol=0.01)
+    assert edge_lengths(segments) == pytest.approx(2.0 * np.pi * 0.2985, rel=0.02)
+    assert_closed(segments)
+    assert level_line(section, 2.0).shape == (0, 2, 2)

@@ -44,8 +44,8 @@ _BADGES = {
 
 _CANDIDATES = (
     '<p class="note">d says how visible an effect of the size that was fitted is in these data, in standard deviations '
-    "of noise and all that is no physics: below about 4 nothing is found. Held-out error: its change against the refitted "
-    "tissue alone; only the most probable are refitted without linearising.</p>"
+    "of noise and all that is no physics: below about 4 nothing is found. Held-out error: its change against the "
+    "refitted tissue alone; only the most probable are refitted without linearising.</p>"
 )
 
 
