@@ -45,7 +45,7 @@ def sentence_of(
         return f"{effect_sentence(best, gravity_axis)} {_grounds(best, fit)}{rest}"
     if verdict.verdict == GROUP:
         members = [ranked for ranked in ranking if ranked.kind in verdict.kinds]
-        said = "; or ".join(f"{_said(one).rstrip('.')} ({_percent(one.probability)})" for one in members)
+        said = "; or ".join(f"{_clause(one)} ({_percent(one.probability)})" for one in members)
         return f"Something is missing ({_chance(p_value)}), and these data do not tell which of these it is: {said}."
     if verdict.verdict == UNKNOWN:
         return (
@@ -57,7 +57,7 @@ def sentence_of(
         return f"It is not physics that is missing ({_chance(p_value)}). {said} That explains the mismatch better."
     assert verdict.verdict == CANNOT_SAY
     why = f": {verdict.why}" if verdict.why else ""
-    perhaps = [_said(one).rstrip(".") for one in ranking if one.kind in verdict.kinds and one.physics][:2]
+    perhaps = [_clause(one) for one in ranking if one.kind in verdict.kinds and one.physics][:2]
     guess = f" Perhaps: {'; or '.join(perhaps)}." if perhaps else ""
     return f"Something is missing ({_chance(p_value)}), but these data cannot say what{why}.{guess}"
 
@@ -76,6 +76,12 @@ def _said(ranked: Ranked) -> str:
     if ranked.kind in known:
         return known[ranked.kind].sentence
     return SENTENCES.get(ranked.kind, "A force without a name acts.")
+
+
+def _clause(ranked: Ranked) -> str:
+    """The sentence within another one."""
+    said = _said(ranked)
+    return f"{said[0].lower()}{said[1:].rstrip('.')}"
 
 
 def _where(ranked: Ranked) -> str:
