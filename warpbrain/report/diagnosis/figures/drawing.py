@@ -15,6 +15,8 @@ COLOURS = {"declared": VERMILLION, "refitted": ORANGE, "explained": BLUE}
 MARKERS = {"declared": "x", "refitted": "+", "explained": "o"}
 HATCHES = {"declared": "////", "refitted": "....", "explained": ""}
 
+#: Of a page for one inch of a figure, so that texts of all are alike.
+_PIXELS = 112
 #: Width of a figure [inch], and size of its texts [point].
 WIDTH, TEXT = 8.0, 9.0
 
@@ -41,7 +43,8 @@ def inlined(figure: Any, alternative: str, caption: str) -> str:
         figure.savefig(stream, format="png", dpi=170)
     text = base64.b64encode(stream.getvalue()).decode()
     return (
-        f'<figure><img src="data:image/png;base64,{text}" alt="{html.escape(alternative)}">'
+        f'<figure><img src="data:image/png;base64,{text}" width="{_PIXELS * figure.get_figwidth():.0f}" '
+        f'alt="{html.escape(alternative)}">'
         f"<figcaption>{html.escape(caption)}</figcaption></figure>"
     )
 

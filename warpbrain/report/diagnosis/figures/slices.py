@@ -68,8 +68,8 @@ def centre_of(said: dict[str, Any], anatomy: Anatomy) -> Any:
     if where is not None and "centre_m" in where:
         return np.array(where["centre_m"])
     points = anatomy.mesh.points
-    # beside the middle: a cut along nodes of a symmetric mesh has no area
-    return 0.5 * (points.min(axis=0) + points.max(axis=0)) + 0.003 * np.ptp(points, axis=0)
+    # beside the midline, where a hemisphere is; elsewhere off planes that nodes of a regular mesh lie in
+    return 0.5 * (points.min(axis=0) + points.max(axis=0)) + np.array([0.12, 0.003, 0.003]) * np.ptp(points, axis=0)
 
 
 def _path(polygons: list[Any]) -> Any:
