@@ -30,7 +30,8 @@ def candidates_figure(said: dict[str, Any]) -> str:
             va="center",
             ha="right" if inside else "left",
             fontsize=TEXT - 1,
-            color="white" if inside and colour == BLUE else BLACK,
+            color=BLACK,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0} if inside else None,
         )
     chances.set_yticks(range(len(tried)), [one["mechanism"] for one in tried], fontsize=TEXT)
     chances.set_ylim(len(tried) - 0.5, -0.5)
