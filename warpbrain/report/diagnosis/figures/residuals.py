@@ -52,11 +52,13 @@ def residuals_figure(said: dict[str, Any], anatomy: Anatomy, rows: Rows) -> str:
     key = _round(MILLIMETRES * large)
     _key(axes[-1], anatomy, key, enlarged)
     plane = f"{view.name}, {'xyz'[view.axis]} = {millimetres(place)}"
+    times = np.unique(rows["time_s"][rows.lengths])
+    when = f", at the last of {len(times)} times, {times[-1]:.3g} s" if len(times) > 1 else ""
     hidden = f" {int(vectors.aside.sum())} set aside: cross." if vectors.aside.any() else ""
     caption = (
         f"What is left at each of {len(vectors.where)} recorded points: arrows from the computed to the observed "
         f"place, {number(enlarged, 2)} times as long as they are, on a common scale, all points seen in the plane of a "
-        f"cut ({plane}).{hidden} Green: where a force is significant. Hatched: the data cannot see a force there."
+        f"cut ({plane}){when}.{hidden} Green: where a force is significant. Hatched: the data cannot see a force there."
     )
     return inlined(figure, f"Arrows of what is left at recorded points; RMSE {', '.join(errors)}.", caption)
 
