@@ -172,7 +172,7 @@ def _recording(folder: Path, recording: Recording, frame: Frame) -> dict[str, An
         PointsRecording: lambda r: {"outside": r.outside},
         SurfaceRecording: lambda r: {"nodes": r.nodes},
         ForceRecording: lambda r: {"boundary": r.boundary},
-        TestRecording: lambda r: {"mode": r.mode},
+        TestRecording: lambda r: {"mode": r.mode} | ({"specimen": r.specimen} if r.specimen else {}),
     }
     write_recording(folder / name, replace(recording, file=name), frame)
     return table | more[type(recording)](recording)

@@ -228,6 +228,7 @@ def read_test(
     role: str,
     sigma: float | None,
     mode: str,
+    specimen: str = "",
 ) -> TestRecording | None:
     """Read a laboratory test from ``.csv``.
 
@@ -243,6 +244,8 @@ def read_test(
     sigma : float or None
         Noise of the response, in its unit.
     mode : {"axial", "shear", "torsion"}
+    specimen : str
+        Which one was tested, of several.
 
     Returns
     -------
@@ -272,6 +275,7 @@ def read_test(
         imposed=imposed,
         response=response,
         time=time,
+        specimen=specimen,
     )
 
 

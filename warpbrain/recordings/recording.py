@@ -128,6 +128,8 @@ class TestRecording(Recording):
     imposed, response : (n,) array
     time : (n,) array or None
         [s], increasing.
+    specimen : str
+        Which one was tested, where tests of a case are of several of one shape; empty: the one.
     """
 
     # not a test of pytest's
@@ -138,3 +140,4 @@ class TestRecording(Recording):
     imposed: Floats
     response: Floats
     time: Floats | None = None
+    specimen: str = ""

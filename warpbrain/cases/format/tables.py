@@ -226,7 +226,10 @@ RECORDING = Table(
         ),
         "surface": (Key("nodes", ("text",), "Node set whose faces are compared with it.", needed=True),),
         "force": (Key("boundary", ("text",), "Name of the boundary that acts with it.", needed=True),),
-        "test": (Key("mode", ("text",), "How the specimen was loaded.", needed=True, choices=MODES),),
+        "test": (
+            Key("mode", ("text",), "How the specimen was loaded.", needed=True, choices=MODES),
+            Key("specimen", ("text",), "Which one was tested, where tests are of several of one shape."),
+        ),
     },
     several=True,
 )

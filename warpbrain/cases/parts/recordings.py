@@ -82,7 +82,7 @@ def _test(context: Context, table: Reading, sets: NodeSets | None, boundaries: s
     common = _common(context, table, 1.0)
     if common is None or not table.has("mode"):
         return None
-    return read_test(**common, mode=table.get("mode"))
+    return read_test(**common, mode=table.get("mode"), specimen=table.get("specimen", ""))
 
 
 _READERS = {"points": _points, "surface": _surface, "force": _force, "test": _test}

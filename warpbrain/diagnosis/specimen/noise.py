@@ -1,0 +1,41 @@
+"""What the noise of tests is taken to be: independent readings, and a smooth part that a whole stretch of a curve shares.
+
+Errors of a curve are alike from row to row: of a mean over specimens, of a gauge, of a shape that is not quite what was
+measured. Taking them for independent makes any difference significant. Its scale is unknown and is averaged over.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.specimen.protocol import Protocol, Test
+
+Floats = NDArray[np.float64]
+
+#: Independent part at least, and the common part, of the largest stress; way along a test over which it is common.
+INDEPENDENT, COMMON, REACH = 0.01, 0.04, 0.4
+
+
+def noise_factor(protocol: Protocol) -> Floats:
+    """Lower triangular factor (n, n) of the covariance [Pa^2]."""
+    covariance = np.zeros((len(protocol), len(protocol)))
+    for test, rows in zip(protocol.tests, protocol.rows, strict=True):
+        own = max(test.sigma, INDEPENDENT * test.peak)
+        covariance[rows, rows] = own**2 * np.eye(len(test.strain)) + (COMMON * test.peak) ** 2 * _alike(test, REACH)
+    return np.asarray(np.linalg.cholesky(covariance))
+
+
+def smooth_patterns(protocol: Protocol, size: float, count: int = 8) -> Floats:
+    """Columns (n, count per test) that explain any smooth change of a test, of a size relative to its largest stress."""
+    columns = []
+    for test, rows in zip(protocol.tests, protocol.rows, strict=True):
+        values, vectors = np.linalg.eigh(_alike(test, 2.0 * REACH))
+        own = np.zeros((len(protocol), min(count, len(values))))
+        own[rows] = size * test.peak * vectors[:, -count:] * np.sqrt(np.maximum(values[-count:], 0.0))
+        columns.append(own)
+    return np.concatenate(columns, axis=1)
+
+
+def _alike(test: Test, reach: float) -> Floats:
+    return np.exp(-0.5 * ((test.path[:, None] - test.path[None]) / reach) ** 2)
