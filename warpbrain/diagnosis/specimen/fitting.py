@@ -18,6 +18,7 @@ from warpbrain.diagnosis.specimen.material import NoStateError
 from warpbrain.errors import InputError
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 _STEPS, _DONE = 40, 1e-3
 #: A scale of the noise that every fit is begun with too: residuals that are large at first do not trap it; how often a
@@ -57,7 +58,7 @@ class SpecimenFit:
     covariance: Floats
     stress: Floats
     columns: Floats
-    rows: NDArray[np.bool_]
+    rows: Bools
     kappa: float
     log_evidence: float
     explanation: Explanation
@@ -80,7 +81,7 @@ class Fitting:
     def fit(
         self,
         hypothesis: Hypothesis,
-        tests: Sequence[int],
+        rows: Bools,
         begin: Sequence[Floats] = (),
         kappa: float = 1.0,
         refresh: bool = True,
@@ -90,8 +91,8 @@ class Fitting:
         Parameters
         ----------
         hypothesis : Hypothesis
-        tests : sequence of int
-            Numbers of the tests that are fitted.
+        rows : (n,) bool array
+            That are fitted.
         begin : sequence of (k,) arrays
             Where to begin; 0 if there are none.
         kappa : float
@@ -99,8 +100,9 @@ class Fitting:
         refresh : bool
             Whether the shape of glued ends follows the law.
         """
-        rows = self.forward.protocol.mask(tests)
         starts = begin or [np.zeros(self.forward.size(hypothesis))]
+        if refresh:
+            self.forward.use_shape_of(self.forward.material(hypothesis, starts[0]))
         found = [self._settled(hypothesis, rows, z, scale) for z in starts for scale in dict.fromkeys((kappa, _LOOSE))]
         stand = [one for one in found if one is not None]
         if not stand:
@@ -113,7 +115,7 @@ class Fitting:
         return best
 
     def _settled(
-        self, hypothesis: Hypothesis, rows: NDArray[np.bool_], z: Floats, kappa: float
+        self, hypothesis: Hypothesis, rows: Bools, z: Floats, kappa: float
     ) -> SpecimenFit | None:
         """A fit whose scale of the noise is the one that it was made with."""
         found = self._from(hypothesis, rows, z, kappa)
@@ -127,7 +129,7 @@ class Fitting:
             found = again
         return found
 
-    def _from(self, hypothesis: Hypothesis, rows: NDArray[np.bool_], z: Floats, kappa: float) -> SpecimenFit | None:
+    def _from(self, hypothesis: Hypothesis, rows: Bools, z: Floats, kappa: float) -> SpecimenFit | None:
         stress = self._try(hypothesis, z)
         if stress is None:
             return None
@@ -161,7 +163,7 @@ class Fitting:
     def _concluded(
         self,
         hypothesis: Hypothesis,
-        rows: NDArray[np.bool_],
+        rows: Bools,
         z: Floats,
         stress: Floats,
         columns: Floats,

@@ -1,0 +1,231 @@
+"""One addition to what is assumed: whether anything is left, what explains it best, and whether that carries over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.calibration import probabilities
+from warpbrain.diagnosis.held_out import Predicted
+from warpbrain.diagnosis.specimen.acting import Assumption
+from warpbrain.diagnosis.specimen.fitting import Fitting, SpecimenFit
+from warpbrain.diagnosis.specimen.folds import Folds, held_out, placebos
+from warpbrain.diagnosis.specimen.screening import Columns, columns_of, p_value, with_smooth_changes
+from warpbrain.diagnosis.verdict import LARGEST, PLACEBO, SURE, TOGETHER
+
+Floats = NDArray[np.float64]
+
+UNKNOWN = "unknown"
+#: Kinds whose prediction of held-out tests is computed.
+_PREDICTED = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A kind at a stage.
+
+    Attributes
+    ----------
+    kind : str
+    physics : bool
+    log_evidence : float
+        Against the fit without it, anything smooth left over being allowed to both.
+    probability : float
+    fit : SpecimenFit or None
+        None of the unknown, and where no fit stands.
+    predicted : Predicted or None
+        Of held-out tests.
+    stress : (n,) array or None
+        Held-out prediction [Pa].
+    """
+
+    kind: str
+    physics: bool
+    log_evidence: float
+    probability: float
+    fit: SpecimenFit | None
+    predicted: Predicted | None
+    stress: Floats | None
+
+    @property
+    def assumption(self) -> Assumption | None:
+        """Which way of the kind."""
+        return self.fit.hypothesis.assumptions[-1] if self.fit is not None else None
+
+    @property
+    def size(self) -> float:
+        """Largest of its coefficients in standard deviations of the prior."""
+        if self.fit is None or self.assumption is None:
+            return 0.0
+        return float(np.abs(self.fit.z[-len(self.assumption.mean) :]).max())
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """What one addition came to.
+
+    Attributes
+    ----------
+    without : SpecimenFit
+    p_value : float
+        Of nothing being left.
+    columns : list of Columns
+    candidates : tuple of Candidate
+        The most probable first; empty if nothing is left.
+    predicted : Predicted
+        Of held-out tests by the fit without.
+    stress : (n,) array
+        Held-out prediction [Pa].
+    gain : (part, low, high)
+        Of the held-out error by the most probable one.
+    placebo_p : float
+    accepted : Candidate or None
+        What is added.
+    label_set : tuple of str
+        The fewest kinds that are probable enough together, where none is alone.
+    why : str
+        What kept a name from being spoken.
+    """
+
+    without: SpecimenFit
+    p_value: float
+    columns: list[Columns]
+    candidates: tuple[Candidate, ...]
+    predicted: Predicted
+    stress: Floats
+    gain: tuple[float, float, float]
+    placebo_p: float
+    accepted: Candidate | None
+    label_set: tuple[str, ...]
+    why: str
+
+
+class Staging:
+    """Runs stages.
+
+    Parameters
+    ----------
+    fitting : Fitting
+    folds : Folds
+    ways : mapping of str to sequence of Assumption
+        Candidates by kind.
+    alpha : float
+    draws : int
+    rng : Generator
+    say : callable
+        Told what is done.
+    """
+
+    def __init__(
+        self,
+        fitting: Fitting,
+        folds: Folds,
+        ways: Mapping[str, Sequence[Assumption]],
+        alpha: float,
+        draws: int,
+        rng: np.random.Generator,
+        say: Callable[[str], None],
+    ) -> None:
+        self.fitting, self.folds, self.ways = fitting, folds, ways
+        self.alpha, self.draws, self.rng, self.say = alpha, draws, rng, say
+
+    def run(self, without: SpecimenFit) -> Stage:
+        """Everything about one addition."""
+        forward = self.fitting.forward
+        repeatable = {kind for kind, own in self.ways.items() if own[0].runs and kind == "viscoelasticity"}
+        ways = {
+            kind: own for kind, own in self.ways.items() if kind not in without.hypothesis.kinds or kind in repeatable
+        }
+        forward.use_shape_of(forward.material(without.hypothesis, without.z))
+        columns = columns_of(forward, without, ways)
+        p = p_value(without, columns, self.draws, self.rng)
+        predicted, stress = held_out(self.fitting, without, self.folds)
+        nothing = Stage(without, p, columns, (), predicted, stress, (0.0, 0.0, 0.0), 1.0, None, (), "")
+        if p > self.alpha or not ways:
+            return nothing
+        candidates = self._candidates(without, ways)
+        best = candidates[0]
+        gain, placebo_p = (0.0, 0.0, 0.0), 1.0
+        if best.predicted is not None and best.assumption is not None:
+            gain = best.predicted.improvement(predicted, self.rng)
+            patterns = placebos(self.fitting, without, self.folds, len(best.assumption.mean), self.rng)
+            placebo_p = float((1 + np.sum(patterns <= best.predicted.rmse)) / (1 + len(patterns)))
+        why = "; ".join(self._vetoes(best, candidates, gain, placebo_p))
+        spoken = best.physics and best.probability >= SURE and not why
+        accepted = best if spoken or (best.fit is not None and not best.physics and best.probability >= 0.5) else None
+        total = np.cumsum([one.probability for one in candidates])
+        count = int(np.searchsorted(total, TOGETHER)) + 1
+        label_set = () if accepted else tuple(one.kind for one in candidates[:count])
+        return Stage(
+            without, p, columns, candidates, predicted, stress, gain, placebo_p, accepted, label_set, why
+        )  # fmt: skip
+
+    def _candidates(self, without: SpecimenFit, ways: Mapping[str, Sequence[Assumption]]) -> tuple[Candidate, ...]:
+        from scipy.special import logsumexp
+
+        forward = self.fitting.forward
+        base = float(np.logaddexp(without.log_evidence, with_smooth_changes(forward, without)) - np.log(2.0))
+        log_evidence: dict[str, float] = {}
+        fits: dict[str, SpecimenFit | None] = {}
+        for kind, own in ways.items():
+            self.say(f"fit with {kind}")
+            found = [one for one in (self._fit(without, way) for way in own) if one is not None]
+            fits[kind] = max(found, key=lambda one: one.log_evidence) if found else None
+            # alone, or with something smooth left over: half each; over the ways of a kind: the mean
+            values = [np.logaddexp(one.log_evidence, with_smooth_changes(forward, one)) - np.log(2.0) for one in found]
+            log_evidence[kind] = (float(logsumexp(values)) - np.log(len(own)) if values else -np.inf) - base
+        fits[UNKNOWN], log_evidence[UNKNOWN] = None, with_smooth_changes(forward, without) - base
+        physics = {kind: kind != UNKNOWN and ways[kind][0].physics for kind in log_evidence}
+        alternatives = frozenset(kind for kind, own in physics.items() if not own and kind != UNKNOWN)
+        chances = probabilities(log_evidence, alternatives)
+        order = sorted(log_evidence, key=lambda kind: -chances[kind])
+        candidates = []
+        for number, kind in enumerate(order):
+            fit = fits[kind]
+            predicted = held_out(self.fitting, fit, self.folds) if fit is not None and number < _PREDICTED else None
+            candidates.append(
+                Candidate(
+                    kind,
+                    physics[kind],
+                    log_evidence[kind],
+                    chances[kind],
+                    fit,
+                    predicted[0] if predicted else None,
+                    predicted[1] if predicted else None,
+                )
+            )
+        return tuple(candidates)
+
+    def _fit(self, without: SpecimenFit, way: Assumption) -> SpecimenFit | None:
+        begin = []
+        for start in way.starts:
+            own = np.zeros(len(way.mean))
+            own[: len(start)] = start
+            begin.append(np.concatenate([without.z, own]))
+        return self.fitting.fit(without.hypothesis.with_more(way), self.folds.fitted, begin, without.kappa)
+
+    def _vetoes(
+        self,
+        best: Candidate,
+        candidates: Sequence[Candidate],
+        gain: tuple[float, float, float],
+        placebo_p: float,
+    ) -> list[str]:
+        vetoes = []
+        if best.physics and gain[1] <= 0.0:
+            vetoes.append("tests that were held out are not predicted better with it")
+        if best.physics and placebo_p > PLACEBO:
+            vetoes.append("patterns that mean nothing predict as well")
+        if best.size > LARGEST:
+            vetoes.append("its size would be implausible")
+        rivals = [one for one in candidates[1:] if one.predicted is not None and one.physics]
+        if best.predicted is not None and any(one.predicted.rmse < _RIVAL * best.predicted.rmse for one in rivals):  # type: ignore[union-attr]
+            vetoes.append("another candidate predicts held-out tests better")
+        return vetoes
+
+
+#: A rival predicts better if its held-out error is smaller than this part.
+_RIVAL = 0.8
