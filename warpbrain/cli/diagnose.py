@@ -71,6 +71,11 @@ def _run(options: argparse.Namespace) -> None:
     start_warp_quietly()
     device = find_device(options.device)
     case = find_case(options.case, options.tissue)
+    if case.specimen is not None:
+        from warpbrain.cli import diagnose_specimen
+
+        diagnose_specimen.run(options, case, asked, device.alias, say)
+        return
     out = output_folder(options.out or Path(f"warpbrain-diagnose-{safe_name(case.name)}"))
     say(case.title)
     progress = Progress("diagnosis", options.quiet)

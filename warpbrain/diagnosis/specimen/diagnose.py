@@ -13,6 +13,7 @@ from warpbrain.cases.case import Case
 from warpbrain.diagnosis.options import DiagnosisOptions, Listener
 from warpbrain.diagnosis.result import Measurement, Ranked, Value
 from warpbrain.diagnosis.specimen.candidates import candidates_of
+from warpbrain.diagnosis.specimen.confirming import confirm
 from warpbrain.diagnosis.specimen.explaining import explained_case
 from warpbrain.diagnosis.specimen.fitting import Fitting, SpecimenFit
 from warpbrain.diagnosis.specimen.folds import folds_of, held_out
@@ -116,13 +117,14 @@ class DiagnosingSpecimen:
                     break
                 self.listener.stage(f"added: {accepted.kind}")
                 fit = accepted.fit
-        verdict = conclude(stages, options.alpha)
         added = fit is not base
         with self._timed("held out"):
             forward.use_shape_of(forward.material(fit.hypothesis, fit.z))
             final_predicted, final_stress = (
                 held_out(fitting, fit, folds) if added else (stages[0].predicted, stages[0].stress)
             )
+            confirmations = confirm(fitting, fit, final_predicted, folds, rng)
+        verdict = conclude(stages, confirmations, options.alpha)
         stresses = {"declared": declared, "refitted": base.stress, "heldout refitted": stages[0].stress}
         scores = {"declared": self._score(declared, None), "refitted": self._score(base.stress, stages[0].stress)}
         improvement = None
@@ -159,7 +161,7 @@ class DiagnosingSpecimen:
             scores=scores,
             stresses=stresses,
             improvement=improvement,
-            placebo_p=stages[0].placebo_p if stages[0].candidates else None,
+            confirmations=confirmations,
             explained=explained,
             assumptions=assumptions_of(self.case, protocol, forward, fit, folds.by_test),
             remarks=remarks,

@@ -114,9 +114,7 @@ class Fitting:
             best = self._settled(hypothesis, rows, best.z, best.kappa) or best
         return best
 
-    def _settled(
-        self, hypothesis: Hypothesis, rows: Bools, z: Floats, kappa: float
-    ) -> SpecimenFit | None:
+    def _settled(self, hypothesis: Hypothesis, rows: Bools, z: Floats, kappa: float) -> SpecimenFit | None:
         """A fit whose scale of the noise is the one that it was made with."""
         found = self._from(hypothesis, rows, z, kappa)
         for _ in range(_SETTLING):

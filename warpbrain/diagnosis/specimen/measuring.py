@@ -69,5 +69,7 @@ def next_measurements(forward: Forward, one: SpecimenFit, other: SpecimenFit) ->
 def _stress(forward: Forward, fit: SpecimenFit, mode: str, strain: Floats, time: Floats) -> Floats:
     nuisances = forward.nuisances(fit.hypothesis)
     logs = nuisances.split(fit.z)[0]
-    scale = float(np.exp(nuisances.logarithmic[:, 0] @ np.ones(len(forward.protocol)) / len(forward.protocol) * logs[0]))
+    scale = float(
+        np.exp(nuisances.logarithmic[:, 0] @ np.ones(len(forward.protocol)) / len(forward.protocol) * logs[0])
+    )
     return scale * forward.material(fit.hypothesis, fit.z).stress(mode, strain, time)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.result import Measurement, Ranked, Smallest
+from warpbrain.diagnosis.specimen.confirming import Confirmation
 from warpbrain.diagnosis.specimen.protocol import Protocol
 from warpbrain.diagnosis.specimen.stage import Stage
 
@@ -83,7 +84,8 @@ class SpecimenDiagnosis:
         Of the same, at all rows [Pa]; and ``"heldout refitted"``, ``"heldout explained"``.
     improvement : (part, low, high) or None
         Of the refitted case's held-out error that is gone.
-    placebo_p : float or None
+    confirmations : tuple of Confirmation
+        Of each kind of physics that was added.
     explained : Case or None
     assumptions, remarks : tuple of str
     by_test : bool
@@ -107,7 +109,7 @@ class SpecimenDiagnosis:
     scores: dict[str, Score]
     stresses: dict[str, Floats]
     improvement: tuple[float, float, float] | None
-    placebo_p: float | None
+    confirmations: tuple[Confirmation, ...]
     explained: Case | None
     assumptions: tuple[str, ...]
     remarks: tuple[str, ...]

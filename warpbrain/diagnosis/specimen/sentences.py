@@ -40,8 +40,12 @@ def sentence_of(
     if said.verdict == NOT_PHYSICS:
         return f"{' '.join(sentences[kind] for kind in said.kinds)} That explains the mismatch better than any physics."
     if said.verdict == GROUP:
-        chances = ", ".join(f"{one.kind} {one.probability:.2f}" for one in stages[-1].candidates if one.kind in said.group)
-        return f"Something is missing ({p}), and it is one of: {chances}. These tests do not tell them apart{_why(said)}."
+        chances = ", ".join(
+            f"{one.kind} {one.probability:.2f}" for one in stages[-1].candidates if one.kind in said.group
+        )
+        return (
+            f"Something is missing ({p}), and it is one of: {chances}. These tests do not tell them apart{_why(said)}."
+        )
     if said.verdict == UNKNOWN:
         return f"Something is missing ({p}) that none of the mechanisms explains."
     return f"Something is missing ({p}), but these tests do not say what{_among(said)}{_why(said)}."

@@ -1,4 +1,4 @@
-"""One addition to what is assumed: whether anything is left, what explains it best, and whether that carries over."""
+"""One addition to what is assumed: whether anything is left, and what explains it best."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ from warpbrain.diagnosis.calibration import probabilities
 from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.specimen.acting import Assumption
 from warpbrain.diagnosis.specimen.fitting import Fitting, SpecimenFit
-from warpbrain.diagnosis.specimen.folds import Folds, held_out, placebos
+from warpbrain.diagnosis.specimen.folds import Folds, held_out
 from warpbrain.diagnosis.specimen.screening import Columns, columns_of, p_value, with_smooth_changes
-from warpbrain.diagnosis.verdict import LARGEST, PLACEBO, SURE, TOGETHER
+from warpbrain.diagnosis.verdict import LARGEST, SURE, TOGETHER
 
 Floats = NDArray[np.float64]
 
 UNKNOWN = "unknown"
 #: Kinds whose prediction of held-out tests is computed.
 _PREDICTED = 3
+#: A rival predicts better if its held-out error is smaller than this part.
+_RIVAL = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +81,6 @@ class Stage:
         Of held-out tests by the fit without.
     stress : (n,) array
         Held-out prediction [Pa].
-    gain : (part, low, high)
-        Of the held-out error by the most probable one.
-    placebo_p : float
     accepted : Candidate or None
         What is added.
     label_set : tuple of str
@@ -96,8 +95,6 @@ class Stage:
     candidates: tuple[Candidate, ...]
     predicted: Predicted
     stress: Floats
-    gain: tuple[float, float, float]
-    placebo_p: float
     accepted: Candidate | None
     label_set: tuple[str, ...]
     why: str
@@ -143,25 +140,18 @@ class Staging:
         columns = columns_of(forward, without, ways)
         p = p_value(without, columns, self.draws, self.rng)
         predicted, stress = held_out(self.fitting, without, self.folds)
-        nothing = Stage(without, p, columns, (), predicted, stress, (0.0, 0.0, 0.0), 1.0, None, (), "")
+        nothing = Stage(without, p, columns, (), predicted, stress, None, (), "")
         if p > self.alpha or not ways:
             return nothing
         candidates = self._candidates(without, ways)
         best = candidates[0]
-        gain, placebo_p = (0.0, 0.0, 0.0), 1.0
-        if best.predicted is not None and best.assumption is not None:
-            gain = best.predicted.improvement(predicted, self.rng)
-            patterns = placebos(self.fitting, without, self.folds, len(best.assumption.mean), self.rng)
-            placebo_p = float((1 + np.sum(patterns <= best.predicted.rmse)) / (1 + len(patterns)))
-        why = "; ".join(self._vetoes(best, candidates, gain, placebo_p))
+        why = "; ".join(self._vetoes(best, candidates))
         spoken = best.physics and best.probability >= SURE and not why
         accepted = best if spoken or (best.fit is not None and not best.physics and best.probability >= 0.5) else None
         total = np.cumsum([one.probability for one in candidates])
         count = int(np.searchsorted(total, TOGETHER)) + 1
         label_set = () if accepted else tuple(one.kind for one in candidates[:count])
-        return Stage(
-            without, p, columns, candidates, predicted, stress, gain, placebo_p, accepted, label_set, why
-        )  # fmt: skip
+        return Stage(without, p, columns, candidates, predicted, stress, accepted, label_set, why)
 
     def _candidates(self, without: SpecimenFit, ways: Mapping[str, Sequence[Assumption]]) -> tuple[Candidate, ...]:
         from scipy.special import logsumexp
@@ -207,25 +197,11 @@ class Staging:
             begin.append(np.concatenate([without.z, own]))
         return self.fitting.fit(without.hypothesis.with_more(way), self.folds.fitted, begin, without.kappa)
 
-    def _vetoes(
-        self,
-        best: Candidate,
-        candidates: Sequence[Candidate],
-        gain: tuple[float, float, float],
-        placebo_p: float,
-    ) -> list[str]:
+    def _vetoes(self, best: Candidate, candidates: Sequence[Candidate]) -> list[str]:
         vetoes = []
-        if best.physics and gain[1] <= 0.0:
-            vetoes.append("tests that were held out are not predicted better with it")
-        if best.physics and placebo_p > PLACEBO:
-            vetoes.append("patterns that mean nothing predict as well")
         if best.size > LARGEST:
             vetoes.append("its size would be implausible")
-        rivals = [one for one in candidates[1:] if one.predicted is not None and one.physics]
-        if best.predicted is not None and any(one.predicted.rmse < _RIVAL * best.predicted.rmse for one in rivals):  # type: ignore[union-attr]
+        rivals = [one.predicted.rmse for one in candidates[1:] if one.predicted is not None and one.physics]
+        if best.predicted is not None and min(rivals, default=np.inf) < _RIVAL * best.predicted.rmse:
             vetoes.append("another candidate predicts held-out tests better")
         return vetoes
-
-
-#: A rival predicts better if its held-out error is smaller than this part.
-_RIVAL = 0.8

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from warpbrain.diagnosis.result import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
+from warpbrain.diagnosis.specimen.confirming import Confirmation
 from warpbrain.diagnosis.specimen.stage import UNKNOWN as UNKNOWN_KIND
 from warpbrain.diagnosis.specimen.stage import Stage
 from warpbrain.diagnosis.verdict import MEMBERS
@@ -37,31 +38,39 @@ class Conclusion:
         return self.verdict in (NAMED, NAMED_AND_REST)
 
 
-def conclude(stages: Sequence[Stage], alpha: float) -> Conclusion:
-    """The verdict: what was accepted, stage by stage, and what the last stage leaves.
+def conclude(stages: Sequence[Stage], confirmations: Sequence[Confirmation], alpha: float) -> Conclusion:
+    """The verdict: what was added, stage by stage, what of it was confirmed, and what the last stage leaves.
 
-    Physics that was named with nothing significant left is `named`; with something left, `named + rest`. Where nothing
-    was named, what is left decides: a few kinds of physics are a group, smooth changes without a name the unknown.
+    Physics that was confirmed with nothing significant left is `named`; with something left, or with something added
+    that was not confirmed, `named + rest`. Where nothing was confirmed, what is left decides: a few kinds of physics
+    are a group, smooth changes without a name the unknown.
     """
     accepted = [stage.accepted for stage in stages if stage.accepted is not None]
-    kinds = tuple(dict.fromkeys(one.kind for one in accepted if one.physics))
+    kinds = tuple(one.kind for one in confirmations if not one.why_not)
+    failed = tuple(one for one in confirmations if one.why_not)
+    doubts = "; ".join(f"{one.kind}: {one.why_not}" for one in failed)
     others = tuple(dict.fromkeys(one.kind for one in accepted if not one.physics))
     last = stages[-1]
     if not accepted and last.p_value > alpha:
         return Conclusion(NOTHING, (), (), "")
     left = last.p_value <= alpha
     group = last.label_set if left and last.accepted is None else ()
+    why = "; ".join(text for text in (doubts, last.why) if text)
     if kinds:
-        return Conclusion(NAMED_AND_REST if left else NAMED, kinds, _physics(last, group), last.why)
+        rest = left or bool(failed)
+        among = (*(one.kind for one in failed), *_physics(last, group))
+        return Conclusion(NAMED_AND_REST if rest else NAMED, kinds, among, why)
+    if failed:
+        return Conclusion(CANNOT_SAY, (), tuple(one.kind for one in failed), why)
     if others and not left:
         return Conclusion(NOT_PHYSICS, others, (), "")
-    if 1 < len(group) <= MEMBERS and _physics(last, group) == group and last.gain[0] > 0.0:
-        return Conclusion(GROUP, (), group, last.why)
+    if 1 < len(group) <= MEMBERS and _physics(last, group) == group:
+        return Conclusion(GROUP, (), group, why)
     if others:
-        return Conclusion(NOT_PHYSICS, others, (), last.why)
+        return Conclusion(NOT_PHYSICS, others, (), why)
     if group and group[0] == UNKNOWN_KIND:
-        return Conclusion(UNKNOWN, (), (), last.why)
-    return Conclusion(CANNOT_SAY, (), group, last.why)
+        return Conclusion(UNKNOWN, (), (), why)
+    return Conclusion(CANNOT_SAY, (), group, why)
 
 
 def _physics(stage: Stage, kinds: Sequence[str]) -> tuple[str, ...]:

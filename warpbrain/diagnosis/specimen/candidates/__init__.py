@@ -8,6 +8,7 @@ from warpbrain.cases.case import Case
 from warpbrain.diagnosis.specimen.acting import Assumption
 from warpbrain.diagnosis.specimen.candidates import drift, friction, law_shape, registered, softening, unlike
 from warpbrain.diagnosis.specimen.protocol import Protocol
+from warpbrain.errors import InputError
 from warpbrain.physics.proposal import NotTestableError
 
 #: Those that are no mechanism of `run`, by kind.
@@ -32,6 +33,11 @@ def candidates_of(
     protocol : Protocol
     wanted : sequence of str, optional
         Kinds; all if absent.
+
+    Raises
+    ------
+    InputError
+        If a kind is wanted that nobody knows.
     """
     found, rejected = registered.assumptions(case, protocol)
     for kind, make in OWN.items():
@@ -40,6 +46,10 @@ def candidates_of(
         except NotTestableError as error:
             rejected[kind] = f"not testable with these data: {error}"
     if wanted is not None:
+        for kind in wanted:
+            if kind not in found and kind not in rejected:
+                known = ", ".join((*found, *rejected))
+                raise InputError(f"--candidates {kind}: means nothing in a specimen; what can be looked for: {known}")
         rejected |= {kind: "not asked for" for kind in (*found, *rejected) if kind not in wanted}
         found = {kind: ways for kind, ways in found.items() if kind in wanted}
     return found, rejected

@@ -1,7 +1,7 @@
 """Tissue that is softer where it was deformed before: below the largest strain so far, or cycle by cycle.
 
-    stress x (1 - D (1 - I/I_max))        I = I1 - 3, I_max the largest so far (the idea of Mullins 1948)
-    stress x (1 - D (1 - exp(-(s/3)^2)))  s, the way so far over the largest strain: a cycle is 4
+stress x (1 - D (1 - I/I_max))        I = I1 - 3, I_max the largest so far (the idea of Mullins 1948)
+stress x (1 - D (1 - exp(-(s/3)^2)))  s, the way so far over the largest strain: a cycle is 4
 """
 
 from __future__ import annotations
