@@ -35,15 +35,15 @@ class Unit:
         Stress [Pa] of the case's own law, elastic, ends as the case has them.
     glued : (n,) array
         Factor of the shape with its ends as the case has them: 1 where they are lubricated.
-    sticking : (n,) array
-        The same if they are glued.
+    sticking : callable
+        Gives the same (n,) if they are glued.
     """
 
     protocol: Protocol
     mu: float
     base: Floats
     glued: Floats
-    sticking: Floats
+    sticking: Callable[[], Floats]
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,8 @@ _STEPS, _DONE = 40, 1e-3
 #: A scale of the noise that every fit is begun with too: residuals that are large at first do not trap it; how often a
 #: fit is repeated with the scale that it found, and when that is enough.
 _LOOSE, _SETTLING, _SETTLED = 3.0, 4, 0.05
+#: What a hypothesis raises whose coefficients cannot be.
+_CANNOT_BE = (InputError, NoStateError, OverflowError, np.linalg.LinAlgError)
 #: Times that the shape of glued ends is computed anew for the law that was arrived at.
 _REFRESHED = 2
 
@@ -103,7 +105,8 @@ class Fitting:
         starts = begin or [np.zeros(self.forward.size(hypothesis))]
         if refresh:
             self.forward.use_shape_of(self.forward.material(hypothesis, starts[0]))
-        found = [self._settled(hypothesis, rows, z, scale) for z in starts for scale in dict.fromkeys((kappa, _LOOSE))]
+        scales = [(z, kappa) for z in starts] + ([(starts[0], _LOOSE)] if kappa < 0.7 * _LOOSE else [])
+        found = [self._settled(hypothesis, rows, z, scale) for z, scale in scales]
         stand = [one for one in found if one is not None]
         if not stand:
             return None
@@ -138,7 +141,9 @@ class Fitting:
         cost = _cost(whiten(observed - stress[rows]), z, kappa)
         for _ in range(_STEPS):
             if columns is None:
-                columns = self.forward.tangent(hypothesis, z, stress)
+                columns = self._try_tangent(hypothesis, z, stress)
+                if columns is None:
+                    return None
                 J = whiten(columns[rows]) / kappa
                 r = whiten(observed - stress[rows]) / kappa
                 gram, right = J.T @ J + np.eye(len(z)), J.T @ r - z
@@ -155,8 +160,8 @@ class Fitting:
                 damping *= 6.0
                 if damping > 1e8:
                     break
-        columns = self.forward.tangent(hypothesis, z, stress)
-        return self._concluded(hypothesis, rows, z, stress, columns, factor)
+        columns = self._try_tangent(hypothesis, z, stress)
+        return None if columns is None else self._concluded(hypothesis, rows, z, stress, columns, factor)
 
     def _concluded(
         self,
@@ -188,7 +193,16 @@ class Fitting:
         try:
             with np.errstate(all="ignore"):
                 found = self.forward.stress(hypothesis, z)
-        except (InputError, NoStateError, OverflowError, np.linalg.LinAlgError):
+        except _CANNOT_BE:
+            return None
+        return found if np.isfinite(found).all() else None
+
+    def _try_tangent(self, hypothesis: Hypothesis, z: Floats, stress: Floats) -> Floats | None:
+        """None at the edge of what can be."""
+        try:
+            with np.errstate(all="ignore"):
+                found = self.forward.tangent(hypothesis, z, stress)
+        except _CANNOT_BE:
             return None
         return found if np.isfinite(found).all() else None
 

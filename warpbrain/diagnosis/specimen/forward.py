@@ -19,6 +19,8 @@ from warpbrain.physics.mechanism import Mechanism
 Floats = NDArray[np.float64]
 
 _STEP = 1e-3
+#: Responses that are kept, and how little a factor of glued ends may change to be the same.
+_REMEMBERED, _SAME = 2000, 0.01
 
 
 @dataclass(frozen=True)
@@ -68,16 +70,23 @@ class Forward:
 
     def use_shape_of(self, material: HomogeneousMaterial) -> bool:
         """Take the factor of glued ends of a law from now on; whether that changes it."""
-        curves = self.shape.curves(material)
-        rows = [curves[test.mode].at(test.strain) for test in self.protocol.tests]
-        sticking = np.concatenate(rows)
-        glued = sticking if self._glued else np.ones(len(self.protocol))
         before = getattr(self, "unit", None)
-        elastic = self._homogeneous(HomogeneousMaterial.of_case(self.case, ()))
+        if before is not None and not self._glued:
+            return False
+        declared = HomogeneousMaterial.of_case(self.case, ())
+        glued = self._factor(material) if self._glued else np.ones(len(self.protocol))
+        # only a hypothesis of ends that stick asks what lubricated ones would do then
+        sticking = (lambda: glued) if self._glued else (lambda: self._factor(declared))
         [tissue] = self.case.tissues.values()
-        self.unit = Unit(self.protocol, tissue.known_law.shear_modulus, elastic * glued, glued, sticking)
+        self.unit = Unit(
+            self.protocol, tissue.known_law.shear_modulus, self._homogeneous(declared) * glued, glued, sticking
+        )
         self._nuisances = {}
-        return before is None or float(np.abs(before.glued - glued).max()) > 0.01
+        return before is None or float(np.abs(before.glued - glued).max()) > _SAME
+
+    def _factor(self, material: HomogeneousMaterial) -> Floats:
+        curves = self.shape.curves(material)
+        return np.concatenate([curves[test.mode].at(test.strain) for test in self.protocol.tests])
 
     def nuisances(self, hypothesis: Hypothesis) -> Nuisances:
         """Of a hypothesis."""
@@ -161,9 +170,6 @@ class Forward:
                 self._responses.clear()
             self._responses[key] = found
         return self._responses[key]
-
-
-_REMEMBERED = 2000
 
 
 def _sum(columns: Sequence[Floats | None], n: int) -> Floats:

@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 #: Further energy [Pa] at `lx`, `ly`, `lz` and `g`.
 Energy = Callable[[Floats, Floats, Floats, Floats], Floats]
 
-_STEP = 1e-4
+_STEP = 2e-5
 _NEWTON, _TOLERANCE = 60, 1e-9
 #: Slope of a branch's lateral stress over its modulus, for Newton steps: near enough to converge.
 _BRANCH_SLOPE = 2.0

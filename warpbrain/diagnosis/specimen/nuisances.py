@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 #: Standard deviations: logarithms of modulus, of a specimen's and of what ends do in a mode, zero and drift of the largest stress, share of the
 #: second invariant, stiffening.
-MODULUS, SPECIMEN, ENDS, ZERO, DRIFT, SHARE, STIFFENING = 1.1, 0.2, 0.15, 0.02, 0.02, 0.4, 2.0
+MODULUS, SPECIMEN, ENDS, ZERO, DRIFT, SHARE, STIFFENING = 1.1, 0.2, 0.15, 0.02, 0.02, 0.15, 1.0
 
 
 class Nuisances:

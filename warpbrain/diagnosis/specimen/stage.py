@@ -19,7 +19,7 @@ from warpbrain.diagnosis.verdict import LARGEST, SURE, TOGETHER
 Floats = NDArray[np.float64]
 
 UNKNOWN = "unknown"
-#: Kinds whose prediction of held-out tests is computed.
+#: Kinds whose prediction of held-out tests is computed even if they are no physics.
 _PREDICTED = 3
 #: A rival predicts better if its held-out error is smaller than this part.
 _RIVAL = 0.8
@@ -148,9 +148,7 @@ class Staging:
         why = "; ".join(self._vetoes(best, candidates))
         spoken = best.physics and best.probability >= SURE and not why
         accepted = best if spoken or (best.fit is not None and not best.physics and best.probability >= 0.5) else None
-        total = np.cumsum([one.probability for one in candidates])
-        count = int(np.searchsorted(total, TOGETHER)) + 1
-        label_set = () if accepted else tuple(one.kind for one in candidates[:count])
+        label_set = () if accepted else _label_set(candidates)
         return Stage(without, p, columns, candidates, predicted, stress, accepted, label_set, why)
 
     def _candidates(self, without: SpecimenFit, ways: Mapping[str, Sequence[Assumption]]) -> tuple[Candidate, ...]:
@@ -175,7 +173,7 @@ class Staging:
         candidates = []
         for number, kind in enumerate(order):
             fit = fits[kind]
-            predicted = held_out(self.fitting, fit, self.folds) if fit is not None and number < _PREDICTED else None
+            predicted = held_out(self.fitting, fit, self.folds) if fit is not None and (number < _PREDICTED or physics[kind]) else None
             candidates.append(
                 Candidate(
                     kind,
@@ -201,7 +199,23 @@ class Staging:
         vetoes = []
         if best.size > LARGEST:
             vetoes.append("its size would be implausible")
-        rivals = [one.predicted.rmse for one in candidates[1:] if one.predicted is not None and one.physics]
-        if best.predicted is not None and min(rivals, default=np.inf) < _RIVAL * best.predicted.rmse:
-            vetoes.append("another candidate predicts held-out tests better")
+        rivals = _rivals(candidates)
+        if rivals:
+            vetoes.append(f"held-out tests are predicted better with {' or '.join(rivals)}")
         return vetoes
+
+
+def _rivals(candidates: Sequence[Candidate]) -> tuple[str, ...]:
+    """Physics that predicts held-out tests clearly better than the most probable does."""
+    best = candidates[0].predicted
+    if best is None:
+        return ()
+    others = [one for one in candidates[1:] if one.predicted is not None and one.physics]
+    return tuple(one.kind for one in others if one.predicted and one.predicted.rmse < _RIVAL * best.rmse)
+
+
+def _label_set(candidates: Sequence[Candidate]) -> tuple[str, ...]:
+    """The fewest kinds that are probable enough together, and what predicts better than the first of them."""
+    total = np.cumsum([one.probability for one in candidates])
+    count = int(np.searchsorted(total, TOGETHER)) + 1
+    return tuple(dict.fromkeys([*(one.kind for one in candidates[:count]), *_rivals(candidates)]))

@@ -27,7 +27,7 @@ def assumptions(case: Case, protocol: Protocol) -> tuple[Assumption, ...]:
         share = float(np.clip(c[0], 0.0, 1.0))
         sticks = 1.0 - share if glued else share
         whole = unit.glued if glued else np.ones(len(protocol))
-        return Acting(factor=np.where(axial, (1.0 + sticks * (unit.sticking - 1.0)) / whole, 1.0))
+        return Acting(factor=np.where(axial, (1.0 + sticks * (unit.sticking() - 1.0)) / whole, 1.0))
 
     return (
         Assumption(

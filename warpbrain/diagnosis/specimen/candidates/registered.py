@@ -40,7 +40,10 @@ def assumptions(case: Case, protocol: Protocol) -> tuple[dict[str, tuple[Assumpt
             continue
         try:
             _require_testable(known, case, protocol)
-            found[kind] = tuple(_assumption(known, proposal) for proposal in known.proposals(situation))
+            proposals = known.proposals(situation)
+            # ways that differ are beginnings enough
+            starts = _STARTS if len(proposals) == 1 else _STARTS[:1]
+            found[kind] = tuple(_assumption(known, proposal, starts) for proposal in proposals)
         except NotTestableError as error:
             rejected[kind] = f"not testable with these data: {error}"
     return found, rejected
@@ -94,7 +97,7 @@ def _require_testable(kind: type[Mechanism], case: Case, protocol: Protocol) -> 
         raise NotTestableError("the case assumes it already")
 
 
-def _assumption(kind: type[Mechanism], proposal: Proposal) -> Assumption:
+def _assumption(kind: type[Mechanism], proposal: Proposal, starts: tuple[tuple[float, ...], ...]) -> Assumption:
     def act(c: Floats, unit: Unit) -> Acting:
         return Acting(mechanisms=(proposal.make(c),))
 
@@ -113,7 +116,7 @@ def _assumption(kind: type[Mechanism], proposal: Proposal) -> Assumption:
         values=lambda c: tuple(_number(proposal.make(c), name) for name in varying),
         runs=True,
         region="" if proposal.region == "all tissue" else proposal.region,
-        starts=_STARTS,
+        starts=starts,
     )
 
 
