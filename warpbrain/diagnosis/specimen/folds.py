@@ -14,8 +14,8 @@ from warpbrain.diagnosis.specimen.protocol import Protocol
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-#: Blocks of a test.
-_BLOCKS = 4
+#: Blocks of a test; and the error of a hypothesis that cannot be fitted without a test, of its largest stress.
+_BLOCKS, _NOTHING = 4, 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,19 +63,40 @@ def held_out(fitting: Fitting, fit: SpecimenFit, folds: Folds) -> tuple[Predicte
     Returns
     -------
     Predicted
-        Relative to the largest stress of each test.
+        Relative to the largest stress of each test, without what only a test itself can tell.
     (n,) array
         Predicted stress [Pa]; NaN where nothing was held out.
     """
     forward = fitting.forward
     forward.use_shape_of(forward.material(fit.hypothesis, fit.z))
     predicted = np.full(len(forward.protocol), np.nan)
+    errors = np.zeros(len(forward.protocol))
     for own in folds.held:
         found = fitting.fit(fit.hypothesis, folds.fitted & ~own, [fit.z], fit.kappa, refresh=False)
-        predicted[own] = np.inf if found is None else found.stress[own]
+        if found is None:
+            predicted[own] = _NOTHING * folds.scale[own]
+            errors[own] = predicted[own]
+            continue
+        predicted[own] = found.stress[own]
+        errors[own] = _without_its_own(fitting, found, own, (forward.protocol.observed - found.stress)[own])
     rows = folds.fitted
-    errors = (forward.protocol.observed - predicted)[rows] / folds.scale[rows]
-    return Predicted(np.clip(errors, -1e3, 1e3), folds.blocks[rows]), predicted
+    return Predicted(errors[rows] / folds.scale[rows], folds.blocks[rows]), predicted
+
+
+def _without_its_own(fitting: Fitting, fit: SpecimenFit, own: Bools, errors: Floats) -> Floats:
+    """Errors (m,) of rows less what only their own test can tell: the zero of its gauge, its drift, its specimen.
+
+    No fit to other tests knows these; they are taken out as far as their priors allow.
+    """
+    count = len(fitting.forward.nuisances(fit.hypothesis))
+    private = [k for k in range(count) if not fit.columns[~own, k].any() and fit.columns[own, k].any()]
+    if not private:
+        return errors
+    # as errors are compared: row by row alike
+    sigma = fit.kappa * np.sqrt(np.sum(fitting.factor[own] ** 2, axis=1))
+    W = fit.columns[np.ix_(own, private)] / sigma[:, None]
+    z = np.linalg.solve(np.eye(len(private)) + W.T @ W, W.T @ (errors / sigma))
+    return errors - fit.columns[np.ix_(own, private)] @ z
 
 
 def placebos(fitting: Fitting, fit: SpecimenFit, folds: Folds, freedom: int, rng: np.random.Generator) -> Floats:
@@ -100,7 +121,8 @@ def placebos(fitting: Fitting, fit: SpecimenFit, folds: Folds, freedom: int, rng
         for own in folds.held:
             others = folds.fitted & ~own
             gram = np.eye(W.shape[1]) + W[others].T @ W[others]
-            errors[own] = (observed - columns @ np.linalg.solve(gram, W[others].T @ w[others]))[own]
+            left = (observed - columns @ np.linalg.solve(gram, W[others].T @ w[others]))[own]
+            errors[own] = _without_its_own(fitting, fit, own, left)
         relative = errors[folds.fitted] / folds.scale[folds.fitted]
         found[number] = float(np.sqrt(np.mean(relative**2)))
     return found

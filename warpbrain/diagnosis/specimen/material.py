@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,8 @@ _STEP = 2e-5
 _NEWTON, _TOLERANCE = 60, 1e-9
 #: Slope of a branch's lateral stress over its modulus, for Newton steps: near enough to converge.
 _BRANCH_SLOPE = 2.0
+#: Matrices of memory that are kept: a fit asks for the same ones again and again.
+_REMEMBERED = 24
 
 
 class NoStateError(Exception):
@@ -215,6 +217,12 @@ class HomogeneousMaterial:
 
 def memory_of(time: Floats, tau: float) -> Floats:
     """From values (n,), zero long before the first time, to what relaxes of them at each time (n, n)."""
+    return _memory(time.tobytes(), tau)
+
+
+@lru_cache(maxsize=_REMEMBERED)
+def _memory(times: bytes, tau: float) -> Floats:
+    time = np.frombuffer(times)
     h = np.diff(time)
     kept = np.concatenate([[1.0], -np.expm1(-h / tau) * tau / h])
     since = time[:, None] - time[None, :]

@@ -3,8 +3,8 @@
     stress = exp(m) prod_s exp(v_s) (simulated + shape of the law) x factors + zero offsets + drifts
 
 The modulus `m` is free within a factor of 3; specimens of one tissue vary by a fifth; the zero of a gauge and its drift
-are a fiftieth of the largest stress; the law may have a share of the second invariant and stiffen a little; glue and
-cut faces are not those of the computed shape, so that modes differ by a sixth.
+are a fiftieth of the largest stress; the law may have a share of the second invariant and stiffen a little; what
+glued ends do is known to half of it, since glue gives way and cut faces are not those of the computed shape.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from warpbrain.diagnosis.specimen.protocol import Protocol
 
 Floats = NDArray[np.float64]
 
-#: Standard deviations: logarithms of modulus, of a specimen's and of what ends do in a mode, zero and drift of the largest stress, share of the
+#: Standard deviations: logarithms of modulus and of a specimen's, part of what glued ends do, zero and drift of the largest stress, share of the
 #: second invariant, stiffening.
-MODULUS, SPECIMEN, ENDS, ZERO, DRIFT, SHARE, STIFFENING = 1.1, 0.2, 0.15, 0.02, 0.02, 0.15, 1.0
+MODULUS, SPECIMEN, ENDS, ZERO, DRIFT, SHARE, STIFFENING = 1.1, 0.2, 0.5, 0.02, 0.02, 0.15, 1.0
 
 
 class Nuisances:
@@ -43,11 +43,10 @@ class Nuisances:
         if several:
             self.logarithmic = np.column_stack([self.logarithmic, SPECIMEN * specimen_rows(protocol)])
             self.names += [f"specimen {name}" for name in protocol.specimens]
-        modes = list(dict.fromkeys(test.mode for test in protocol.tests))
-        if shape_of_law and len(modes) > 1:
-            of = np.concatenate([np.full(len(test.strain), modes.index(test.mode)) for test in protocol.tests])
-            self.logarithmic = np.column_stack([self.logarithmic, ENDS * (of[:, None] == np.arange(len(modes)))])
-            self.names += [f"ends in {mode} tests" for mode in modes]
+        if shape_of_law and bool(np.any(unit.glued != 1.0)):
+            # 1 standard deviation takes half of the factor away, 2 leave a homogeneous state
+            self.logarithmic = np.column_stack([self.logarithmic, -ENDS * np.log(unit.glued)])
+            self.names.append("ends that hold less")
         I = invariant_rows(protocol)
         shapes = [SHARE * excess_rows(protocol, unit), STIFFENING * unit.base * I / (1.0 + STIFFENING * I)]
         #: Added to the simulated stress before it is scaled.

@@ -25,7 +25,7 @@ Ints = NDArray[np.int64]
 
 #: Steps of a diagnosis from rest to the largest imposed value, rows of a test without times, and the part of a test's
 #: duration that the first step of a rest takes.
-_STEPS, _ROWS, _FIRST = 5, 60, 0.005
+_STEPS, _ROWS, _FIRST = 4, 60, 0.005
 #: What a stress is called in each mode, for people.
 MODES = {"axial": "axial", "shear": "shear", "torsion": "torsion"}
 

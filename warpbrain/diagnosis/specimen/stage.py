@@ -21,8 +21,11 @@ Floats = NDArray[np.float64]
 UNKNOWN = "unknown"
 #: Kinds whose prediction of held-out tests is computed even if they are no physics.
 _PREDICTED = 3
-#: A rival predicts better if its held-out error is smaller than this part.
-_RIVAL = 0.8
+#: A rival predicts better if its held-out error is smaller than this part; it counts if its log evidence is not farther
+#: behind than this, by which curves that are smooth can mislead.
+_RIVAL, _NEAR = 0.8, 25.0
+#: Probability that another branch of what was added already needs.
+_MORE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +149,9 @@ class Staging:
         candidates = self._candidates(without, ways)
         best = candidates[0]
         why = "; ".join(self._vetoes(best, candidates))
-        spoken = best.physics and best.probability >= SURE and not why
+        # more of what is added already needs no new name
+        known = best.kind in without.hypothesis.kinds
+        spoken = best.physics and best.probability >= (_MORE if known else SURE) and not why
         accepted = best if spoken or (best.fit is not None and not best.physics and best.probability >= 0.5) else None
         label_set = () if accepted else _label_set(candidates)
         return Stage(without, p, columns, candidates, predicted, stress, accepted, label_set, why)
@@ -207,11 +212,11 @@ class Staging:
 
 def _rivals(candidates: Sequence[Candidate]) -> tuple[str, ...]:
     """Physics that predicts held-out tests clearly better than the most probable does."""
-    best = candidates[0].predicted
+    best, least = candidates[0].predicted, candidates[0].log_evidence - _NEAR
     if best is None:
         return ()
-    others = [one for one in candidates[1:] if one.predicted is not None and one.physics]
-    return tuple(one.kind for one in others if one.predicted and one.predicted.rmse < _RIVAL * best.rmse)
+    near = [one for one in candidates[1:] if one.physics and one.log_evidence > least]
+    return tuple(one.kind for one in near if one.predicted and one.predicted.rmse < _RIVAL * best.rmse)
 
 
 def _label_set(candidates: Sequence[Candidate]) -> tuple[str, ...]:
