@@ -12,7 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from common import FIGURES, Floats, arguments, declared, diagnose, draw, row, test, write_results
+from common import FIGURES, Floats, arguments, declared, diagnose, draw, recorded_test, row, write_results
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
@@ -48,7 +48,7 @@ def tape(data: Path) -> Case:
             name = f"to {stretch.replace('d', '.')} at {rate.replace('d', '.')} per s"
             role = "fit" if (stretch, rate) in FITTED else "check"
             axes = ("stretch", "stress")
-            tests.append(test(name, "axial", axes, table[:, 1], 1e3 * table[:, 2], table[:, 0], role, name))
+            tests.append(recorded_test(name, "axial", axes, table[:, 1], 1e3 * table[:, 2], table[:, 0], role, name))
     specimen = Specimen("block", (1e-2, 1e-2, 1e-2), "lubricated")
     return declared("tape", "VHB 4910, pulled and let go", specimen, 1e4, 0.49, tests)
 
@@ -60,7 +60,7 @@ def layer(data: Path) -> Case:
         table = sheet(data / f"cyclic-shear-relaxation-test__{file}.xlsx")
         shear, stress = table[:, 4], 1e3 * table[:, 3]
         axes = ("displacement", "force")
-        tests.append(test(name, "shear", axes, THICKNESS * shear, SIDE**2 * stress, table[:, 0], role, name))
+        tests.append(recorded_test(name, "shear", axes, THICKNESS * shear, SIDE**2 * stress, table[:, 0], role, name))
     specimen = Specimen("block", (SIDE, SIDE, THICKNESS), "glued")
     return declared("layer", "Optically clear adhesive, sheared in steps", specimen, 1e4, 0.49, tests)
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from common import FIGURES, arguments, declared, diagnose, draw, row, test, write_results
+from common import FIGURES, arguments, declared, diagnose, draw, recorded_test, row, write_results
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
@@ -31,10 +31,10 @@ def case_of(data: Path, region: str) -> Case:
     for name, own in (("tension", axial["stretch"] >= 1.0), ("compression", axial["stretch"] <= 1.0)):
         order = np.argsort(np.abs(axial["stretch"][own] - 1.0))
         stretch, stress = axial["stretch"][own][order], axial["stress"][own][order]
-        tests.append(test(name, "axial", ("stretch", "stress"), stretch, stress))
+        tests.append(recorded_test(name, "axial", ("stretch", "stress"), stretch, stress))
     own = shear["shear"] >= 0.0
     axes = ("displacement", "force")
-    tests.append(test("shear", "shear", axes, SIDE * shear["shear"][own], SIDE**2 * shear["stress"][own]))
+    tests.append(recorded_test("shear", "shear", axes, SIDE * shear["shear"][own], SIDE**2 * shear["stress"][own]))
     name = region.replace("_", "-")
     specimen = Specimen("block", (SIDE, SIDE, SIDE), "glued")
     return declared(name, f"Human {region.replace('_', ' ')}, mean of specimens", specimen, 700.0, 0.45, tests)

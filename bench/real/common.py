@@ -1,4 +1,4 @@
-"""What the three proofs on real recordings share: a case folder from tables, its diagnosis, a table and a figure of it."""
+"""What the three proofs on real recordings share: a case folder from tables, its diagnosis, its table and figure."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def declared(name: str, title: str, specimen: Specimen, mu: float, poisson: floa
     )
 
 
-def test(
+def recorded_test(
     name: str,
     mode: str,
     quantities: tuple[str, str],
@@ -125,7 +125,9 @@ def row(found: SpecimenDiagnosis, said: dict[str, Any]) -> dict[str, Any]:
         }
     return {
         **{key: said[key] for key in keys},
-        "not_tried": {one["mechanism"]: one["rejected_because"] for one in said["ranking"] if one["log_evidence"] is None},
+        "not_tried": {
+            one["mechanism"]: one["rejected_because"] for one in said["ranking"] if one["log_evidence"] is None
+        },
         "tests": by_test,
         "next_measurement": said["next_measurement"][:3],
         "seconds": sum(found.seconds.values()),

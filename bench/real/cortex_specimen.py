@@ -1,4 +1,4 @@
-"""One human frontal-cortex specimen, declared hyperelastic: what its cycles say, and what cycle 3 and the hold say to that.
+"""One human frontal-cortex specimen, declared hyperelastic: what its cycles say, and how cycle 3 and the hold judge it.
 
     python bench/real/cortex_specimen.py DATA --out proof
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from common import FIGURES, arguments, declared, diagnose, draw, row, test, write_results
+from common import FIGURES, arguments, declared, diagnose, draw, recorded_test, row, write_results
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
@@ -32,7 +32,7 @@ def case_of(data: Path) -> Case:
     for file, (name, role) in FILES.items():
         table = np.genfromtxt(data / file, delimiter=",", names=True)
         axes = ("displacement", "force")
-        tests.append(test(name, "axial", axes, table["displacement"], table["force"], table["time"], role))
+        tests.append(recorded_test(name, "axial", axes, table["displacement"], table["force"], table["time"], role))
     specimen = Specimen("cylinder", (2.0 * RADIUS, 2.0 * RADIUS, HEIGHT), "glued")
     return declared("cortex-specimen", "Human frontal cortex, one specimen", specimen, 1000.0, 0.45, tests)
 

@@ -36,7 +36,7 @@ def viscous(time: np.ndarray, stretch: np.ndarray, beta: float, tau: float) -> n
     def rate(t: float, q: np.ndarray) -> np.ndarray:
         l, h = np.interp(t, time, stretch), 1e-4
         there = (second(np.interp(t + h, time, stretch)) - second(np.interp(t - h, time, stretch))) / (2.0 * h)
-        return beta * there - q / tau if 0.0 < l else q
+        return beta * there - q / tau if l > 0.0 else q
 
     found = solve_ivp(rate, (time[0], time[-1]), np.zeros(2), t_eval=time, rtol=1e-6, max_step=np.ptp(time) / 200.0)
     qz, qt = found.y
@@ -53,21 +53,23 @@ def noisy(stress: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     peak = np.abs(stress).max()
     x = np.linspace(0.0, 1.0, len(stress))
     common = np.exp(-0.5 * ((x[:, None] - x) / 0.15) ** 2) + 1e-9 * np.eye(len(x))
-    return stress + 0.01 * peak * rng.normal(size=len(x)) + 0.02 * peak * np.linalg.cholesky(common) @ rng.normal(
-        size=len(x)
+    return (
+        stress
+        + 0.01 * peak * rng.normal(size=len(x))
+        + 0.02 * peak * np.linalg.cholesky(common) @ rng.normal(size=len(x))
     )
 
 
-def test_of(name: str, stretch: np.ndarray, stress: np.ndarray, time: np.ndarray | None = None) -> TestRecording:
+def rod_test(name: str, stretch: np.ndarray, stress: np.ndarray, time: np.ndarray | None = None) -> TestRecording:
     return replace(recorded("stretch", stretch), response=stress, name=name, time=time)
 
 
-test_of.__test__ = False
+rod_test.__test__ = False
 
 
 def static(law, rng: np.random.Generator) -> list[TestRecording]:
     ways = {"tension": np.linspace(1.0, 1.12, 25), "compression": np.linspace(1.0, 0.88, 25)}
-    return [test_of(name, l, noisy(law(l), rng)) for name, l in ways.items()]
+    return [rod_test(name, l, noisy(law(l), rng)) for name, l in ways.items()]
 
 
 def diagnosed(recordings: list[TestRecording], kinds=KINDS, **options) -> SpecimenDiagnosis:
@@ -99,7 +101,7 @@ def test_a_viscous_rod_is_told_by_its_cycles():
     tests = []
     for name, duration in (("slow", 400.0), ("fast", 40.0)):
         time, stretch = cycle(duration)
-        tests.append(test_of(name, stretch, noisy(viscous(time, stretch, 1.5, 12.0), rng), time))
+        tests.append(rod_test(name, stretch, noisy(viscous(time, stretch, 1.5, 12.0), rng), time))
     found = diagnosed(tests)
     assert found.verdict == "named" and [one.kind for one in found.named] == ["viscoelasticity"]
     values = {one.name: one for one in found.named[0].values}
@@ -114,7 +116,9 @@ def test_a_drifting_zero_is_no_physics():
     for name in ("cycle 1", "cycle 2"):
         time, stretch = cycle(100.0)
         stress = noisy(neo_hookean(stretch), rng)
-        tests.append(test_of(name, stretch, stress + 0.5 * np.abs(stress).max() * (first + time) / 200.0, first + time))
+        tests.append(
+            rod_test(name, stretch, stress + 0.5 * np.abs(stress).max() * (first + time) / 200.0, first + time)
+        )
         first += 101.0
     found = diagnosed(tests)
     assert found.verdict == "not physics" and found.ranking[0].kind == "drift of the zero"
@@ -128,14 +132,14 @@ def case_with(*recordings: TestRecording) -> Case:
 def test_bad_cases_are_refused():
     l = np.linspace(1.0, 1.1, 5)
     with pytest.raises(InputError, match="5 rows of tests: too few"):
-        DiagnosingSpecimen(case_with(test_of("tension", l, neo_hookean(l))))
+        DiagnosingSpecimen(case_with(rod_test("tension", l, neo_hookean(l))))
     with pytest.raises(InputError, match="every response is 0"):
-        DiagnosingSpecimen(case_with(test_of("tension", np.linspace(1.0, 1.1, 30), np.zeros(30))))
+        DiagnosingSpecimen(case_with(rod_test("tension", np.linspace(1.0, 1.1, 30), np.zeros(30))))
     shear = replace(recorded("shear", np.linspace(0.0, 1e-3, 30)), response=np.linspace(0.0, 1.0, 30))
     with pytest.raises(InputError, match="lubricated grips slide"):
         DiagnosingSpecimen(case_with(shear))
     diagnosing = DiagnosingSpecimen(
-        case_with(test_of("tension", np.linspace(1.0, 1.1, 30), neo_hookean(np.linspace(1.0, 1.1, 30)))),
+        case_with(rod_test("tension", np.linspace(1.0, 1.1, 30), neo_hookean(np.linspace(1.0, 1.1, 30)))),
         DiagnosisOptions(candidates=("gravity",)),
     )
     with pytest.raises(InputError, match="--candidates gravity"):

@@ -137,31 +137,34 @@ class Fitting:
         factor = self.factor[np.ix_(rows, rows)]
         observed = self.forward.protocol.observed[rows]
         whiten = Explanation(factor, np.zeros((len(factor), 1))).whitened
-        damping, columns = 1e-3, None
+        damping, columns = 1e-3, self._try_tangent(hypothesis, z, stress)
+        if columns is None:
+            return None
+        fresh = True
         cost = _cost(whiten(observed - stress[rows]), z, kappa)
         for _ in range(_STEPS):
-            if columns is None:
-                columns = self._try_tangent(hypothesis, z, stress)
-                if columns is None:
-                    return None
+            if fresh:
                 J = whiten(columns[rows]) / kappa
                 r = whiten(observed - stress[rows]) / kappa
-                gram, right = J.T @ J + np.eye(len(z)), J.T @ r - z
+                gram, right, fresh = J.T @ J + np.eye(len(z)), J.T @ r - z, False
             step = np.linalg.solve(gram + damping * np.diag(np.diag(gram)), right)
             step *= min(1.0, 2.0 / max(float(np.abs(step).max()), 1e-12))
             moved = self._try(hypothesis, z + step)
             new = np.inf if moved is None else _cost(whiten(observed - moved[rows]), z + step, kappa)
-            if new < cost:
-                gained, cost, z, stress, columns = cost - new, new, z + step, moved, None
-                damping = max(0.2 * damping, 1e-9)
-                if gained < _DONE:
-                    break
-            else:
+            if moved is None or new >= cost:
                 damping *= 6.0
                 if damping > 1e8:
                     break
-        columns = self._try_tangent(hypothesis, z, stress)
-        return None if columns is None else self._concluded(hypothesis, rows, z, stress, columns, factor)
+                continue
+            gained, cost, z, stress = cost - new, new, z + step, moved
+            damping = max(0.2 * damping, 1e-9)
+            there = self._try_tangent(hypothesis, z, stress)
+            if there is None:
+                return None
+            columns, fresh = there, True
+            if gained < _DONE:
+                break
+        return self._concluded(hypothesis, rows, z, stress, columns, factor)
 
     def _concluded(
         self,
@@ -180,7 +183,7 @@ class Fitting:
         log_evidence = float(logsumexp(explanation.log_none(white[:, None])[:, 0] + kappa_log_prior()))
         kappa = explanation.best_kappa(white)
         W = explanation.whitened(columns[rows]) / kappa
-        covariance = np.linalg.inv(np.eye(len(z)) + W.T @ W)
+        covariance: Floats = np.linalg.inv(np.eye(len(z)) + W.T @ W)
         # at a limit of a parameter the linear model has a better point than there is
         there = _cost(white / kappa - W @ z, z, 1.0)
         beyond = covariance @ (W.T @ (white / kappa))

@@ -89,14 +89,14 @@ def _without_its_own(fitting: Fitting, fit: SpecimenFit, own: Bools, errors: Flo
     No fit to other tests knows these; they are taken out as far as their priors allow.
     """
     count = len(fitting.forward.nuisances(fit.hypothesis))
-    private = [k for k in range(count) if not fit.columns[~own, k].any() and fit.columns[own, k].any()]
-    if not private:
+    private = np.array([k for k in range(count) if not fit.columns[~own, k].any() and fit.columns[own, k].any()])
+    if not len(private):
         return errors
     # as errors are compared: row by row alike
     sigma = fit.kappa * np.sqrt(np.sum(fitting.factor[own] ** 2, axis=1))
-    W = fit.columns[np.ix_(own, private)] / sigma[:, None]
+    W = fit.columns[own][:, private] / sigma[:, None]
     z = np.linalg.solve(np.eye(len(private)) + W.T @ W, W.T @ (errors / sigma))
-    return errors - fit.columns[np.ix_(own, private)] @ z
+    return errors - fit.columns[own][:, private] @ z
 
 
 def placebos(fitting: Fitting, fit: SpecimenFit, folds: Folds, freedom: int, rng: np.random.Generator) -> Floats:

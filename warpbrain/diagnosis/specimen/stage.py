@@ -26,6 +26,8 @@ _PREDICTED = 3
 _RIVAL, _NEAR = 0.8, 25.0
 #: Probability that another branch of what was added already needs.
 _MORE = 0.5
+#: Probability below which a kind is in no label set.
+_LEAST = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +40,8 @@ class Candidate:
     physics : bool
     log_evidence : float
         Against the fit without it, anything smooth left over being allowed to both.
-    probability : float
+    probability, at_most : float
+        The smaller and the larger one, of nothing else and of anything smooth being left over.
     fit : SpecimenFit or None
         None of the unknown, and where no fit stands.
     predicted : Predicted or None
@@ -51,6 +54,7 @@ class Candidate:
     physics: bool
     log_evidence: float
     probability: float
+    at_most: float
     fit: SpecimenFit | None
     predicted: Predicted | None
     stress: Floats | None
@@ -162,29 +166,41 @@ class Staging:
         forward = self.fitting.forward
         base = float(np.logaddexp(without.log_evidence, with_smooth_changes(forward, without)) - np.log(2.0))
         log_evidence: dict[str, float] = {}
+        log_alone: dict[str, float] = {}
         fits: dict[str, SpecimenFit | None] = {}
         for kind, own in ways.items():
             self.say(f"fit with {kind}")
             found = [one for one in (self._fit(without, way) for way in own) if one is not None]
             fits[kind] = max(found, key=lambda one: one.log_evidence) if found else None
             # alone, or with something smooth left over: half each; over the ways of a kind: the mean
-            values = [np.logaddexp(one.log_evidence, with_smooth_changes(forward, one)) - np.log(2.0) for one in found]
-            log_evidence[kind] = (float(logsumexp(values)) - np.log(len(own)) if values else -np.inf) - base
-        fits[UNKNOWN], log_evidence[UNKNOWN] = None, with_smooth_changes(forward, without) - base
+            alone = np.array([one.log_evidence for one in found])
+            either = [np.logaddexp(one.log_evidence, with_smooth_changes(forward, one)) - np.log(2.0) for one in found]
+            log_evidence[kind] = (float(logsumexp(either)) - np.log(len(own)) if found else -np.inf) - base
+            log_alone[kind] = (float(logsumexp(alone)) - np.log(len(own)) if found else -np.inf) - without.log_evidence
+        smooth = with_smooth_changes(forward, without)
+        fits[UNKNOWN], log_evidence[UNKNOWN] = None, smooth - base
+        log_alone[UNKNOWN] = smooth - without.log_evidence
         physics = {kind: kind != UNKNOWN and ways[kind][0].physics for kind in log_evidence}
         alternatives = frozenset(kind for kind, own in physics.items() if not own and kind != UNKNOWN)
-        chances = probabilities(log_evidence, alternatives)
-        order = sorted(log_evidence, key=lambda kind: -chances[kind])
+        # a name must be sure whether or not something else may be left: the smaller of both counts
+        both = [probabilities(each, alternatives) for each in (log_evidence, log_alone)]
+        chances = {kind: min(each[kind] for each in both) for kind in log_evidence}
+        order = sorted(log_evidence, key=lambda kind: -(both[0][kind] + both[1][kind]))
         candidates = []
         for number, kind in enumerate(order):
             fit = fits[kind]
-            predicted = held_out(self.fitting, fit, self.folds) if fit is not None and (number < _PREDICTED or physics[kind]) else None
+            predicted = (
+                held_out(self.fitting, fit, self.folds)
+                if fit is not None and (number < _PREDICTED or physics[kind])
+                else None
+            )
             candidates.append(
                 Candidate(
                     kind,
                     physics[kind],
                     log_evidence[kind],
                     chances[kind],
+                    max(each[kind] for each in both),
                     fit,
                     predicted[0] if predicted else None,
                     predicted[1] if predicted else None,
@@ -222,5 +238,11 @@ def _rivals(candidates: Sequence[Candidate]) -> tuple[str, ...]:
 def _label_set(candidates: Sequence[Candidate]) -> tuple[str, ...]:
     """The fewest kinds that are probable enough together, and what predicts better than the first of them."""
     total = np.cumsum([one.probability for one in candidates])
-    count = int(np.searchsorted(total, TOGETHER)) + 1
-    return tuple(dict.fromkeys([*(one.kind for one in candidates[:count]), *_rivals(candidates)]))
+    # the smaller probabilities of all may not reach it
+    count = int(np.searchsorted(total, min(TOGETHER, float(total[-1])))) + 1
+    possible = [
+        one.kind
+        for k, one in enumerate(candidates)
+        if (k < count and one.at_most > _LEAST) or one.at_most > 1.0 - TOGETHER
+    ]
+    return tuple(dict.fromkeys([*possible, *_rivals(candidates)]))
