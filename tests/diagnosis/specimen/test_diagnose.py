@@ -116,9 +116,8 @@ def test_a_drifting_zero_is_no_physics():
     for name in ("cycle 1", "cycle 2"):
         time, stretch = cycle(100.0)
         stress = noisy(neo_hookean(stretch), rng)
-        tests.append(
-            rod_test(name, stretch, stress + 0.5 * np.abs(stress).max() * (first + time) / 200.0, first + time)
-        )
+        drifted = stress + 0.5 * np.abs(stress).max() * (first + time) / 200.0
+        tests.append(rod_test(name, stretch, drifted, first + time))
         first += 101.0
     found = diagnosed(tests)
     assert found.verdict == "not physics" and found.ranking[0].kind == "drift of the zero"

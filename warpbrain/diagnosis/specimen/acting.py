@@ -1,8 +1,8 @@
 """What a candidate does to the tests of a specimen, and how it may act: the faces that every candidate has here.
 
 Registered mechanisms (`warpbrain.physics.mechanisms`) act through the material. Candidates that are no mechanism of
-`run` (softening by earlier loading, end friction, another shape of the law, a drifting zero, unlike specimens) scale the
-simulated stress or add to it.
+`run` (softening by earlier loading, end friction, another shape of the law, a drifting zero, unlike specimens) scale
+the simulated stress or add to it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Fits a hypothesis to some of the tests without linearising, and says how probable it then is.
 
-Levenberg's steps to the most probable coefficients; evidence by Laplace about them, averaged over the scale of the noise
-(`warpbrain.diagnosis.evidence`). A step that makes no sense to a mechanism is shortened, never taken.
+Levenberg's steps to the most probable coefficients; evidence by Laplace about them, averaged over the scale of the
+noise (`warpbrain.diagnosis.evidence`). A step that makes no sense to a mechanism is shortened, never taken.
 """
 
 from __future__ import annotations

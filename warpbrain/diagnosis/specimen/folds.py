@@ -1,4 +1,4 @@
-"""What a hypothesis predicts of tests that it was not fitted to: each test in turn, its rows in blocks for intervals."""
+"""What a hypothesis predicts of tests that it was not fitted to: each in turn, its rows in blocks for intervals."""
 
 from __future__ import annotations
 
@@ -102,8 +102,9 @@ def _without_its_own(fitting: Fitting, fit: SpecimenFit, own: Bools, errors: Flo
 def placebos(fitting: Fitting, fit: SpecimenFit, folds: Folds, freedom: int, rng: np.random.Generator) -> Floats:
     """Held-out errors of a fit with smooth patterns that mean nothing in the place of a mechanism.
 
-    A pattern is a random smooth function of stretch, shear, the way along a test and the logarithm of its time, the same
-    in all tests, so that it can carry over to those that are held out as a mechanism does. Each competes to first order.
+    A pattern is a random smooth function of stretch, shear, the way along a test and the logarithm of its time, the
+    same in all tests, so that it can carry over to those that are held out as a mechanism does. Each competes to first
+    order.
     """
     protocol = fitting.forward.protocol
     where = _coordinates(protocol)

@@ -1,11 +1,11 @@
 """Stress of a homogeneous state, in closed form or by a few Newton steps for all states of a test at once.
 
-A state is a stretch along z, two lateral stretches and a shear of x along z, `F = [[lx, 0, g], [0, ly, 0], [0, 0, lz]]`.
+A state is a stretch along z, two lateral ones and a shear of x along z, `F = [[lx, 0, g], [0, ly, 0], [0, 0, lz]]`.
 Stresses are slopes of the energy, taken by differences, so that every law of the house is the same to them. Lateral
 faces are free: lubricated ends leave `lx` and `ly` to equilibrium. Simple shear prescribes all of `F`.
 
-Memory is that of `warpbrain.physics.mechanisms.viscoelasticity`, integrated exactly for a stress that goes straight from
-row to row: `q_n = sum_m beta (tau/h_m) (1 - exp(-h_m/tau)) exp(-(t_n - t_m)/tau) (S_m - S_(m-1))` (Simo and Hughes,
+Memory is that of `warpbrain.physics.mechanisms.viscoelasticity`, integrated exactly for a stress that goes straight
+from row to row: `q_n = sum_m beta (tau/h_m) (1 - exp(-h_m/tau)) exp(-(t_n - t_m)/tau) (S_m - S_(m-1))` (Simo and Hughes,
 Computational Inelasticity, section 10.3, before its midpoint rule).
 """
 

@@ -1,4 +1,4 @@
-"""What the noise of tests is taken to be: independent readings, and a smooth part that a whole stretch of a curve shares.
+"""What the noise of tests is taken to be: independent readings, and a smooth part that a stretch of a curve shares.
 
 Errors of a curve are alike from row to row: of a mean over specimens, of a gauge, of a shape that is not quite what was
 measured. Taking them for independent makes any difference significant. Its scale is unknown and is averaged over.
@@ -27,7 +27,7 @@ def noise_factor(protocol: Protocol) -> Floats:
 
 
 def smooth_patterns(protocol: Protocol, size: float, count: int = 8) -> Floats:
-    """Columns (n, count per test) that explain any smooth change of a test, of a size relative to its largest stress."""
+    """Columns (n, count per test) of any smooth change of a test, of a size relative to its largest stress."""
     columns = []
     for test, rows in zip(protocol.tests, protocol.rows, strict=True):
         values, vectors = np.linalg.eigh(_alike(test, 2.0 * REACH))

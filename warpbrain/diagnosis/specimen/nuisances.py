@@ -4,7 +4,7 @@
 
 The modulus `m` is free within a factor of 3; specimens of one tissue vary by a fifth; the zero of a gauge and its drift
 are a fiftieth of the largest stress; the law may have a share of the second invariant and stiffen a little; what
-glued ends do is known to half of it, since glue gives way and cut faces are not those of the computed shape.
+glued ends do may be twice that of the computed shape or nothing, since glue gives way and cut faces are not flat.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from warpbrain.diagnosis.specimen.protocol import Protocol
 
 Floats = NDArray[np.float64]
 
-#: Standard deviations: logarithms of modulus and of a specimen's, part of what glued ends do, zero and drift of the largest stress, share of the
-#: second invariant, stiffening.
-MODULUS, SPECIMEN, ENDS, ZERO, DRIFT, SHARE, STIFFENING = 1.1, 0.2, 0.5, 0.02, 0.02, 0.15, 1.0
+#: Standard deviations: logarithms of modulus and of a specimen's, part of what glued ends do, zero and drift of the
+#: largest stress, share of the second invariant, stiffening.
+MODULUS, SPECIMEN, ENDS, ZERO, DRIFT, SHARE, STIFFENING = 1.1, 0.2, 1.0, 0.02, 0.02, 0.15, 1.0
 
 
 class Nuisances:
@@ -44,7 +44,7 @@ class Nuisances:
             self.logarithmic = np.column_stack([self.logarithmic, SPECIMEN * specimen_rows(protocol)])
             self.names += [f"specimen {name}" for name in protocol.specimens]
         if shape_of_law and bool(np.any(unit.glued != 1.0)):
-            # 1 standard deviation takes half of the factor away, 2 leave a homogeneous state
+            # 1 standard deviation leaves a homogeneous state
             self.logarithmic = np.column_stack([self.logarithmic, -ENDS * np.log(unit.glued)])
             self.names.append("ends that hold less")
         I = invariant_rows(protocol)

@@ -1,4 +1,4 @@
-"""The tests of a specimen as a diagnosis sees them: few rows of each, as stress over strain, in chains that share memory.
+"""The tests of a specimen as a diagnosis sees them: few rows of each, stress over strain, in chains of one memory.
 
 Every response is turned into a nominal stress [Pa]: a force over the area of an end, a torque over `int r dA`. Every
 imposed value is turned into a strain: a stretch, a shear, or the shear at the rim of a twisted cylinder. Of a test with
@@ -225,7 +225,7 @@ def radius_of(specimen: Specimen) -> float:
 
 
 def roughness(values: Floats) -> float:
-    """Standard deviation of what is independent from row to row: from second differences, which smooth parts have not."""
+    """Standard deviation of what is independent from row to row: second differences, which smooth parts have not."""
     if len(values) < 5:
         return 0.0
     second = values[2:] - 2.0 * values[1:-1] + values[:-2]

@@ -78,8 +78,8 @@ def assumptions_of(
     if chains:
         found.append("Tests whose times go on are one history: tissue remembers the earlier ones.")
     found.append(
-        f"The noise of a test is {100 * INDEPENDENT:g} % of its largest stress or its roughness, and {100 * COMMON:g} % "
-        f"that a stretch of the curve has in common, times {fit.kappa:.2f}, which was found."
+        f"The noise of a test is {100 * INDEPENDENT:g} % of its largest stress or its roughness, and "
+        f"{100 * COMMON:g} % that a stretch of the curve has in common, times {fit.kappa:.2f}, which was found."
     )
     if case.specimen.grips == "glued":
         low, high = float(forward.unit.glued.min()), float(forward.unit.glued.max())

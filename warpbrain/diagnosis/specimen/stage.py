@@ -179,13 +179,13 @@ class Staging:
             log_alone[kind] = (float(logsumexp(alone)) - np.log(len(own)) if found else -np.inf) - without.log_evidence
         smooth = with_smooth_changes(forward, without)
         fits[UNKNOWN], log_evidence[UNKNOWN] = None, smooth - base
-        log_alone[UNKNOWN] = smooth - without.log_evidence
         physics = {kind: kind != UNKNOWN and ways[kind][0].physics for kind in log_evidence}
         alternatives = frozenset(kind for kind, own in physics.items() if not own and kind != UNKNOWN)
         # a name must be sure whether or not something else may be left: the smaller of both counts
         both = [probabilities(each, alternatives) for each in (log_evidence, log_alone)]
-        chances = {kind: min(each[kind] for each in both) for kind in log_evidence}
-        order = sorted(log_evidence, key=lambda kind: -(both[0][kind] + both[1][kind]))
+        chances = {kind: min(each.get(kind, 1.0) for each in both) for kind in log_evidence}
+        at_most = {kind: max(each.get(kind, 0.0) for each in both) for kind in log_evidence}
+        order = sorted(log_evidence, key=lambda kind: -(chances[kind] + at_most[kind]))
         candidates = []
         for number, kind in enumerate(order):
             fit = fits[kind]
@@ -200,7 +200,7 @@ class Staging:
                     physics[kind],
                     log_evidence[kind],
                     chances[kind],
-                    max(each[kind] for each in both),
+                    at_most[kind],
                     fit,
                     predicted[0] if predicted else None,
                     predicted[1] if predicted else None,

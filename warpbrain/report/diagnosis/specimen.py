@@ -1,4 +1,4 @@
-"""A diagnosis of a specimen as JSON and as lines of text: the keys of `diagnosis.json`, stresses in the place of lengths."""
+"""A diagnosis of a specimen as JSON and as lines of text: the keys of `diagnosis.json`, stresses for lengths."""
 
 from __future__ import annotations
 
