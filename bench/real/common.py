@@ -87,18 +87,18 @@ def recorded_test(
     )
 
 
-def diagnose(case: Case, out: Path) -> tuple[SpecimenDiagnosis, dict[str, Any]]:
+def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosis, dict[str, Any]]:
     """Write a case folder, read it, diagnose it as `warpbrain diagnose` does, and write what was found beside it."""
     start_warp_quietly()
     folder = out / case.name
     if not (folder / "case.toml").exists():
         write_case(folder, case)
-    options = DiagnosisOptions()
+    options = DiagnosisOptions(ends=ends)
     start = time.perf_counter()
     listener = Listener(stage=lambda text: print(f"{time.perf_counter() - start:7.1f} s  {text}", flush=True))
     found = DiagnosingSpecimen(read_case(folder), options, "cpu", listener).run()
     said = describe_specimen_diagnosis(found, options, "cpu")
-    beside = out / f"{case.name}-diagnosis"
+    beside = out / f"{case.name}-diagnosis{'' if ends else '-homogeneous'}"
     beside.mkdir(parents=True, exist_ok=True)
     write_curves(beside / "curves.csv", found)
     if found.explained is not None:

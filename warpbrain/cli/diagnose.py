@@ -37,6 +37,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="leave out what makes the method work, for comparisons: credit mechanisms with what stiffness, "
         "registration and mesh could explain",
     )
+    add("--homogeneous", action="store_true", help="of a specimen: take its state for homogeneous whatever its grips")
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
     add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-diagnose-CASE)")
     add("--quiet", action="store_true", help="print nothing but errors")
@@ -53,6 +54,7 @@ def _run(options: argparse.Namespace) -> None:
         options.seed,
         mesh_error=not options.no_discretisation,
         without_nuisances=options.ablation == "no-nuisances",
+        ends=not options.homogeneous,
     )
     say: Callable[..., None] = _silent if options.quiet else print
 

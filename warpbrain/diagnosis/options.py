@@ -28,6 +28,9 @@ class DiagnosisOptions:
     without_nuisances : bool
         Credit mechanisms with what nuisances could explain too: what the method is worth without its heart, for
         comparisons.
+    ends : bool
+        Of specimens: whether glued ends are computed; otherwise states are taken for homogeneous, as test evaluations
+        do.
 
     Raises
     ------
@@ -41,6 +44,7 @@ class DiagnosisOptions:
     draws: int = 400
     mesh_error: bool = True
     without_nuisances: bool = False
+    ends: bool = True
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.alpha) and 0.0 < self.alpha < 0.5):

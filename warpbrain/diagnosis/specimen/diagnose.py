@@ -95,7 +95,7 @@ class DiagnosingSpecimen:
         rng = np.random.default_rng([options.seed, 11])
         self.listener.stage("base: the case as declared, its tissue refitted")
         with self._timed("base"):
-            forward = Forward(self.case, protocol, self.device)
+            forward = Forward(self.case, protocol, self.device, options.ends)
             fitting = Fitting(forward, noise_factor(protocol))
             folds = folds_of(protocol)
             hypothesis = Hypothesis()

@@ -56,12 +56,14 @@ class Forward:
     protocol : Protocol
     device : str, optional
         Of the finite elements that glued ends need.
+    ends : bool
+        Whether glued ends are computed; otherwise the state is taken for homogeneous.
     """
 
-    def __init__(self, case: Case, protocol: Protocol, device: str | None = None) -> None:
+    def __init__(self, case: Case, protocol: Protocol, device: str | None = None, ends: bool = True) -> None:
         assert case.specimen is not None
         self.case, self.protocol = case, protocol
-        self._glued = case.specimen.grips == "glued"
+        self._glued = case.specimen.grips == "glued" and ends
         self.shape = Shape(case, protocol, device)
         self._responses: dict[tuple[str, ...], Floats] = {}
         declared = HomogeneousMaterial.of_case(case, ())

@@ -5,8 +5,8 @@ Stresses are slopes of the energy, taken by differences, so that every law of th
 faces are free: lubricated ends leave `lx` and `ly` to equilibrium. Simple shear prescribes all of `F`.
 
 Memory is that of `warpbrain.physics.mechanisms.viscoelasticity`, integrated exactly for a stress that goes straight
-from row to row: `q_n = sum_m beta (tau/h_m) (1 - exp(-h_m/tau)) exp(-(t_n - t_m)/tau) (S_m - S_(m-1))` (Simo and Hughes,
-Computational Inelasticity, section 10.3, before its midpoint rule).
+from row to row: `q_n = sum_m beta (tau/h_m) (1 - exp(-h_m/tau)) exp(-(t_n - t_m)/tau) (S_m - S_(m-1))` (Simo and
+Hughes, Computational Inelasticity, section 10.3, before its midpoint rule).
 """
 
 from __future__ import annotations

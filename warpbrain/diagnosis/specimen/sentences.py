@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.result import GROUP, NOT_PHYSICS, NOTHING, UNKNOWN, Ranked, Smallest
 from warpbrain.diagnosis.specimen.fitting import SpecimenFit
@@ -81,12 +83,14 @@ def assumptions_of(
         f"The noise of a test is {100 * INDEPENDENT:g} % of its largest stress or its roughness, and "
         f"{100 * COMMON:g} % that a stretch of the curve has in common, times {fit.kappa:.2f}, which was found."
     )
-    if case.specimen.grips == "glued":
+    if case.specimen.grips == "glued" and np.any(forward.unit.glued != 1.0):
         low, high = float(forward.unit.glued.min()), float(forward.unit.glued.max())
         found.append(
             f"Stress is that of the homogeneous state times {low:.3g} to {high:.3g}, the factor of glued ends: finite "
             f"elements ({ELEMENTS}) of the law that was arrived at, elastic; memory is taken to have the same factor."
         )
+    elif case.specimen.grips == "glued":
+        found.append("The state is taken for homogeneous, though the ends are glued.")
     else:
         found.append("Ends slide without friction: the state is homogeneous.")
     found.append(f"Allowed to explain differences first: {', '.join(forward.nuisances(fit.hypothesis).names)}.")

@@ -1,9 +1,9 @@
 """How much more a glued specimen resists than a homogeneous state: computed with finite elements, as a factor.
 
 The factor is the nominal stress of the rig (`warpbrain.simulation.specimen`) over that of the homogeneous state, both
-of one law, at a few strains. It depends little on the law, so it is computed for the law that a hypothesis has arrived at,
-and again when that has changed. Memory is taken to have the same factor. Where the rig finds no equilibrium, far out,
-the factor of the farthest strain that it reached is kept.
+of one law, at a few strains. It is computed for the law that a hypothesis has arrived at, and again when that has
+changed. Memory is taken to have the same factor. Where the rig finds no equilibrium, far out, the factor of the
+farthest strain that it reached is kept.
 """
 
 from __future__ import annotations

@@ -55,6 +55,7 @@ def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: DiagnosisOpti
             "alpha": options.alpha,
             "seed": options.seed,
             "draws": options.draws,
+            "ends": options.ends,
         },
         "seconds": found.seconds,
         "device": device,
