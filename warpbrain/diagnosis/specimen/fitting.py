@@ -183,7 +183,7 @@ class Fitting:
         log_evidence = float(logsumexp(explanation.log_none(white[:, None])[:, 0] + kappa_log_prior()))
         kappa = explanation.best_kappa(white)
         W = explanation.whitened(columns[rows]) / kappa
-        covariance: Floats = np.linalg.inv(np.eye(len(z)) + W.T @ W)
+        covariance = np.asarray(np.linalg.inv(np.eye(len(z)) + W.T @ W), dtype=np.float64)
         # at a limit of a parameter the linear model has a better point than there is
         there = _cost(white / kappa - W @ z, z, 1.0)
         beyond = covariance @ (W.T @ (white / kappa))

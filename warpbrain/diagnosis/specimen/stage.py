@@ -40,8 +40,10 @@ class Candidate:
     physics : bool
     log_evidence : float
         Against the fit without it, anything smooth left over being allowed to both.
-    probability, at_most : float
-        The smaller and the larger one, of nothing else and of anything smooth being left over.
+    probability : float
+        Among all, nothing else being left over.
+    at_most : float
+        The larger one of that and of anything smooth being left over.
     fit : SpecimenFit or None
         None of the unknown, and where no fit stands.
     predicted : Predicted or None
@@ -155,7 +157,8 @@ class Staging:
         why = "; ".join(self._vetoes(best, candidates))
         # more of what is added already needs no new name
         known = best.kind in without.hypothesis.kinds
-        spoken = best.physics and best.probability >= (_MORE if known else SURE) and not why
+        sure = best.at_most >= _MORE if known else best.probability >= SURE
+        spoken = best.physics and sure and not why
         accepted = best if spoken or (best.fit is not None and not best.physics and best.probability >= 0.5) else None
         label_set = () if accepted else _label_set(candidates)
         return Stage(without, p, columns, candidates, predicted, stress, accepted, label_set, why)
@@ -181,11 +184,13 @@ class Staging:
         fits[UNKNOWN], log_evidence[UNKNOWN] = None, smooth - base
         physics = {kind: kind != UNKNOWN and ways[kind][0].physics for kind in log_evidence}
         alternatives = frozenset(kind for kind, own in physics.items() if not own and kind != UNKNOWN)
-        # a name must be sure whether or not something else may be left: the smaller of both counts
-        both = [probabilities(each, alternatives) for each in (log_evidence, log_alone)]
-        chances = {kind: min(each.get(kind, 1.0) for each in both) for kind in log_evidence}
-        at_most = {kind: max(each.get(kind, 0.0) for each in both) for kind in log_evidence}
-        order = sorted(log_evidence, key=lambda kind: -(chances[kind] + at_most[kind]))
+        # Smooth changes of single tests carry over to no other test: beside them half a cause fits as well as a whole
+        # one. They say whether there is a name at all; which it is, is said without them, and by held-out tests.
+        with_rest, alone_only = (probabilities(each, alternatives) for each in (log_evidence, log_alone))
+        known = 1.0 - with_rest[UNKNOWN]
+        chances = {UNKNOWN: with_rest[UNKNOWN]} | {kind: known * own for kind, own in alone_only.items()}
+        at_most = {kind: max(own, with_rest[kind]) for kind, own in chances.items()}
+        order = sorted(chances, key=lambda kind: -chances[kind])
         candidates = []
         for number, kind in enumerate(order):
             fit = fits[kind]
