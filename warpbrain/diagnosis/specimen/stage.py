@@ -154,9 +154,12 @@ class Staging:
             return nothing
         candidates = self._candidates(without, ways)
         best = candidates[0]
-        why = "; ".join(self._vetoes(best, candidates))
         # more of what is added already needs no new name
         known = best.kind in without.hypothesis.kinds
+        vetoes = self._vetoes(best, candidates)
+        if best.physics and not known and best.predicted is not None and best.predicted.rmse >= predicted.rmse:
+            vetoes.append("held-out tests are not predicted better with it")
+        why = "; ".join(vetoes)
         sure = best.at_most >= _MORE if known else best.probability >= SURE
         spoken = best.physics and sure and not why
         accepted = best if spoken or (best.fit is not None and not best.physics and best.probability >= 0.5) else None
