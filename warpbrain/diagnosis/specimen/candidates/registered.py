@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -40,13 +41,35 @@ def assumptions(case: Case, protocol: Protocol) -> tuple[dict[str, tuple[Assumpt
             continue
         try:
             _require_testable(known, case, protocol)
-            proposals = known.proposals(situation)
+            proposals = _branches() if known is Viscoelasticity else known.proposals(situation)
             # ways that differ are beginnings enough
             starts = _STARTS if len(proposals) == 1 else _STARTS[:1]
             found[kind] = tuple(_assumption(known, proposal, starts) for proposal in proposals)
         except NotTestableError as error:
             rejected[kind] = f"not testable with these data: {error}"
     return found, rejected
+
+
+def _branches() -> list[Proposal]:
+    """One branch, at short, middle and long times of relaxation; its coefficients are `ln beta` and `ln tau`.
+
+    Not what the mechanism proposes itself: tests in time tell its own time of relaxation, and it is fitted.
+    """
+    says = Viscoelasticity.parameters()
+    modulus, relaxation = says["moduli"].expectation, says["times"].expectation
+    assert modulus is not None and relaxation is not None
+    sd = 0.5 * math.log(modulus.quantile(0.841) / modulus.quantile(0.159))
+    apart = math.log(relaxation.quantile(0.5) / relaxation.quantile(1.0 / 6.0))
+    return [
+        Proposal(
+            make=lambda c: Viscoelasticity(moduli=(math.exp(c[0]),), times=(math.exp(c[1]),)),
+            mean=np.array([math.log(modulus.quantile(0.5)), math.log(relaxation.quantile(part))]),
+            sd=np.array([sd, 0.5 * apart]),
+            follows="smooth",
+            region=f"relaxing in about {relaxation.quantile(part):.2g} s",
+        )
+        for part in (1.0 / 6.0, 0.5, 5.0 / 6.0)
+    ]
 
 
 def tells_time(protocol: Protocol) -> bool:
