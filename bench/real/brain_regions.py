@@ -54,7 +54,7 @@ def main() -> None:
         rows[f"{region}, homogeneous"] = row(found, said)
         for number, axis in enumerate(line):
             draw(axis, found, number, "strain", ("heldout refitted", "heldout explained"))
-            axis.set_title(f"{region.replace('_', ' ')}: {axis.get_title()} from the others", fontsize=9)
+            axis.set_title(f"{region.replace('_', ' ')}: {axis.get_title()} from the others", fontsize=8)
     axes[0, 0].legend(frameon=False, fontsize=8)
     write_results("real_brain_regions", rows)
     figure.savefig(FIGURES / "real-brain-regions.png", dpi=150)
