@@ -85,6 +85,6 @@ def _accuracy(file: Path, effects: Sequence[Outcome]) -> None:
     ticks = [f"{bin_name(low, high)}\n({count})" for (low, high), count in zip(BINS, counts, strict=True)]
     axes.set_xticks(range(len(BINS)), ticks)
     axes.set(ylim=(0, 1.05), xlabel="detectability of the effect (cases)", ylabel="share, with 95 % interval")
-    axes.legend(loc="lower right", frameon=False)
+    axes.legend(loc="upper left", frameon=False)
     figure.savefig(file, dpi=150)
     plt.close(figure)

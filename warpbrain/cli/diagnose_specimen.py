@@ -35,6 +35,7 @@ def run(
     from warpbrain.atomic import output_folder, safe_name
     from warpbrain.diagnosis.specimen.diagnose import DiagnosingSpecimen
     from warpbrain.report.diagnosis.files import write_explained
+    from warpbrain.report.diagnosis.html import write_page
     from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines
     from warpbrain.report.diagnosis.specimen_curves import write_curves
     from warpbrain.report.files import write_summary
@@ -59,6 +60,7 @@ def run(
     if found.explained is not None:
         write_explained(out / "explained", found.explained)
         written.append("explained")
-    # last: whoever finds it finds the others
+    # after all that it speaks of: whoever finds it finds the others
     write_summary(out / "diagnosis.json", said)
-    say("", f"written to {out}: diagnosis.json, {', '.join(written)}", sep="\n")
+    write_page(out)
+    say("", f"written to {out}: report.html, diagnosis.json, {', '.join(written)}", sep="\n")

@@ -80,7 +80,7 @@ def held_out(fitting: Fitting, fit: SpecimenFit, folds: Folds) -> tuple[Predicte
         predicted[own] = found.stress[own]
         errors[own] = _without_its_own(fitting, found, own, (forward.protocol.observed - found.stress)[own])
     rows = folds.fitted
-    return Predicted(errors[rows] / folds.scale[rows], folds.blocks[rows]), predicted
+    return Predicted(errors[rows] / folds.scale[rows], folds.blocks[rows], np.flatnonzero(rows)), predicted
 
 
 def _without_its_own(fitting: Fitting, fit: SpecimenFit, own: Bools, errors: Floats) -> Floats:

@@ -1,0 +1,87 @@
+"""Evidence in closed form beside the density of a normal distribution, and what nuisances may not change."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.stats import kstest, multivariate_normal
+
+from warpbrain.diagnosis.effects import Effect
+from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Inner, kappa_log_prior
+
+N = 40
+
+
+@dataclass
+class Example:
+    noise: np.ndarray
+    nuisances: np.ndarray
+    effects: list[Effect]
+
+    @property
+    def explanation(self) -> Explanation:
+        return Explanation(np.linalg.cholesky(self.noise), self.nuisances)
+
+
+@pytest.fixture
+def example() -> Example:
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(N, N))
+    noise = 0.05 * root @ root.T + np.eye(N)
+    effects = [Effect(None, rng.normal(size=N), rng.normal(size=(N, k))) for k in (1, 3, 1, 2)]
+    return Example(noise, rng.normal(size=(N, 5)), effects)
+
+
+@pytest.mark.parametrize("kappa", [0.7, 1.0, 2.0])
+def test_it_is_the_density_of_a_normal_distribution(example: Example, kappa: float) -> None:
+    rng = np.random.default_rng(2)
+    residuals = rng.normal(size=(N, 3))
+    explanation = example.explanation
+    white = explanation.whitened(residuals)
+    none = explanation.log_none(white, np.array([kappa]))[0]
+    factors = explanation.log_factors(explanation.stack(example.effects), white, np.array([kappa]))[0]
+    S = kappa**2 * example.noise + example.nuisances @ example.nuisances.T
+    for b in range(3):
+        assert none[b] == pytest.approx(multivariate_normal(np.zeros(N), S).logpdf(residuals[:, b]), rel=1e-9)
+        for v, effect in enumerate(example.effects):
+            whole = multivariate_normal(effect.mean, S + effect.columns @ effect.columns.T).logpdf(residuals[:, b])
+            assert none[b] + factors[v, b] == pytest.approx(whole, rel=1e-9)
+
+
+def test_coefficients_are_the_posterior_mean(example: Example) -> None:
+    rng = np.random.default_rng(3)
+    residual = rng.normal(size=(N, 1))
+    explanation = example.explanation
+    stack = explanation.stack(example.effects)
+    S = example.noise + example.nuisances @ example.nuisances.T
+    for v, effect in enumerate(example.effects):
+        z, covariance = Inner(explanation, stack, explanation.whitened(residual)).coefficients(1.0, v)
+        precision = np.eye(effect.columns.shape[1]) + effect.columns.T @ np.linalg.solve(S, effect.columns)
+        expected = np.linalg.solve(precision, effect.columns.T @ np.linalg.solve(S, residual[:, 0] - effect.mean))
+        np.testing.assert_allclose(z, expected, rtol=1e-8)
+        np.testing.assert_allclose(covariance, np.linalg.inv(precision), rtol=1e-8, atol=1e-12)
+
+
+def test_what_a_nuisance_can_do_is_worth_nothing(example: Example) -> None:
+    # a nuisance that may be anything, and residuals moved along it
+    free = Explanation(np.linalg.cholesky(example.noise), 1e4 * example.nuisances)
+    rng = np.random.default_rng(4)
+    residual = rng.normal(size=(N, 1))
+    moved = residual + example.nuisances @ rng.normal(size=(5, 1))
+    stack = free.stack(example.effects)
+    before, after = (free.log_factors(stack, free.whitened(r)) for r in (residual, moved))
+    np.testing.assert_allclose(after, before, atol=1e-3)
+
+
+def test_p_values_of_draws_are_uniform(example: Example) -> None:
+    explanation = example.explanation
+    stack = explanation.stack(example.effects)
+
+    def statistic(count: int, seed: int) -> np.ndarray:
+        draws = explanation.draws(count, 1.0, np.random.default_rng(seed))
+        weights = kappa_log_prior()[:, None, None]
+        return np.asarray((explanation.log_factors(stack, draws, KAPPAS) + weights).max(axis=(0, 1)))
+
+    null, own = np.sort(statistic(2000, 5)), statistic(500, 6)
+    p = 1.0 - np.searchsorted(null, own) / len(null)
+    assert kstest(p, "uniform").pvalue > 0.01

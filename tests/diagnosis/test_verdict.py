@@ -1,0 +1,56 @@
+"""The rule: each of the seven verdicts, and what keeps a name from being spoken."""
+
+from collections.abc import Mapping
+
+import pytest
+
+from warpbrain.diagnosis.result import (
+    CANNOT_SAY,
+    GROUP,
+    NAMED,
+    NAMED_AND_REST,
+    NOT_PHYSICS,
+    NOTHING,
+    UNKNOWN,
+    Ranked,
+)
+from warpbrain.diagnosis.verdict import Evidence, decide
+
+
+def found(chances: Mapping[str, float], **known: object) -> Evidence:
+    ranking = [
+        Ranked(kind, kind not in ("unknown", "registration", "mesh"), 10.0, chance, 9.0, -1e-4, (), None, None, "")
+        for kind, chance in chances.items()
+    ]
+    given = {
+        "alpha": 0.05,
+        "p_value": 0.001,
+        "ranking": ranking,
+        "gain": (0.4, 0.2, 0.5),
+        "placebo_p": 0.01,
+        "adequacy_p": 0.5,
+        "size": 1.0,
+    }
+    return Evidence(**(given | known))
+
+
+@pytest.mark.parametrize(
+    ("chances", "known", "expected"),
+    [
+        ({"gravity": 1.0}, {"p_value": 0.3}, NOTHING),
+        ({"gravity": 0.97, "pressure": 0.03}, {}, NAMED),
+        ({"gravity": 0.97, "pressure": 0.03}, {"adequacy_p": 0.001}, NAMED_AND_REST),
+        ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {}, GROUP),
+        ({"unknown": 0.8, "gravity": 0.2}, {}, UNKNOWN),
+        ({"registration": 0.8, "gravity": 0.2}, {}, NOT_PHYSICS),
+        ({"gravity": 0.97, "pressure": 0.03}, {"gain": (0.1, -0.1, 0.3)}, CANNOT_SAY),
+        ({"gravity": 0.97, "pressure": 0.03}, {"placebo_p": 0.3}, CANNOT_SAY),
+        ({"gravity": 0.97, "pressure": 0.03}, {"size": 7.0}, CANNOT_SAY),
+    ],
+)
+def test_it_says(chances: Mapping[str, float], known: Mapping[str, object], expected: str) -> None:
+    assert decide(found(chances, **known)).verdict == expected
+
+
+def test_a_name_that_is_kept_back_says_why() -> None:
+    assert "held out" in decide(found({"gravity": 0.99}, gain=(0.0, -0.1, 0.1))).why
