@@ -7,6 +7,7 @@ body that holds it; a constant one on a body that is free does too. The imaged s
 tension acted.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -18,6 +19,7 @@ from warpbrain.physics.directions import element_directions, unit_vector
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
 
@@ -97,6 +99,19 @@ class ResidualStress(Mechanism):
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)
         element_directions(mesh, elements_of(mesh, self.elements), self.direction, self.field)
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """Along each axis of the anatomy, in all tissue."""
+        return [
+            Proposal.of_one(
+                lambda tension, axis=axis: cls(tension=tension, direction=tuple(axis)),
+                0.0,
+                300.0,
+                region=f"tension along {name}",
+            )
+            for name, axis in zip("xyz", np.eye(3).tolist(), strict=True)
+        ]
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
         """See `warpbrain.physics.term.Following`."""
