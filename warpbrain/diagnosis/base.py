@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effects
 from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.flexible import LENGTHS, flexible_columns
+from warpbrain.diagnosis.flexible import LENGTHS, SCALES, flexible_columns
 from warpbrain.diagnosis.gross_errors import ASIDE, gross_errors
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.mesh_error import mesh_error
-from warpbrain.diagnosis.nuisances import Nuisances, nuisances_at
+from warpbrain.diagnosis.nuisances import REGISTRATION_SD, Nuisances, nuisances_at
 from warpbrain.diagnosis.options import Listener
 from warpbrain.diagnosis.sensing import explanation_of, known_sigma
 from warpbrain.diagnosis.sensors import tracked_points
@@ -91,6 +91,17 @@ class Base:
         """The residual, whitened by the noise."""
         return self.explanation.whitened(self.residual)
 
+    @property
+    def typical_noise(self) -> float:
+        """Median of the noise of displacements [m]."""
+        return float(np.median(self.noise[self.at.sensors.is_displacement]))
+
+    @property
+    def smooth_forces(self) -> list[Floats]:
+        """Columns of smooth forces of each length and size."""
+        noise = self.typical_noise
+        return [scale * noise * columns for columns in self.flexible for scale in SCALES]
+
     def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
         """What nuisances do to the displacement of other points (k, 3) [m], and what makes effects there."""
         at = self.at.with_sensors(tracked_points(self.at.system.model.mesh, points, self.states.centre))
@@ -141,7 +152,7 @@ class BaseFinder:
         kappa = explanation.best_kappa(rough.whitened)
         xi = explanation.nuisances_given(rough.whitened, kappa)
         z = xi[registration] + _ROUGHLY * xi[-6:]
-        self.states.realign(z * rough.nuisances.registration_sd)
+        self.states.realign(z * REGISTRATION_SD)
         hypothesis = self._moved(rough.nuisances, xi)
         try:
             second = self.states.solve(hypothesis, first.u)
@@ -185,7 +196,7 @@ class BaseFinder:
         z = np.zeros(nuisances.columns.shape[1])
         z[nuisances.part("tissue")] = np.linalg.solve(self.prior.factor, theta - self.prior.mean)
         z[nuisances.part("stiffness field")] = state.hypothesis.field
-        z[nuisances.part("registration")] = self.states.motion / nuisances.registration_sd
+        z[nuisances.part("registration")] = self.states.motion / REGISTRATION_SD
         residual = sensors.residual - nuisances.mean + nuisances.columns @ z
         anything = _any_force(flexible, residual, at)
         loose = np.column_stack([nuisances.columns, anything])

@@ -14,19 +14,18 @@ from warpbrain.cases.case import Case
 from warpbrain.diagnosis.alternatives import alternatives_at
 from warpbrain.diagnosis.base import Base, BaseFinder
 from warpbrain.diagnosis.calibration import probabilities
-from warpbrain.diagnosis.confounding import SEEN, Gram
 from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
-from warpbrain.diagnosis.evidence import Inner, kappa_log_prior
+from warpbrain.diagnosis.evidence import Inner, Stack
 from warpbrain.diagnosis.flexible import SCALES
 from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo, scattered_blocks, spatial_blocks
-from warpbrain.diagnosis.locating import ScoreMap, score_map
+from warpbrain.diagnosis.locating import ScoreMap, ball_of, score_map
 from warpbrain.diagnosis.measuring import next_measurements
 from warpbrain.diagnosis.observable import require_observable
 from warpbrain.diagnosis.options import DiagnosisOptions, Listener
-from warpbrain.diagnosis.parameters import scanned_values, smallest_of, values_of
+from warpbrain.diagnosis.parameters import SEEN, scanned_values, smallest_of, values_of
 from warpbrain.diagnosis.refitting import Refit, Refitting
 from warpbrain.diagnosis.result import Diagnosis, Fit, Ranked, Smallest
-from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening
+from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening, log_unknown
 from warpbrain.diagnosis.sentences import assumptions_of, sentence_of
 from warpbrain.diagnosis.states import States
 from warpbrain.diagnosis.verdict import Evidence, decide
@@ -92,17 +91,16 @@ class Diagnosing:
             candidates = self._candidates(base)
         self.listener.stage("screening")
         with self._timed("screening"):
-            noise = float(np.median(base.noise[base.at.sensors.is_displacement]))
-            flexible = [scale * noise * columns for columns in base.flexible for scale in SCALES]
-            screening = Screening(base.explanation, candidates, flexible)
+            screening = Screening(base.explanation, candidates, base.smooth_forces)
             screen = screening.run(base.whitened[:, None])
         kappa = base.explanation.best_kappa(base.whitened)
         with self._timed("significance"):
             draws = base.explanation.draws(options.draws, kappa, rng)
             null = screening.run(draws).alarm
             p_value = float((1 + np.sum(null >= screen.alarm[0])) / (1 + len(null)))
-            at = base.at
-            where = score_map(at, base.explanation, base.whitened, draws, kappa, 0.7 * spacing, spacing, options.alpha)
+            where = score_map(
+                base.at, base.explanation, base.whitened, draws, kappa, 0.7 * spacing, spacing, options.alpha
+            )
         with self._timed("refit"):
             fits = self._refits(base, candidates, screen, kappa)
         with self._timed("held out"):
@@ -119,7 +117,6 @@ class Diagnosing:
         refitting = Refitting(
             self.states, base.prior, base.nuisances, base.explanation.factor, base.state, base.difference
         )
-        stack = base.explanation.stack(candidates.effects)
         order = np.argsort(-screen.log_factors[: len(candidates.kinds), 0]).tolist()
         best = screen.log_factors[order[0], 0] if order else 0.0
         chosen = [candidates.kinds[k] for k in order[:_REFITTED] if best - screen.log_factors[k, 0] < _BEHIND]
@@ -129,7 +126,7 @@ class Diagnosing:
             effects = () if kind == "none" else (candidates.effects[screen.best_effect(candidates, kind)],)
             if any(effect.proposal is None for effect in effects):
                 continue
-            begin = _linear_point(base, stack, candidates, screen, kind, kappa)
+            begin = _linear_point(base, candidates, screen, kind, kappa)
             try:
                 fits[kind] = refitting.fit(effects, begin, kappa)
             except (SolveError, InputError):
@@ -160,16 +157,13 @@ class Diagnosing:
         without = {way: way.predict(linear, columns) for way in (regions, scattered)}
         predicted = {kind: ways[kind].predict(f.linear, f.columns) for kind, f in fits.items() if kind != "none"}
         beside = {kind: without[ways[kind]] for kind in fits}
-        gram = Gram(base.explanation, screening.stack, kappa)
-        ranking = tuple(
-            sorted(
-                (
-                    self._ranked(kind, base, candidates, screen, fits, value, chances[kind], gram, predicted, beside)
-                    for kind, value in log_evidence.items()
-                ),
-                key=lambda ranked: -ranked.probability,
+        ranked = [
+            self._ranked(
+                kind, base, candidates, screen, fits, value, chances[kind], screening.stack, kappa, predicted, beside
             )
-        )
+            for kind, value in log_evidence.items()
+        ]
+        ranking = tuple(sorted(ranked, key=lambda one: -one.probability))
         best = ranking[0].kind if ranking[0].kind in fits else next((r.kind for r in ranking if r.kind in fits), "none")
         gain = likely = (0.0, 0.0, 0.0)
         placebo_p, adequacy_p, size = 1.0, 1.0, 0.0
@@ -181,22 +175,21 @@ class Diagnosing:
             likely = predicted[best].improvement(without[way], rng, _LIKELY)
             scanned = len(candidates.of_kind[best]) > 20
             freedom = fits[best].effects[0].columns.shape[1]
-            noise = float(np.median(base.noise[sensors.is_displacement]))
             patterns = placebo(
                 way, linear, columns, base.flexible[-1], freedom,
-                _TRIES_SCANNED if scanned else _TRIES, 4.0 * noise, rng,
+                _TRIES_SCANNED if scanned else _TRIES, 4.0 * base.typical_noise, rng,
             )  # fmt: skip
             band = (float(np.quantile(patterns, 0.05)), float(np.quantile(patterns, 0.95)))
             placebo_p = float((1 + np.sum(patterns <= predicted[best].rmse)) / (1 + len(patterns)))
-            adequacy_p = self._adequacy(base, fits[best], candidates, rng)
+            adequacy_p = self._adequacy(base, fits[best], rng)
             size = float(np.abs(fits[best].coefficients[0]).max())
         verdict = decide(Evidence(options.alpha, p_value, ranking, likely, placebo_p, adequacy_p, size))
         named = tuple(r for r in ranking if r.kind in verdict.kinds) if "named" in verdict.verdict else ()
         explained = self._explained(fits, named)
         fit = self._fit(base, fits, without[way], predicted, named, gain, placebo_p, band, ceiling)
-        smallest = self._smallest(candidates, gram)
+        smallest = self._smallest(base, candidates, screening.stack, kappa)
         physical = [r.kind for r in ranking if r.physics and r.kind in candidates.of_kind][:2]
-        measurements = next_measurements(base, candidates, screening, screen, physical, fits, kappa)
+        measurements = next_measurements(base, candidates, screen, physical, fits, kappa)
         return Diagnosis(
             self.case,
             verdict.verdict,
@@ -251,17 +244,9 @@ class Diagnosing:
 
     def _unknown(self, base: Base, none: Refit) -> float:
         """Log evidence of any smooth force in the place of a mechanism."""
-        from scipy.special import logsumexp
-
-        noise = float(np.median(base.noise[base.at.sensors.is_displacement]))
         explanation = none.explanation(base.explanation.factor)
-        white = explanation.whitened(none.linear)
-        values = []
-        for columns in base.flexible:
-            for scale in SCALES:
-                loose = explanation.with_more(scale * noise * columns)
-                values.append(logsumexp(loose.log_none(white[:, None])[:, 0] + kappa_log_prior()))
-        return float(logsumexp(values)) - float(np.log(len(values)))
+        loose = [explanation.with_more(force) for force in base.smooth_forces]
+        return float(log_unknown(loose, explanation.whitened(none.linear)[:, None])[0])
 
     def _ranked(
         self,
@@ -272,7 +257,8 @@ class Diagnosing:
         fits: dict[str, Refit],
         log_evidence: float,
         chance: float,
-        gram: Gram,
+        stack: Stack,
+        kappa: float,
         predicted: dict[str, Predicted],
         without: dict[str, Predicted],
     ) -> Ranked:
@@ -284,13 +270,13 @@ class Diagnosing:
         effect = candidates.effects[number]
         if effect.proposal is None:
             return Ranked(kind, False, log_evidence, chance, 0.0, None, (), None, None, "", "no physics")
-        own = gram.stack.columns[:, gram.stack.first[number] : gram.stack.first[number + 1]]
+        own = stack.of(number)
         if kind in fits:
             z, covariance = fits[kind].coefficients[0], fits[kind].covariances[0]
         else:
-            inner = Inner(base.explanation, gram.stack, base.whitened[:, None])
-            z, covariance = inner.coefficients(gram.kappa, number)
-        d = base.explanation.detectability(own[:, 0] + own[:, 1:] @ z, gram.kappa)
+            inner = Inner(base.explanation, stack, base.whitened[:, None])
+            z, covariance = inner.coefficients(kappa, number)
+        d = base.explanation.detectability(own[:, 0] + own[:, 1:] @ z, kappa)
         centre, radius = _place(candidates, screen, kind)
         change = predicted[kind].rmse - without[kind].rmse if kind in predicted else None
         why = "" if kind in fits else "less probable than what was refitted"
@@ -301,20 +287,14 @@ class Diagnosing:
         values += tuple(v for v in scanned_values(scanned, weights) if v.name not in {known.name for known in values})
         return Ranked(kind, True, log_evidence, chance, d, change, values, centre, radius, effect.proposed.region, why)
 
-    def _adequacy(self, base: Base, fit: Refit, candidates: Candidates, rng: np.random.Generator) -> float:
+    def _adequacy(self, base: Base, fit: Refit, rng: np.random.Generator) -> float:
         """Probability of what is left after a refit, if it is noise: any smooth force against none."""
-        from scipy.special import logsumexp
-
         explanation = fit.explanation(base.explanation.factor)
-        noise = float(np.median(base.noise[base.at.sensors.is_displacement]))
-        loose = [explanation.with_more(SCALES[0] * noise * columns) for columns in base.flexible]
-        weights = kappa_log_prior()[:, None]
+        loose = [explanation.with_more(SCALES[0] * base.typical_noise * columns) for columns in base.flexible]
 
         def statistic(residuals: Floats) -> Floats:
-            none = logsumexp(explanation.log_none(residuals) + weights, axis=0)
-            return np.asarray(
-                np.max([logsumexp(one.log_none(residuals) + weights, axis=0) - none for one in loose], axis=0)
-            )
+            none = explanation.log_marginal(residuals)
+            return np.asarray(np.max([one.log_marginal(residuals) - none for one in loose], axis=0))
 
         own = statistic(explanation.whitened(fit.linear)[:, None])[0]
         null = statistic(explanation.draws(self.options.draws, fit.kappa, rng))
@@ -322,12 +302,7 @@ class Diagnosing:
 
     def _ceiling(self, base: Base, held_out: HeldOut, linear: Floats, columns: Floats) -> float:
         """Held-out error with any smooth force of the size that suits best."""
-        noise = float(np.median(base.noise[base.at.sensors.is_displacement]))
-        return min(
-            held_out.predict(linear, np.column_stack([columns, scale * noise * flexible])).rmse
-            for flexible in base.flexible
-            for scale in SCALES
-        )
+        return min(held_out.predict(linear, np.column_stack([columns, force])).rmse for force in base.smooth_forces)
 
     def _explained(self, fits: dict[str, Refit], named: tuple[Ranked, ...]) -> Case | None:
         if not named:
@@ -384,18 +359,17 @@ class Diagnosing:
             found.append(float(np.sqrt(np.mean(np.concatenate([values.ravel() for values in lengths]) ** 2))))
         return tuple(found)
 
-    def _smallest(self, candidates: Candidates, gram: Gram) -> dict[str, Smallest]:
-        """Of each kind, where the data see it half as well as at the best of its places."""
+    def _smallest(self, base: Base, candidates: Candidates, stack: Stack, kappa: float) -> dict[str, Smallest]:
+        """Of each kind, at the middle one of its places by how well the data see it."""
         found = {}
         for kind, numbers in candidates.of_kind.items():
             if candidates.effects[numbers[0]].proposal is None:
                 continue
             lengths = []
             for number in numbers.tolist():
-                own = gram.stack.columns[:, gram.stack.first[number] : gram.stack.first[number + 1]]
                 effect = candidates.effects[number]
                 switch = effect.proposed.is_there_or_not or effect.proposed.mean.any()
-                lengths.append(gram.explanation.detectability(own[:, 0 if switch else 1], gram.kappa))
+                lengths.append(base.explanation.detectability(stack.of(number)[:, 0 if switch else 1], kappa))
             middle = int(np.argsort(lengths)[len(lengths) // 2])
             found[kind] = smallest_of(candidates.effects[numbers[middle]], lengths[middle], SEEN)
         return found
@@ -407,7 +381,7 @@ class Diagnosing:
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
 
 
-def _linear_point(base: Base, stack: object, candidates: Candidates, screen: Screen, kind: str, kappa: float) -> Floats:
+def _linear_point(base: Base, candidates: Candidates, screen: Screen, kind: str, kappa: float) -> Floats:
     """Coordinates of nuisances and mechanism that the linear model has, to begin a refit with."""
     columns, mean = base.nuisances.columns, np.zeros(len(base.residual))
     if kind != "none":
@@ -429,12 +403,8 @@ def _place(candidates: Candidates, screen: Screen, kind: str) -> tuple[Floats | 
         return None, None
     located = [k for k in own.tolist() if candidates.effects[k].proposed.centre is not None]
     sites = np.array([candidates.effects[k].proposed.centre for k in located])
-    weights = softmax(screen.places[located, 0])
-    centre = weights @ sites
-    apart = np.linalg.norm(sites - centre, axis=1)
-    order = np.argsort(apart)
-    at = min(int(np.searchsorted(np.cumsum(weights[order]), 0.9)), len(order) - 1)
-    return centre, max(float(apart[order][at]), float(best.radius or 0.0))
+    centre, radius = ball_of(sites, softmax(screen.places[located, 0]))
+    return centre, max(radius, float(best.radius or 0.0))
 
 
 def _is_local(fit: Refit) -> bool:

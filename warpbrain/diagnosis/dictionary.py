@@ -13,7 +13,7 @@ from warpbrain.cases.case import Case
 from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.sensors import spread_points
 from warpbrain.errors import InputError, SolveError
-from warpbrain.mesh import TetMesh, boundary_faces, face_vectors, nodes_of
+from warpbrain.mesh import TetMesh, face_vectors, nodes_of
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 
@@ -45,7 +45,7 @@ class Dictionary:
 def situation_of(case: Case, instants: int = 1) -> Situation:
     """What mechanisms may know of a case."""
     mesh, _ = case.remaining
-    faces = boundary_faces(mesh.tetrahedra)
+    faces = mesh.boundary
     used = {boundary.nodes for boundary in case.boundaries}
     fixed = [
         b.nodes for b in case.boundaries if isinstance(b, Fixed) and mesh.node_sets[b.nodes][faces].all(axis=1).any()
@@ -64,7 +64,6 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
     # points a spacing apart have about 0.7 of its cube each, and 0.85 of its square
     spacing = (mesh.volume / (0.7 * _VOLUME_SITES)) ** (1.0 / 3.0)
     between = (area / (0.85 * _SURFACE_SITES)) ** 0.5
-    middles = mesh.points[mesh.tetrahedra].mean(axis=1)
     on_surface = mesh.points[open_faces].mean(axis=1)
     return Situation(
         mesh,
@@ -76,7 +75,7 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
         held,
         free,
         instants,
-        middles[spread_points(middles, spacing)],
+        mesh.centres[spread_points(mesh.centres, spacing)],
         on_surface[spread_points(on_surface, between)],
         spacing,
     )

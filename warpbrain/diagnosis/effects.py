@@ -13,7 +13,7 @@ from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
 from warpbrain.physics.proposal import Proposal
-from warpbrain.simulation.model import Material
+from warpbrain.simulation.assumed import substituted
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
@@ -87,15 +87,13 @@ class Effects:
         present : Mechanism, optional
             What of them acts at the state already.
         """
-        asked: list[Mechanism] = []
-        for proposal in proposals:
-            asked.extend(self._points(proposal))
-        answers = self._answers(asked, present)
+        points = [self._points(proposal) for proposal in proposals]
+        answers = self._answers([mechanism for own in points for mechanism in own], present)
         found, next_one = [], 0
-        for proposal in proposals:
-            count = len(self._points(proposal))
-            found.append(self._effect(proposal, self._over_time(proposal, answers[:, next_one : next_one + count])))
-            next_one += count
+        for proposal, own in zip(proposals, points, strict=True):
+            columns = answers[:, next_one : next_one + len(own)]
+            found.append(self._effect(proposal, self._over_time(proposal, columns)))
+            next_one += len(own)
         return found
 
     def _over_time(self, proposal: Proposal, answers: Floats) -> Floats:
@@ -107,7 +105,7 @@ class Effects:
     @staticmethod
     def _points(proposal: Proposal) -> list[Mechanism]:
         """Mechanisms whose answers make the columns."""
-        if proposal.follows in ("switch", "release"):
+        if proposal.is_there_or_not:
             return []
         axes = np.diag(proposal.sd)
         if proposal.follows == "proportional":
@@ -116,7 +114,7 @@ class Effects:
         return [proposal.make(proposal.start), *beside]
 
     def _effect(self, proposal: Proposal, answers: Floats) -> Effect:
-        if proposal.follows in ("switch", "release"):
+        if proposal.is_there_or_not:
             if proposal.follows == "release":
                 assert proposal.patch is not None
                 answer = self.at.released(proposal.patch.members, _lifts(proposal.make(proposal.mean)))
@@ -195,12 +193,9 @@ class Effects:
         if self._internal is None:
             self._internal = self.at.internal_forces()
         model = self.at.system.model
-        materials = {
-            label: Material(*mechanism.substitute(label, m.law, m.poisson, m.formulation))
-            for label, m in model.materials.items()
-        }
         system = self.at.system
-        beside = System(replace(model, materials=materials), str(system.device), system.precision.name)
+        other = replace(model, materials=substituted(model.materials, mechanism))
+        beside = System(other, str(system.device), system.precision.name)
         return self.at.internal_forces(beside) - self._internal
 
 

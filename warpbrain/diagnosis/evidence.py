@@ -55,6 +55,10 @@ class Stack:
     def __len__(self) -> int:
         return len(self.first) - 1
 
+    def of(self, number: int) -> Floats:
+        """Columns of one effect, its mean first."""
+        return self.columns[:, self.first[number] : self.first[number + 1]]
+
 
 class Explanation:
     """What residuals are compared with: noise, and nuisances that may explain them first.
@@ -103,6 +107,12 @@ class Explanation:
         """Log density of whitened residuals (n, b) without any cause: (kappas, b)."""
         rr, Vr = np.sum(residuals**2, axis=0), self._WV.T @ residuals
         return np.array([self._log_base(rr, Vr, k) for k in kappas])
+
+    def log_marginal(self, residuals: Floats) -> Floats:
+        """The same averaged over the factor on the noise: (b,)."""
+        from scipy.special import logsumexp
+
+        return np.asarray(logsumexp(self.log_none(residuals) + kappa_log_prior()[:, None], axis=0))
 
     def _log_base(self, rr: Floats, Vr: Floats, kappa: float) -> Floats:
         k2 = kappa**2

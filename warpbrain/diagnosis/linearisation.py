@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.errors import SolveError
-from warpbrain.mesh import TetMesh, face_vectors
+from warpbrain.mesh import vertex_normals
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
@@ -61,7 +61,8 @@ class Linearisation:
         system.u.assign(self.u)
         K = system.stiffness().tocsr()
         free = ~system.model.constrained.ravel()
-        self._K: Any = K
+        #: `K` [N/m] on every component, SciPy CSR (3 N, 3 N).
+        self.stiffness: Any = K
         self._free, self._held_free = free, K[~free][:, free]
         options = {"SymmetricMode": True}
         try:
@@ -106,23 +107,22 @@ class Linearisation:
         from scipy.sparse import coo_matrix
         from scipy.sparse.linalg import LinearOperator, cg
 
-        mesh = self.system.model.mesh
         members = np.flatnonzero(patch)
-        normals = _normals(mesh)[members]
-        pull = np.einsum("ni,ni->n", self.reactions[members], normals)
+        normals = vertex_normals(self.system.model.mesh)
+        pull = np.einsum("ni,ni->n", self.reactions[members], normals[members])
         kept = members[(pull <= 0.0) | (not lifts)]
-        along = _normals(mesh)[kept]
+        along = normals[kept]
         # the wall as a very stiff spring along its normal
-        stiff = _WALL * float(self._K.diagonal().max())
+        stiff = _WALL * float(self.stiffness.diagonal().max())
         rows = (3 * kept[:, None, None] + np.arange(3)[:, None] + np.zeros((1, 1, 3), dtype=int)).ravel()
         columns = (3 * kept[:, None, None] + np.arange(3)[None] + np.zeros((1, 3, 1), dtype=int)).ravel()
         values = (stiff * along[:, :, None] * along[:, None, :]).ravel()
-        wall = coo_matrix((values, (rows, columns)), self._K.shape).tocsr()
+        wall = coo_matrix((values, (rows, columns)), self.stiffness.shape).tocsr()
         free = self._free.copy()
         free.reshape(-1, 3)[members] = True
         load = np.zeros(len(free))
         load.reshape(-1, 3)[members] = -self.reactions[members]
-        K = (self._K + wall)[free][:, free].tocsr()
+        K = (self.stiffness + wall)[free][:, free].tocsr()
         # what was free before is solved with the factors that there are; few iterations do for the rest
         inner = self._free[free]
         diagonal = K.diagonal()
@@ -137,8 +137,8 @@ class Linearisation:
         du[free], info = cg(K, load[free], rtol=_RELEASE, maxiter=300, M=approximate)
         if info:
             raise SolveError(f"letting go of {len(members)} nodes: conjugate gradients did not converge")
-        dR = np.where(free, 0.0, self._K @ du)
-        return np.asarray(self.sensors.by_displacement @ du + self.sensors.by_reactions @ dR)
+        dR = np.where(free, 0.0, self.stiffness @ du)
+        return self.sensors.answer(du, dR)
 
     def answers(self, forces: Floats) -> Floats:
         """What nodal forces (..., N, 3) [N] change of what is recorded: (n, ...)."""
@@ -159,7 +159,7 @@ class Linearisation:
     @cached_property
     def element_forces(self) -> Floats:
         """Internal forces (m, 4, 3) [N] of the elements."""
-        return self._element_forces()
+        return _element_forces(self.system, self.u)
 
     @cached_property
     def growth_forces(self) -> Floats:
@@ -173,17 +173,8 @@ class Linearisation:
             model = self.system.model
             grown = replace(model, mechanisms=(*model.mechanisms, Swelling(amount=amount)))
             beside = System(grown, str(self.system.device), self.system.precision.name)
-            sides.append(Linearisation._element_forces_of(beside, self.u))
+            sides.append(_element_forces(beside, self.u))
         return (sides[1] - sides[0]) / (2.0 * _GROWTH)
-
-    def _element_forces(self) -> Floats:
-        return self._element_forces_of(self.system, self.u)
-
-    @staticmethod
-    def _element_forces_of(system: System, u: Floats) -> Floats:
-        system.u.assign(u)
-        system.evaluate_forces()
-        return np.asarray(system.element_forces.numpy().astype(np.float64))
 
     def internal_forces(self, system: System | None = None) -> Floats:
         """Internal forces (N, 3) [N] at the state, of this system or of another with the same nodes."""
@@ -194,12 +185,8 @@ class Linearisation:
         return np.asarray(asked.internal.numpy().astype(np.float64))
 
 
-def _normals(mesh: TetMesh) -> Floats:
-    """Outward unit normals (N, 3) at the nodes of the surface, means over their faces; zero elsewhere."""
-    faces = mesh.boundary
-    vectors = face_vectors(mesh.points, faces)
-    total = np.zeros(mesh.points.shape)
-    for corner in faces.T:
-        np.add.at(total, corner, vectors)
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.asarray(total / np.where(length > 0.0, length, 1.0))
+def _element_forces(system: System, u: Floats) -> Floats:
+    """Internal forces (m, 4, 3) [N] of the elements of a system at a displacement."""
+    system.u.assign(u)
+    system.evaluate_forces()
+    return np.asarray(system.element_forces.numpy().astype(np.float64))

@@ -9,6 +9,7 @@ compared with its distribution in draws of noise and nuisances (Westfall and You
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,17 +74,25 @@ class ScoreMap:
     @property
     def centre(self) -> Floats:
         """Mean (3,) [m] of the places that may be it, weighted by their scores' likelihood."""
-        weights = np.exp(0.5 * (self.scores - self.scores.max())) * self.region
-        return np.asarray(weights @ self.sites / weights.sum())
+        return self._ball[0]
 
     @property
     def radius(self) -> float:
         """Of a ball [m] about the centre that holds 90 % of that weight, no less than a patch."""
-        weights = np.exp(0.5 * (self.scores - self.scores.max())) * self.region
-        apart = np.linalg.norm(self.sites - self.centre, axis=1)
-        order = np.argsort(apart)
-        enough = np.searchsorted(np.cumsum(weights[order]), 0.9 * weights.sum())
-        return max(float(apart[order][min(enough, len(order) - 1)]), self.length)
+        return max(self._ball[1], self.length)
+
+    @cached_property
+    def _ball(self) -> tuple[Floats, float]:
+        return ball_of(self.sites, np.exp(0.5 * (self.scores - self.scores.max())) * self.region)
+
+
+def ball_of(sites: Floats, weights: Floats) -> tuple[Floats, float]:
+    """Mean (3,) of weighted places (k, 3) [m], and the radius about it that holds 90 % of the weight."""
+    centre = np.asarray(weights @ sites / weights.sum())
+    apart = np.linalg.norm(sites - centre, axis=1)
+    order = np.argsort(apart)
+    at = min(int(np.searchsorted(np.cumsum(weights[order]), 0.9 * weights.sum())), len(order) - 1)
+    return centre, float(apart[order][at])
 
 
 def score_map(

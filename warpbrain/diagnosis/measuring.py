@@ -1,4 +1,10 @@
-"""What to measure next: by how much it would tell the two most probable causes apart."""
+"""What to measure next: by how much it would tell the two most probable causes apart.
+
+A cause with its effect `g` on the sensors is told from another by the expected log Bayes factor over the best imitation
+that the other can make, its size free:
+
+    D = 1/2 ( |g|^2 - |P g|^2 )        in the metric of noise and nuisances
+"""
 
 from __future__ import annotations
 
@@ -13,7 +19,7 @@ from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.result import Measurement
-from warpbrain.diagnosis.screening import Screen, Screening
+from warpbrain.diagnosis.screening import Screen
 from warpbrain.diagnosis.sensors import spread_points
 
 Floats = NDArray[np.float64]
@@ -27,7 +33,6 @@ _READING = {"pressure": (20.0, "a reading of the pressure, to 20 Pa")}
 def next_measurements(
     base: Base,
     candidates: Candidates,
-    screening: Screening,
     screen: Screen,
     kinds: Sequence[str],
     fits: dict[str, Refit],
@@ -38,7 +43,7 @@ def next_measurements(
         return ()
     first, second = (candidates.effects[screen.best_effect(candidates, kind)] for kind in kinds[:2])
     z = fits[kinds[0]].coefficients[0] if kinds[0] in fits else np.ones(first.columns.shape[1])
-    noise = float(np.median(base.noise[base.at.sensors.is_displacement]))
+    noise = base.typical_noise
     columns = base.nuisances.columns
     found = [Measurement("nothing more", _apart(base, first, second, z, columns, kappa, None, noise))]
     found.append(
@@ -67,8 +72,7 @@ def next_measurements(
 
 def _places(base: Base) -> dict[str, Floats]:
     mesh = base.at.system.model.mesh
-    middles = mesh.points[mesh.tetrahedra].mean(axis=1)
-    found = {"throughout the tissue": middles[spread_points(middles, 0.0, _POINTS)]}
+    found = {"throughout the tissue": mesh.centres[spread_points(mesh.centres, 0.0, _POINTS)]}
     still = base.at.system.model.constrained.all(axis=1)
     for name, members in mesh.node_sets.items():
         points = mesh.points[members & ~still]

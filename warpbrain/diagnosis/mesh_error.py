@@ -14,7 +14,7 @@ import numpy as np
 from warpbrain.diagnosis.states import TOLERANCE, Hypothesis, SolvedState, States
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.finer import FinerCase
+from warpbrain.simulation.finer import FinerCase, restricted
 from warpbrain.simulation.system import System
 
 #: Out-of-balance force of the finer state, relative: far below the error that is looked for.
@@ -45,6 +45,5 @@ def mesh_error(states: States, hypothesis: Hypothesis, near: SolvedState) -> Dif
     found = EquilibriumSolver(system, EquilibriumOptions(tolerance=_ROUGH)).solve(
         external, finer.prolongation @ coarse.u
     )
-    # a reaction between two nodes goes to both of them, so that resultants stay
-    reactions = finer.prolongation.T @ np.where(model.constrained, found.internal - external, 0.0)
-    return Difference(found.u[: len(coarse.u)] - coarse.u, reactions - coarse.reactions, hypothesis.theta)
+    u, reactions = restricted(finer.prolongation, found.u, model.reactions(found.internal, external))
+    return Difference(u - coarse.u, reactions - coarse.reactions, hypothesis.theta)

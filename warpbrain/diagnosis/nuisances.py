@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effects
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.sensors import Sensors, spread_points
+from warpbrain.diagnosis.sensors import spread_points
 from warpbrain.diagnosis.states import States
 from warpbrain.estimation.discretisation import Difference, Discretisation
 from warpbrain.estimation.gaussian import Gaussian
@@ -32,6 +32,7 @@ Floats = NDArray[np.float64]
 _VOLUME, _EXPONENT, _SECOND, _LOADS = 0.4, 3.0, 0.25, 0.04
 #: Of a rigid error of registration: shift [m] and turn [rad].
 _SHIFT, _TURN = 1e-3, math.radians(1.0)
+REGISTRATION_SD = np.repeat([_SHIFT, _TURN], 3)
 #: Error of the mesh beside what a finer one shows, as a part of the displacement, and how far [m] it is alike.
 _FRACTION, _ALIKE = 0.06, 0.02
 #: Step of a difference in `theta`.
@@ -71,11 +72,6 @@ class Nuisances:
     families: tuple[Family, ...]
     mean: Floats
     anchors: Floats
-
-    @property
-    def registration_sd(self) -> Floats:
-        """Standard deviations (6,) of shift [m] and turn [rad]."""
-        return np.repeat([_SHIFT, _TURN], 3)
 
     @property
     def columns(self) -> Floats:
@@ -133,20 +129,16 @@ def nuisances_at(
         Family("compressibility", _law_columns(effects, _other_volume(states))),
         Family("shape of the law", _law_columns(effects, _other_shape())),
         Family("known loads", _known_loads(at)),
-        Family("registration", sensors.rigid * np.repeat([_SHIFT, _TURN], 3)),
+        Family("registration", sensors.rigid * REGISTRATION_SD),
     ]
     mean = np.zeros(len(sensors))
     if mesh_error is not None:
         believed = Discretisation()
-        answer = _observed(sensors, mesh_error.u, mesh_error.reactions)
+        answer = sensors.answer(mesh_error.u, mesh_error.reactions)
         mean = believed.mean * answer
         families.append(Family("mesh", believed.deviation * answer[:, None]))
     families.append(Family("mesh, unknown", _fractional(at, anchors)))
     return Nuisances(tuple(families), mean, anchors)
-
-
-def _observed(sensors: Sensors, u: Floats, reactions: Floats) -> Floats:
-    return np.asarray(sensors.by_displacement @ u.ravel() + sensors.by_reactions @ reactions.ravel())
 
 
 def _tissue(at: Linearisation, states: States, theta: Floats) -> Floats:
@@ -200,9 +192,8 @@ def _known_loads(at: Linearisation) -> Floats:
     model = at.system.model
     columns = [_LOADS * at.answers(model.external_forces()[None])]
     if model.prescribed.any():
-        moved = at.system.stiffness() @ model.prescribed.ravel()
-        moved = moved.reshape(-1, 3)
-        own = _observed(at.sensors, model.prescribed, np.where(model.constrained, moved, 0.0))
+        moved = (at.stiffness @ model.prescribed.ravel()).reshape(-1, 3)
+        own = at.sensors.answer(model.prescribed, np.where(model.constrained, moved, 0.0))
         answer = own + at.answers(np.where(model.constrained, 0.0, -moved)[None])[:, 0]
         columns.append(_LOADS * answer[:, None])
     found = np.concatenate(columns, axis=1)

@@ -13,6 +13,9 @@ from warpbrain.physics.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
 
+#: Detectability at which an effect is found nearly always.
+SEEN = 5.0
+
 
 def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, ...]:
     """Parameters that differ among proposals, such as a level or a radius: mean and spread over them.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effect, Effects
-from warpbrain.diagnosis.evidence import Explanation, kappa_log_prior
+from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.mesh_error import mesh_error
 from warpbrain.diagnosis.nuisances import Nuisances
@@ -74,11 +74,6 @@ class Refit:
         """The linear model about the best point."""
         return Explanation(factor, self.columns)
 
-    def proposal_coefficients(self) -> tuple[Floats, ...]:
-        """The coefficients that the proposals are made with."""
-        pairs = zip(self.effects, self.coefficients, strict=True)
-        return tuple(effect.coefficients(z) for effect, z in pairs)
-
 
 @dataclass(frozen=True, eq=False)
 class _Share:
@@ -88,13 +83,13 @@ class _Share:
     ----------
     answer : (n,) array
         At the size with which it was computed.
-    along, constant : (k,) and (1,) array
-        Empty if there is none.
+    along : (k,) array
+    constant : float
     """
 
     answer: Floats
     along: Floats
-    constant: Floats
+    constant: float
 
 
 class Refitting:
@@ -126,7 +121,7 @@ class Refitting:
     ) -> None:
         self.states, self.prior, self.nuisances, self.factor = states, prior, nuisances, factor
         self.start, self.difference = start, difference
-        self._share = _Share(np.zeros(len(factor)), np.zeros(0), np.zeros(0))
+        self._share: _Share | None = None
         self._U = nuisances.columns
         self._tissue, self._field = nuisances.part("tissue"), nuisances.part("stiffness field")
         self._linear = np.ones(self._U.shape[1], dtype=bool)
@@ -155,20 +150,21 @@ class Refitting:
         SolveError
             If there is no equilibrium near the beginning.
         """
-        self._share = _Share(np.zeros(len(self.factor)), np.zeros(0), np.zeros(0))
+        self._share = None
         columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
         found = self._descend(effects, self._limited(begin), columns, kappa, self.start, 1)
         if self.difference is None or not effects:
             return self._refit(effects, *found)
         self._share = self._share_of(effects[0], found[0], found[1])
         state, z, _, columns, _ = found
-        columns = columns.copy()
-        own = slice(self._U.shape[1], self._U.shape[1] + len(self._share.along))
-        columns[:, own] += np.outer(self._share.answer, self._share.along)
+        if self._share is not None:
+            columns = columns.copy()
+            own = slice(self._U.shape[1], self._U.shape[1] + len(self._share.along))
+            columns[:, own] += np.outer(self._share.answer, self._share.along)
         return self._refit(effects, *self._descend(effects, z, columns, kappa, state, -1))
 
-    def _share_of(self, effect: Effect, state: SolvedState, z: Floats) -> _Share:
-        """What of the mesh's error belongs to the first mechanism, in proportion to its size."""
+    def _share_of(self, effect: Effect, state: SolvedState, z: Floats) -> _Share | None:
+        """What of the mesh's error belongs to the first mechanism, in proportion to its size; None if not known."""
         assert self.difference is not None
         q, size = self._U.shape[1], effect.columns.shape[1]
         away = effect.coefficients(z[q : q + size]) - effect.proposed.without
@@ -176,18 +172,16 @@ class Refitting:
         scaled = away / effect.proposed.sd
         length = float(scaled @ scaled)
         if length < 1e-6 or effect.proposed.history is not None:
-            return _Share(np.zeros(len(self.factor)), np.zeros(size), np.zeros(1))
+            return None
         try:
             error = mesh_error(self.states, state.hypothesis, state)
         except SolveError:
-            return _Share(np.zeros(len(self.factor)), np.zeros(size), np.zeros(1))
-        sensors = state.sensors
-        du, dR = error.u - self.difference.u, error.reactions - self.difference.reactions
-        answer = sensors.by_displacement @ du.ravel() + sensors.by_reactions @ dR.ravel()
+            return None
+        answer = state.sensors.answer(error.u - self.difference.u, error.reactions - self.difference.reactions)
         mean = (effect.proposed.mean - effect.proposed.without) / effect.proposed.sd
         along = scaled / length if not effect.proposed.is_there_or_not else np.zeros(size)
-        constant = along @ mean if not effect.proposed.is_there_or_not else 1.0
-        return _Share(Discretisation().mean * np.asarray(answer), along, np.array([constant]))
+        constant = float(along @ mean) if not effect.proposed.is_there_or_not else 1.0
+        return _Share(Discretisation().mean * answer, along, constant)
 
     def _descend(
         self,
@@ -285,9 +279,9 @@ class Refitting:
         at = self._U.shape[1]
         linear = self._U[:, self._linear] @ z[:at][self._linear]
         residual = state.sensors.residual - self.nuisances.mean - linear
-        if len(self._share.constant):
+        if self._share is not None:
             own = z[at : at + len(self._share.along)]
-            residual = residual - self._share.answer * float(self._share.constant[0] + self._share.along @ own)
+            residual = residual - self._share.answer * (self._share.constant + float(self._share.along @ own))
         for effect in effects:
             size = effect.columns.shape[1]
             if effect.proposed.is_there_or_not:
@@ -323,13 +317,11 @@ class Refitting:
         columns: Floats,
         converged: bool,
     ) -> Refit:
-        from scipy.special import logsumexp
-
         q = self._U.shape[1]
         linear = residual + columns @ z
         model = Explanation(self.factor, columns)
         white = model.whitened(linear)
-        log_evidence = float(logsumexp(model.log_none(white[:, None])[:, 0] + kappa_log_prior()))
+        log_evidence = float(model.log_marginal(white[:, None])[0])
         kappa = model.best_kappa(white)
         W = model.whitened(columns) / kappa
         covariance = np.asarray(np.linalg.inv(np.eye(len(z)) + W.T @ W), dtype=np.float64)

@@ -6,6 +6,7 @@ the unknown: any smooth force.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,13 +74,10 @@ class Screening:
 
     def run(self, residuals: Floats) -> Screen:
         """Evidence for whitened residuals (n, b)."""
-        from scipy.special import logsumexp
-
-        weights = kappa_log_prior()[:, None]
-        none = np.asarray(logsumexp(self.explanation.log_none(residuals) + weights, axis=0))
+        none = self.explanation.log_marginal(residuals)
         places = self._places(self.explanation, residuals) - none
         by_kind = self._by_kind(places)
-        unknown = self._unknown(residuals) - none
+        unknown = log_unknown(self.flexible, residuals) - none
         return Screen((*self.candidates.kinds, UNKNOWN), none, np.vstack([by_kind, unknown]), places)
 
     def _places(self, explanation: Explanation, residuals: Floats) -> Floats:
@@ -96,10 +94,10 @@ class Screening:
         rows = [logsumexp(places[own], axis=0) - np.log(len(own)) for own in self.candidates.of_kind.values()]
         return np.array(rows).reshape(len(rows), places.shape[1])
 
-    def _unknown(self, residuals: Floats) -> Floats:
-        """Log density (b,) with any smooth force."""
-        from scipy.special import logsumexp
 
-        weights = kappa_log_prior()[:, None]
-        found = [logsumexp(flexible.log_none(residuals) + weights, axis=0) for flexible in self.flexible]
-        return np.asarray(logsumexp(np.array(found), axis=0) - np.log(len(found)))
+def log_unknown(flexible: Sequence[Explanation], residuals: Floats) -> Floats:
+    """Log density (b,) of whitened residuals with a force of any of some lengths and sizes, all alike likely."""
+    from scipy.special import logsumexp
+
+    found = [explanation.log_marginal(residuals) for explanation in flexible]
+    return np.asarray(logsumexp(np.array(found), axis=0) - np.log(len(found)))

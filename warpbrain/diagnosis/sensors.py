@@ -69,6 +69,10 @@ class Sensors:
         """Which rows are lengths, not forces."""
         return np.asarray(self.directions.any(axis=1))
 
+    def answer(self, du: Floats, dR: Floats) -> Floats:
+        """What changes of displacement and reactions (N, 3) change of what is computed: (n,)."""
+        return np.asarray(self.by_displacement @ du.ravel() + self.by_reactions @ dR.ravel())
+
 
 #: What was recorded at a time, with displacement and reactions (N, 3) then.
 Instant = tuple[float, Observations, Floats, Floats]

@@ -137,7 +137,7 @@ class States:
         else:
             states = [EquilibriumSolver(system, options).solve(model.external_forces(), start)] * len(self.times)
         external = model.external_forces()
-        reactions = [np.where(model.constrained, state.internal - external, 0.0) for state in states]
+        reactions = [model.reactions(state.internal, external) for state in states]
         parts = zip(self.times, self.observations, states, reactions, strict=True)
         instants = [(time, observations, state.u, R) for time, observations, state, R in parts]
         return SolvedState(hypothesis, system, states[-1].u, reactions[-1], sensors_at(instants, self.centre))

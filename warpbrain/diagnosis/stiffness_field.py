@@ -24,11 +24,10 @@ SPREAD, REACH, MODES = 0.25, 0.026, 16
 
 def stiffness_modes(mesh: TetMesh, count: int = MODES) -> Floats:
     """Modes (m, count) of `ln mu` of each element, each times its standard deviation."""
-    middles = mesh.points[mesh.tetrahedra].mean(axis=1)
-    some = middles[spread_points(middles, 0.5 * REACH, 400)]
+    some = mesh.centres[spread_points(mesh.centres, 0.5 * REACH, 400)]
     values, vectors = np.linalg.eigh(_covariance(some, some))
     largest = np.argsort(values)[::-1][:count]
-    return np.asarray(_covariance(middles, some) @ vectors[:, largest] / np.sqrt(values[largest]))
+    return np.asarray(_covariance(mesh.centres, some) @ vectors[:, largest] / np.sqrt(values[largest]))
 
 
 def _covariance(a: Floats, b: Floats) -> Floats:

@@ -34,8 +34,7 @@ def switched(states: States, state: SolvedState, sensors: Sensors, known: dict[s
         if key not in known:
             asked = replace(state.hypothesis, mechanisms=(mechanism,))
             known[key] = states.solve(asked, state.u)
-        du, dR = known[key].u - state.u, known[key].reactions - state.reactions
-        return np.asarray(sensors.by_displacement @ du.ravel() + sensors.by_reactions @ dR.ravel())
+        return sensors.answer(known[key].u - state.u, known[key].reactions - state.reactions)
 
     answer.known = known  # type: ignore[attr-defined]
     return answer

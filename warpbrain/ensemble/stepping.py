@@ -94,7 +94,7 @@ def _answers(
                 residual=float(course.residual[slot]),
                 min_J=float(min_J[slot]),
                 u=u,
-                reactions=np.where(model.constrained, internal - model.external_forces(time), 0.0),
+                reactions=model.reactions(internal, model.external_forces(time)),
             )
         )
     return found

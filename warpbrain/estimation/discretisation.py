@@ -25,7 +25,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import ROUGH, Forward, State
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.physics.force import NodalForce
-from warpbrain.simulation.finer import FinerCase
+from warpbrain.simulation.finer import FinerCase, restricted
 from warpbrain.simulation.of_case import model_of
 
 Floats = NDArray[np.float64]
@@ -113,10 +113,8 @@ class FinerMesh:
                 "then the estimate holds for this mesh only"
             ) from None
         self._last = finer.u - start
-        count = len(state.u)
-        # a reaction between two nodes goes to both of them, so that resultants stay
-        reactions = self._prolong.T @ finer.reactions
-        return Difference(finer.u[:count] - state.u, reactions - state.reactions, state.theta)
+        u, reactions = restricted(self._prolong, finer.u, finer.reactions)
+        return Difference(u - state.u, reactions - state.reactions, state.theta)
 
 
 def _shared_forces(case: Case) -> Floats:

@@ -100,7 +100,7 @@ class Forward:
         self.solves += 1
         self.system.set_model(self._model(theta))
         found = self._solvers[tolerance].solve(self._external, start)
-        reactions = np.where(self.system.model.constrained, found.internal - self._external, 0.0)
+        reactions = self.system.model.reactions(found.internal, self._external)
         self._last = State(theta.copy(), found.u, reactions, len(found.history), found.unstable_iterations > 0)
         return self._last
 

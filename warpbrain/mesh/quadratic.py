@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.mesh.quality import EDGES
 from warpbrain.mesh.refinement import inherited, refined
-from warpbrain.mesh.surface import boundary_faces, nodes_of
+from warpbrain.mesh.surface import nodes_of
 from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
 
 #: Parts of a tetrahedron's mass for each corner and each midside node: the diagonal of the consistent mass matrix,
@@ -85,12 +85,12 @@ class QuadraticMesh:
     @cached_property
     def on_surface(self) -> Bools:
         """Nodes of the boundary, (N,) bool."""
-        return nodes_of(boundary_faces(self.node_mesh.tetrahedra), len(self.ends))
+        return nodes_of(self.node_mesh.boundary, len(self.ends))
 
     @cached_property
     def faces(self) -> Ints:
         """Triangles of the boundary (b, 6), oriented outwards: corners 0, 1, 2, then the middles of 01, 02 and 12."""
-        return self.six_nodes(boundary_faces(self.corners.tetrahedra))
+        return self.six_nodes(self.corners.boundary)
 
     def six_nodes(self, triangles: ArrayLike) -> Ints:
         """Triangles (k, 3) of corners with their midside nodes, (k, 6)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.tet_mesh import Bools, Floats, Ints
+from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
 
 # corners of the four faces of a positive tetrahedron, each seen counter-clockwise from outside; face i is opposite i
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -208,6 +208,15 @@ def face_vectors(points: ArrayLike, faces: ArrayLike) -> Floats:
     """Area vectors (b, 3) of triangles (b, 3): along the normal, as long as the area is large."""
     corner = np.asarray(points, dtype=np.float64)[np.asarray(faces)]
     return np.asarray(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) / 2.0)
+
+
+def vertex_normals(mesh: TetMesh) -> Floats:
+    """Outward unit normals (n, 3) at the nodes of the boundary, means over their faces; zero at all other nodes."""
+    faces = mesh.boundary
+    normals = np.zeros_like(mesh.points)
+    np.add.at(normals, faces.ravel(), np.repeat(face_vectors(mesh.points, faces), 3, axis=0))
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray(normals / np.where(lengths > 0.0, lengths, 1.0))
 
 
 def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:

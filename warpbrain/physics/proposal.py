@@ -6,8 +6,9 @@ proposals of a kind (places, levels, node sets), and averages over them: that is
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from warpbrain.physics.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
+#: A point or a direction.
+Place = tuple[float, float, float]
 
 #: How the effect of a proposal follows its coefficients: in proportion, to first order about a start that does nothing,
 #: all at once, or all at once where something that held it lets go.
@@ -158,6 +161,46 @@ class Proposal:
             return self.nothing
         return self.start if len(self.start) else np.zeros(len(self))
 
+    @classmethod
+    def in_balls(
+        cls, make: Callable[[float, Place, float], Mechanism], sd: float, radii: Sequence[float], situation: Situation
+    ) -> list[Proposal]:
+        """Smooth ones of one coefficient, nothing at zero, in balls of some radii [m] throughout the tissue.
+
+        Parameters
+        ----------
+        make : callable
+            From the coefficient, the centre [m] and the radius [m] to the mechanism.
+        sd : float
+        radii : sequence of float
+        situation : Situation
+        """
+        found = []
+        for site in situation.volume_sites:
+            x, y, z = site.tolist()
+            for radius in radii:
+                one = partial(_placed, make, (x, y, z), radius)
+                found.append(cls.of_one(one, 0.0, sd, "smooth", centre=site, radius=radius))
+        return found
+
+    @classmethod
+    def along_axes(cls, make: Callable[[float, Place], Mechanism], sd: float, what: str) -> list[Proposal]:
+        """Proportional ones of one coefficient along each axis of the anatomy.
+
+        Parameters
+        ----------
+        make : callable
+            From the coefficient and the axis to the mechanism.
+        sd : float
+        what : str
+            What lies along the axis, for people.
+        """
+        axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+        return [
+            cls.of_one(partial(_along, make, axis), 0.0, sd, region=f"{what} along {name}")
+            for name, axis in axes.items()
+        ]
+
     @property
     def is_there_or_not(self) -> bool:
         """Whether it has no size, only a share that says how exactly it is simulated."""
@@ -165,3 +208,13 @@ class Proposal:
 
     def __len__(self) -> int:
         return len(self.mean)
+
+
+def _placed(
+    make: Callable[[float, Place, float], Mechanism], centre: Place, radius: float, coefficient: float
+) -> Mechanism:
+    return make(coefficient, centre, radius)
+
+
+def _along(make: Callable[[float, Place], Mechanism], axis: Place, coefficient: float) -> Mechanism:
+    return make(coefficient, axis)

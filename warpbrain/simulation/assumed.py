@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from warpbrain.physics.load import Load
@@ -26,9 +26,13 @@ def with_mechanisms(model: Model, mechanisms: Sequence[Mechanism]) -> Model:
     loads = [m for m in mechanisms if isinstance(m, Load)]
     materials = dict(model.materials)
     for substituting in (m for m in mechanisms if isinstance(m, Substituting)):
-        materials = {
-            label: Material(*substituting.substitute(label, m.law, m.poisson, m.formulation))
-            for label, m in materials.items()
-        }
+        materials = substituted(materials, substituting)
     acting = [m for m in mechanisms if not isinstance(m, Removing | Load)]
     return replace(model, materials=materials, loads=(*loads, *model.loads), mechanisms=(*acting, *model.mechanisms))
+
+
+def substituted(materials: Mapping[int, Material], mechanism: Substituting) -> dict[int, Material]:
+    """The materials of tissues as a mechanism that says something of their law has them."""
+    return {
+        label: Material(*mechanism.substitute(label, m.law, m.poisson, m.formulation)) for label, m in materials.items()
+    }

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
-from warpbrain.mesh import QuadraticMesh, TetMesh, boundary_faces, node_areas, nodes_of
+from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, nodes_of
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
@@ -71,7 +71,7 @@ class FinerCase:
         if not forces.any():
             return np.zeros(mesh.points.shape)
         loaded = forces.any(axis=1)
-        surface = nodes_of(boundary_faces(self._coarse.tetrahedra), len(self._coarse.points))
+        surface = nodes_of(self._coarse.boundary, len(self._coarse.points))
         share = _surface_of_nodes if surface[loaded].all() else _volume_of_nodes
         density = np.zeros_like(forces)
         density[loaded] = forces[loaded] / share(self._coarse)[loaded, None]
@@ -96,8 +96,16 @@ def prolongation(ends: NDArray[np.integer], count: int) -> Any:
     return csr_matrix((np.full(2 * len(ends), 0.5), (rows, ends.ravel())), shape=(len(ends), count))
 
 
+def restricted(prolong: Any, u: Floats, reactions: Floats) -> tuple[Floats, Floats]:
+    """Displacement and reactions of the finer mesh at the nodes of the mesh that there was.
+
+    A reaction between two nodes goes to both of them, so that resultants stay.
+    """
+    return u[: prolong.shape[1]], np.asarray(prolong.T @ reactions)
+
+
 def _surface_of_nodes(mesh: TetMesh) -> Floats:
-    return node_areas(mesh.points, boundary_faces(mesh.tetrahedra))
+    return node_areas(mesh.points, mesh.boundary)
 
 
 def _volume_of_nodes(mesh: TetMesh) -> Floats:

@@ -22,7 +22,7 @@ from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.finer import FinerCase
+from warpbrain.simulation.finer import FinerCase, restricted
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.observation import Observed, State, observe
 from warpbrain.simulation.result import Result
@@ -107,9 +107,9 @@ def estimate(state: State, elements: str, solve: Solve, prolongation: Any = None
     if prolongation is None:
         return MeshError(locking, None, reactions)
     finer = solve(other, True, prolongation @ free.u)
-    size = _RICHARDSON * (finer.u[: len(state.u)] - free.u)
-    # a reaction between two nodes goes to both of them, so that resultants stay
-    reactions = reactions + _RICHARDSON * (prolongation.T @ finer.reactions - free.reactions)
+    finer_u, finer_reactions = restricted(prolongation, finer.u, finer.reactions)
+    size = _RICHARDSON * (finer_u - free.u)
+    reactions = reactions + _RICHARDSON * (finer_reactions - free.reactions)
     return MeshError(locking, size, reactions)
 
 
@@ -170,7 +170,7 @@ def _equilibrium(system: System, start: Floats, say: Callable[[float], None]) ->
     say(0.0)
     options = EquilibriumOptions(tolerance=TOLERANCE)
     found = EquilibriumSolver(system, options, lambda step: say(step.load)).solve(start=start)
-    return Found(system.mesh, found.u, _reactions(system, found.internal, system.model.external_forces()))
+    return Found(system.mesh, found.u, system.model.reactions(found.internal, system.model.external_forces()))
 
 
 def _motion(system: System, steps: int, say: Callable[[float], None]) -> Found:
@@ -185,8 +185,4 @@ def _motion(system: System, steps: int, say: Callable[[float], None]) -> Found:
     system.gather_forces()
     internal = system.internal.numpy().astype(np.float64)
     u = system.u.numpy().astype(np.float64)
-    return Found(system.mesh, u, _reactions(system, internal, system.model.external_forces(simulator.time)))
-
-
-def _reactions(system: System, internal: Floats, external: Floats) -> Floats:
-    return np.where(system.model.constrained, internal - external, 0.0)
+    return Found(system.mesh, u, system.model.reactions(internal, system.model.external_forces(simulator.time)))

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver, NewtonStep
@@ -102,15 +101,15 @@ def follow_slowly(
         raise InputError(f"times = {list(times)} s: expected positive numbers that increase")
     require_held(system.model)
     solver = EquilibriumSolver(system, options, on_step, clock)
-    for term in system.terms:
-        term.forget()
+    system.forget()
     u, now, pending = np.zeros(system.model.mesh.points.shape), 0.0, False
     for time in series.tolist():
         step, taken = time - now, 0
         while now < time:
             if pending:
                 # only now is it known that nobody looks at the state before any more
-                _advance(system, u)
+                system.u.assign(u)
+                system.advance()
             pending = False
             # the last step ends at the time itself, whatever the rounding
             end = time if now + 1.5 * step > time else now + step
@@ -124,10 +123,3 @@ def follow_slowly(
             u, now, taken, pending = state.u, end, taken + 1, True
         system.u.assign(u)
         yield Moment(time, state, taken)
-
-
-def _advance(system: System, u: NDArray[np.float64]) -> None:
-    """Let terms with a memory keep what they need of a step that stands."""
-    system.u.assign(u)
-    for term in system.terms:
-        term.advance(system.u)

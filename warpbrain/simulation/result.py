@@ -105,7 +105,7 @@ def nodal_state_of(system: System, time: float = math.inf) -> NodalState:
     system.evaluate_forces()
     system.gather_forces()
     internal = system.internal.numpy().astype(np.float64)
-    reactions = np.where(system.model.constrained, internal - system.model.external_forces(time), 0.0)
+    reactions = system.model.reactions(internal, system.model.external_forces(time))
     return NodalState(system.node_mesh, system.u.numpy().astype(np.float64), reactions)
 
 

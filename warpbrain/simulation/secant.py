@@ -64,7 +64,6 @@ def secant(
     found = []
     for model in (present, without):
         state = solve_equilibrium(System(model, device), options)
-        reactions = np.where(model.constrained, state.internal - model.external_forces(), 0.0)
-        found.append((state.u, reactions))
+        found.append((state.u, model.reactions(state.internal, model.external_forces())))
     (u, reactions), (u_without, reactions_without) = found
     return Secant(shared, u - u_without[shared], reactions - reactions_without[shared])

@@ -224,8 +224,7 @@ class Rig:
         ramps = [[time for time, _ in m.ramp] for m in self.system.model.mechanisms if m.ramp]
         history = history_of(recording.time, recording.imposed, reach, steps, self._shortest, ramps)
         start = float(history.time[0])
-        for term in self.system.terms:
-            term.forget()
+        self.system.forget()
         found = self._step(recording, rest, np.zeros((len(self._top), 3)), math.inf, start)
         if history.imposed[0] != rest:
             found = self._step(recording, float(history.imposed[0]), found.u, 0.0, start)

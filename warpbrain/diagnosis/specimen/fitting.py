@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.evidence import Explanation, kappa_log_prior
+from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.specimen.forward import Forward, Hypothesis
 from warpbrain.diagnosis.specimen.material import NoStateError
 from warpbrain.errors import InputError
@@ -175,12 +175,10 @@ class Fitting:
         columns: Floats,
         factor: Floats,
     ) -> SpecimenFit:
-        from scipy.special import logsumexp
-
         explanation = Explanation(factor, columns[rows])
         residual = self.forward.protocol.observed[rows] - stress[rows] + columns[rows] @ z
         white = explanation.whitened(residual)
-        log_evidence = float(logsumexp(explanation.log_none(white[:, None])[:, 0] + kappa_log_prior()))
+        log_evidence = float(explanation.log_marginal(white[:, None])[0])
         kappa = explanation.best_kappa(white)
         W = explanation.whitened(columns[rows]) / kappa
         covariance = np.asarray(np.linalg.inv(np.eye(len(z)) + W.T @ W), dtype=np.float64)

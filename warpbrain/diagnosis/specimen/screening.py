@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import Explanation, Stack, kappa_log_prior
+from warpbrain.diagnosis.screening import log_unknown
 from warpbrain.diagnosis.specimen.acting import Assumption
 from warpbrain.diagnosis.specimen.fitting import SpecimenFit
 from warpbrain.diagnosis.specimen.forward import Forward
@@ -94,12 +95,7 @@ def _alarm(explanation: Explanation, stack: Stack, kinds: Sequence[str], residua
 
 def with_smooth_changes(forward: Forward, fit: SpecimenFit) -> float:
     """Log evidence of a fit with any smooth change of the tests beside it."""
-    from scipy.special import logsumexp
-
     # what a limit of a parameter costs, see `Fitting`, counts here too
-    plain = float(logsumexp(fit.explanation.log_none(fit.whitened[:, None])[:, 0] + kappa_log_prior()))
-    found = []
-    for size in SIZES:
-        loose = fit.explanation.with_more(smooth_patterns(forward.protocol, size)[fit.rows])
-        found.append(logsumexp(loose.log_none(fit.whitened[:, None])[:, 0] + kappa_log_prior()))
-    return float(logsumexp(found)) - float(np.log(len(found))) + fit.log_evidence - plain
+    plain = float(fit.explanation.log_marginal(fit.whitened[:, None])[0])
+    loose = [fit.explanation.with_more(smooth_patterns(forward.protocol, size)[fit.rows]) for size in SIZES]
+    return float(log_unknown(loose, fit.whitened[:, None])[0]) + fit.log_evidence - plain

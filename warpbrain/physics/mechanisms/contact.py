@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from warpbrain.kernels.distance_field import smooth_distance
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
-from warpbrain.mesh import TetMesh, boundary_faces, face_vectors, node_areas
+from warpbrain.mesh import TetMesh, node_areas, vertex_normals
 from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
@@ -95,7 +95,7 @@ class Contact(Mechanism):
         if self.surface is None:
             return
         members = mesh.node_sets[self.nodes]
-        if not members[boundary_faces(mesh.tetrahedra)].any():
+        if not members[mesh.boundary].any():
             raise ParameterError("nodes", f"node set '{self.nodes}' holds no node of the surface")
         size, held, body = (
             np.linalg.norm(np.ptp(p, axis=0)) for p in (self.surface.points, mesh.points[members], mesh.points)
@@ -132,7 +132,7 @@ class Contact(Mechanism):
         """Points [m] and outward triangles of the surface it touches."""
         if self.surface is not None:
             return self.surface.points, self.surface.outward
-        own = boundary_faces(mesh.tetrahedra)
+        own = mesh.boundary
         own = own[mesh.node_sets[self.nodes][own].all(axis=1)]
         if not len(own):
             raise ParameterError("nodes", f"node set '{self.nodes}' holds no face of the surface")
@@ -142,7 +142,7 @@ class Contact(Mechanism):
         members = np.flatnonzero(mesh.node_sets[self.nodes])
         if self.state == "fixed":
             return np.repeat(members, 3), np.tile(np.eye(3), (len(members), 1))
-        return members, _vertex_normals(mesh)[members]
+        return members, vertex_normals(mesh)[members]
 
     def bind(self, body: Body) -> "ContactTerm":
         """See `warpbrain.physics.term.Following`."""
@@ -161,7 +161,7 @@ class ContactTerm(Term):
         self.mechanism = contact
         precision, device = body.precision, body.device
         points, faces = contact.skull(body.mesh)
-        own = boundary_faces(body.mesh.tetrahedra)
+        own = body.mesh.boundary
         shared = np.isin(own, members)
         touching = own[shared.any(axis=1)]
         # what the body's own triangles cannot follow need not be resolved
@@ -261,14 +261,6 @@ class ContactTerm(Term):
 def _edge(points: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
     """Median length [m] of the edges of triangles."""
     return float(np.median(np.linalg.norm(points[faces] - points[np.roll(faces, 1, axis=1)], axis=2)))
-
-
-def _vertex_normals(mesh: TetMesh) -> NDArray[np.float64]:
-    faces = boundary_faces(mesh.tetrahedra)
-    normals = np.zeros_like(mesh.points)
-    np.add.at(normals, faces.ravel(), np.repeat(face_vectors(mesh.points, faces), 3, axis=0))
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals / np.where(lengths > 0.0, lengths, 1.0)
 
 
 @cache

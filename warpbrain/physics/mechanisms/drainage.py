@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from warpbrain.kernels.minimal_residual import MinimalResidual
 from warpbrain.kernels.pore import pore_kernels
-from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import LogNormal, Normal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.regions import elements_of
@@ -119,7 +119,7 @@ class Drainage(Mechanism):
 
     def open_nodes(self, mesh: TetMesh) -> NDArray[np.bool_]:
         """Nodes (n,) at which the pressure of the fluid is given: of the drained faces of elements with pores."""
-        faces = boundary_faces(mesh.tetrahedra)
+        faces = mesh.boundary
         if self.drained:
             faces = faces[mesh.node_sets[self.drained][faces].all(axis=1)]
         nodes = np.zeros(len(mesh.points), dtype=bool)

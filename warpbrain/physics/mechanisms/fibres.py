@@ -85,7 +85,6 @@ def _moduli(F: Any, g: Any, h: Any, data: wp.array2d[Any], e: int):
 
 
 _CODE = ExtraEnergy("fibres", _energy, _stress, _moduli)
-_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,15 +157,7 @@ class Fibres(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy."""
-        return [
-            Proposal.of_one(
-                lambda k1, axis=axis: cls(direction=axis, stiffness=max(k1, 1e-9)),
-                0.0,
-                500.0,
-                region=f"fibres along {name}",
-            )
-            for name, axis in zip("xyz", _AXES, strict=True)
-        ]
+        return Proposal.along_axes(lambda k1, axis: cls(direction=axis, stiffness=max(k1, 1e-9)), 500.0, "fibres")
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
         """See `warpbrain.physics.term.Following`."""

@@ -56,21 +56,11 @@ class Inclusion(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Balls of two sizes throughout the tissue; the coefficient is the logarithm of the ratio."""
-        found = []
-        for site in situation.volume_sites:
-            centre = tuple(site.tolist())
-            for radius in _RADII:
-                found.append(
-                    Proposal.of_one(
-                        lambda s, centre=centre, radius=radius: cls(ratio=math.exp(s), centre=centre, radius=radius),
-                        0.0,
-                        _USUAL,
-                        "smooth",
-                        centre=site,
-                        radius=radius,
-                    )
-                )
-        return found
+
+        def ball(s: float, centre: tuple[float, float, float], radius: float) -> Inclusion:
+            return cls(ratio=math.exp(s), centre=centre, radius=radius)
+
+        return Proposal.in_balls(ball, _USUAL, _RADII, situation)
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

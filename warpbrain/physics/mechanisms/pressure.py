@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from warpbrain.kernels.curved_pressure import curved_pressure_kernels
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
-from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.mesh import TetMesh
 from warpbrain.mesh.integrals import triangle_rule
 from warpbrain.mesh.soundness import open_edges
 from warpbrain.physics.expectation import Normal
@@ -68,7 +68,7 @@ class Pressure(Mechanism):
 
     def faces(self, mesh: TetMesh) -> Ints:
         """Triangles (k, 3) that carry the pressure, oriented outwards."""
-        faces = boundary_faces(mesh.tetrahedra)
+        faces = mesh.boundary
         own = faces[mesh.node_sets[self.nodes][faces].all(axis=1)]
         if not len(own):
             raise ParameterError(
@@ -79,7 +79,7 @@ class Pressure(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """On every set of free faces that is not most of the surface: that would be a pressure all around."""
-        every = len(boundary_faces(situation.mesh.tetrahedra))
+        every = len(situation.mesh.boundary)
         found = []
         for nodes in situation.free:
             part = len(cls(nodes=nodes, value=0.0).faces(situation.mesh)) / every

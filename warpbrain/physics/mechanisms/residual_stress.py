@@ -103,15 +103,7 @@ class ResidualStress(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy, in all tissue."""
-        return [
-            Proposal.of_one(
-                lambda tension, axis=axis: cls(tension=tension, direction=tuple(axis)),
-                0.0,
-                300.0,
-                region=f"tension along {name}",
-            )
-            for name, axis in zip("xyz", np.eye(3).tolist(), strict=True)
-        ]
+        return Proposal.along_axes(lambda tension, axis: cls(tension=tension, direction=axis), 300.0, "tension")
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
         """See `warpbrain.physics.term.Following`."""

@@ -60,21 +60,12 @@ class Swelling(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """All tissue, or balls of two sizes throughout it."""
-        found = [Proposal.of_one(lambda g: cls(amount=g), 0.0, _EVERYWHERE, "smooth", region="all tissue")]
-        for site in situation.volume_sites:
-            centre = tuple(site.tolist())
-            for radius in _RADII:
-                found.append(
-                    Proposal.of_one(
-                        lambda g, centre=centre, radius=radius: cls(amount=g, centre=centre, radius=radius),
-                        0.0,
-                        _SOMEWHERE,
-                        "smooth",
-                        centre=site,
-                        radius=radius,
-                    )
-                )
-        return found
+        everywhere = Proposal.of_one(lambda g: cls(amount=g), 0.0, _EVERYWHERE, "smooth", region="all tissue")
+
+        def ball(g: float, centre: tuple[float, float, float], radius: float) -> Swelling:
+            return cls(amount=g, centre=centre, radius=radius)
+
+        return [everywhere, *Proposal.in_balls(ball, _SOMEWHERE, _RADII, situation)]
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

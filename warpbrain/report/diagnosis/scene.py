@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.mesh import boundary_faces
 from warpbrain.report.diagnosis.figures.drawing import COLOURS, shades
 from warpbrain.report.diagnosis.saved import STATES, Anatomy, Rows
 from warpbrain.report.files import MILLIMETRES
@@ -19,7 +18,7 @@ Floats = NDArray[np.float64]
 
 def describe_scene(said: dict[str, Any], anatomy: Anatomy, rows: Rows | None) -> dict[str, Any]:
     """The scene, lengths in mm; arrays are 32-bit numbers in base64."""
-    faces = boundary_faces(anatomy.mesh.tetrahedra)
+    faces = anatomy.mesh.boundary
     used, triangles = np.unique(faces, return_inverse=True)
     where = said["where"]
     ball = None

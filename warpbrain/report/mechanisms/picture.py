@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.mesh import TetMesh
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.slices import cut, outline
@@ -86,7 +86,7 @@ def _draw_phantom(axes: Any, case: Case) -> None:
     ball = mesh.element_sets["ball"][section.elements]
     fills, rims = (np.where(ball, colour, colours).tolist() for colour in (_BALL, _BALL_EDGE))
     axes.add_collection(PolyCollection(polygons, facecolors=fills, edgecolors=rims, linewidths=0.4))
-    edges = MILLIMETRES * outline(mesh.points, boundary_faces(mesh.tetrahedra), 1, PLACE)
+    edges = MILLIMETRES * outline(mesh.points, mesh.boundary, 1, PLACE)
     axes.add_collection(LineCollection(list(edges), colors=views.TISSUE_EDGE, linewidths=0.9))
     near = np.abs(mesh.points[:, 1] - PLACE) < _NEAR
     entries: list[tuple[Any, str]] = [(Patch(facecolor=_BALL, edgecolor=_BALL_EDGE), "ball")]
@@ -110,7 +110,7 @@ def _draw_effect(axes: Any, whole: TetMesh, mesh: TetMesh, difference: Floats) -
     shown.set_clim(0.0, LARGEST)
     axes.add_collection(shown)
     for body, points, style in ((mesh, moved, "-"), (whole, whole.points, (0, (3, 2)))):
-        edges = MILLIMETRES * outline(points, boundary_faces(body.tetrahedra), 1, PLACE)
+        edges = MILLIMETRES * outline(points, body.boundary, 1, PLACE)
         axes.add_collection(LineCollection(list(edges), colors="#1d1d1d", linestyles=[style], linewidths=0.9))
     shows = np.flatnonzero((np.abs(mesh.points[:, 1] - PLACE) < _NEAR) & (sizes > _SHORTEST))
     cells = np.round(MILLIMETRES * mesh.points[shows][:, [0, 2]] / _SPACING)

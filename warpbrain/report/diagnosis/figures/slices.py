@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.mesh import boundary_faces
 from warpbrain.report.diagnosis.saved import Anatomy
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.generative.page import GREEN
@@ -37,7 +36,7 @@ def draw_slice(axes: Any, anatomy: Anatomy, view: View, place: float, threshold:
         )
     segments = in_view(level_line(section, threshold))
     axes.add_collection(LineCollection(list(segments), colors=GREEN, linewidths=2.2))
-    draw_outline(axes, boundary_faces(mesh.tetrahedra), mesh.points, view, place)
+    draw_outline(axes, mesh.boundary, mesh.points, view, place)
     return section
 
 
