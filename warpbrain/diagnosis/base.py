@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effects
 from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.flexible import LENGTHS, SCALES, flexible_columns
+from warpbrain.diagnosis.flexible import LENGTHS, flexible_columns, smooth_forces
+from warpbrain.diagnosis.fraction import likely_fraction
 from warpbrain.diagnosis.gross_errors import ASIDE, gross_errors
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.mesh_error import mesh_error
@@ -99,16 +100,17 @@ class Base:
     @property
     def smooth_forces(self) -> list[Floats]:
         """Columns of smooth forces of each length and size."""
-        noise = self.typical_noise
-        return [scale * noise * columns for columns in self.flexible for scale in SCALES]
+        return smooth_forces(self.flexible, self.typical_noise)
 
     def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
         """What nuisances do to the displacement of other points (k, 3) [m], and what makes effects there."""
         at = self.at.with_sensors(tracked_points(self.at.system.model.mesh, points, self.states.centre))
         effects = Effects(at, switched(self.states, self.state, at.sensors, self.effects.switches))
         theta = self.state.hypothesis.theta
-        anchors = self.nuisances.anchors
-        return nuisances_at(at, self.states, theta, self.prior, effects, self.difference, anchors), effects
+        own = self.nuisances
+        return nuisances_at(
+            at, self.states, theta, self.prior, effects, self.difference, own.anchors, own.fraction
+        ), effects
 
 
 class BaseFinder:
@@ -212,6 +214,10 @@ class BaseFinder:
             aside = found
         sigma = np.where(aside, ASIDE * noise, noise)
         explanation = explanation_of(sensors, sigma, nuisances.columns)
+        if difference is not None and not self._bare:
+            smooth = smooth_forces(flexible, float(np.median(noise[sensors.is_displacement])))
+            nuisances = nuisances.with_fraction(likely_fraction(explanation.factor, nuisances, residual, smooth))
+            explanation = Explanation(explanation.factor, nuisances.columns)
         return Base(
             self.states,
             self.prior,

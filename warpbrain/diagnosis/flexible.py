@@ -6,6 +6,8 @@ of that length. Scaled to 1 m of mean displacement at the sensors, and cut to th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,3 +45,8 @@ def flexible_columns(at: Linearisation, length: float) -> Floats:
     found = left[:, :kept] * sizes[:kept]
     rows = at.sensors.is_displacement
     return np.asarray(found / np.sqrt(np.mean(np.sum(found[rows] ** 2, axis=1))))
+
+
+def smooth_forces(flexible: Sequence[Floats], noise: float) -> list[Floats]:
+    """Columns of smooth forces of each length, and of each size relative to a noise [m]."""
+    return [scale * noise * columns for columns in flexible for scale in SCALES]

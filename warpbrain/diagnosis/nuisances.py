@@ -7,7 +7,7 @@ were, a rigid error of registration, and the error of the mesh. A cause is credi
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,12 +29,12 @@ from warpbrain.physics.proposal import Proposal
 Floats = NDArray[np.float64]
 
 #: Standard deviations: of `-ln(1 - 2 nu)`, of an exponent of the law, of a share of I2, of the size of known loads.
-_VOLUME, _EXPONENT, _SECOND, _LOADS = 0.4, 3.0, 0.25, 0.04
+_VOLUME, _EXPONENT, _SECOND, _LOADS = 0.4, 2.0, 0.25, 0.04
 #: Of a rigid error of registration: shift [m] and turn [rad].
 _SHIFT, _TURN = 1e-3, math.radians(1.0)
 REGISTRATION_SD = np.repeat([_SHIFT, _TURN], 3)
-#: Error of the mesh beside what a finer one shows, as a part of the displacement, and how far [m] it is alike.
-_FRACTION, _ALIKE = 0.06, 0.02
+#: Error of the mesh beside what a finer one shows: the largest part of the displacement, and how far [m] it is alike.
+FRACTION, _ALIKE = 0.06, 0.02
 #: Step of a difference in `theta`.
 _STEP = 1e-3
 
@@ -67,11 +67,14 @@ class Nuisances:
         What they are expected to change of what is recorded beforehand: the error of the mesh.
     anchors : (a, 3) array
         Points [m] about which the unknown part of the mesh's error is alike.
+    fraction : float
+        That part, relative to the displacement.
     """
 
     families: tuple[Family, ...]
     mean: Floats
     anchors: Floats
+    fraction: float = FRACTION
 
     @property
     def columns(self) -> Floats:
@@ -80,7 +83,13 @@ class Nuisances:
 
     def weakened(self) -> Nuisances:
         """The same as if nothing of them could be: columns that are next to nothing."""
-        return Nuisances(tuple(Family(f.name, 1e-9 * f.columns) for f in self.families), self.mean, self.anchors)
+        return replace(self, families=tuple(Family(f.name, 1e-9 * f.columns) for f in self.families))
+
+    def with_fraction(self, fraction: float) -> Nuisances:
+        """The same with another size of the unknown part of the mesh's error."""
+        *others, last = self.families
+        scaled = Family(last.name, last.columns * (fraction / self.fraction))
+        return replace(self, families=(*others, scaled), fraction=fraction)
 
     def part(self, name: str) -> slice:
         """Where the columns of a family are."""
@@ -101,6 +110,7 @@ def nuisances_at(
     effects: Effects,
     mesh_error: Difference | None,
     anchors: Floats | None = None,
+    fraction: float = FRACTION,
 ) -> Nuisances:
     """The nuisances of a state.
 
@@ -118,6 +128,8 @@ def nuisances_at(
         The state on a finer mesh less the state.
     anchors : (a, 3) array, optional
         Those of other sensors, so that columns mean the same.
+    fraction : float
+        Unknown part of the mesh's error, relative to the displacement.
     """
     sensors = at.sensors
     if anchors is None:
@@ -137,8 +149,8 @@ def nuisances_at(
         answer = sensors.answer(mesh_error.u, mesh_error.reactions)
         mean = believed.mean * answer
         families.append(Family("mesh", believed.deviation * answer[:, None]))
-    families.append(Family("mesh, unknown", _fractional(at, anchors)))
-    return Nuisances(tuple(families), mean, anchors)
+    families.append(Family("mesh, unknown", _fractional(at, anchors, fraction)))
+    return Nuisances(tuple(families), mean, anchors, fraction)
 
 
 def _tissue(at: Linearisation, states: States, theta: Floats) -> Floats:
@@ -200,7 +212,7 @@ def _known_loads(at: Linearisation) -> Floats:
     return found[:, found.any(axis=0)]
 
 
-def _fractional(at: Linearisation, anchors: Floats) -> Floats:
+def _fractional(at: Linearisation, anchors: Floats, fraction: float) -> Floats:
     """A part of the displacement in any direction, alike among neighbours."""
     from scipy.spatial import cKDTree
 
@@ -215,5 +227,5 @@ def _fractional(at: Linearisation, anchors: Floats) -> Floats:
     near /= np.sqrt(np.sum(near**2, axis=1, keepdims=True))
     found = np.zeros((len(sensors), 3 * len(anchors)))
     along = sensors.directions[rows]
-    found[rows] = (_FRACTION * size[:, None, None] * near[:, :, None] * along[:, None, :]).reshape(len(rows), -1)
+    found[rows] = (fraction * size[:, None, None] * near[:, :, None] * along[:, None, :]).reshape(len(rows), -1)
     return found
