@@ -23,7 +23,7 @@ from warpbrain.diagnosis.options import Listener
 from warpbrain.diagnosis.sensing import explanation_of, known_sigma
 from warpbrain.diagnosis.sensors import tracked_points
 from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
-from warpbrain.diagnosis.switching import switched
+from warpbrain.diagnosis.switching import Known, Solving
 from warpbrain.diagnosis.tissue_prior import declared, tissue_prior
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference
@@ -54,6 +54,8 @@ class Base:
         The base.
     at : Linearisation
     effects : Effects
+    known : Known
+        What was solved beside the base for them.
     nuisances : Nuisances
     flexible : tuple of (n, k) arrays
         Columns of smooth forces of each length, of 1 m.
@@ -77,6 +79,7 @@ class Base:
     state: SolvedState
     at: Linearisation
     effects: Effects
+    known: Known
     nuisances: Nuisances
     flexible: tuple[Floats, ...]
     sigma: Floats
@@ -105,7 +108,7 @@ class Base:
     def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
         """What nuisances do to the displacement of other points (k, 3) [m], and what makes effects there."""
         at = self.at.with_sensors(tracked_points(self.at.system.model.mesh, points, self.states.centre))
-        effects = Effects(at, switched(self.states, self.state, at.sensors, self.effects.switches))
+        effects = Effects(at, Solving(self.states, self.state, at.sensors, self.known))
         theta = self.state.hypothesis.theta
         own = self.nuisances
         return nuisances_at(
@@ -188,7 +191,8 @@ class BaseFinder:
     def _linearised(self, first: SolvedState, state: SolvedState, difference: Difference | None) -> Base:
         sensors = state.sensors
         at = Linearisation(state.system, state.u, state.reactions, sensors)
-        effects = Effects(at, switched(self.states, state, sensors, {}))
+        known = Known()
+        effects = Effects(at, Solving(self.states, state, sensors, known))
         theta = state.hypothesis.theta
         nuisances = nuisances_at(at, self.states, theta, self.prior, effects, difference)
         if self._bare:
@@ -225,6 +229,7 @@ class BaseFinder:
             state,
             at,
             effects,
+            known,
             nuisances,
             flexible,
             sigma,

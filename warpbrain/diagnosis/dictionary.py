@@ -162,7 +162,10 @@ def candidates_at(
             on_kind(kind)
         own: list[Effect] = []
         smooth = [proposal for proposal in proposals if not proposal.is_there_or_not]
-        own.extend(effects.of(smooth))
+        try:
+            own.extend(effects.of(smooth))
+        except SolveError as error:
+            rejected[kind] = f"{smooth[0].region}: cannot be simulated here: {error}"
         for proposal in proposals:
             if proposal.is_there_or_not:
                 try:

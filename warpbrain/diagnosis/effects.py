@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.diagnosis.course import Course
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
@@ -20,9 +21,18 @@ Floats = NDArray[np.float64]
 
 #: Part of a standard deviation by which a smooth proposal is differentiated.
 _STEP = 1e-3
+#: The same of a course.
+_STEP_OF_COURSE = 0.05
 
-#: The answer of a switch: the sensors (n,) of the state with the mechanism, less those without it.
-Switched = Callable[[Mechanism], Floats]
+
+class Solved(Protocol):
+    """What answers for mechanisms that are solved, not differentiated: `warpbrain.diagnosis.switching.Solving`."""
+
+    def there(self, mechanism: Mechanism) -> Floats:
+        """The sensors (n,) of the state with the mechanism, less those without it."""
+
+    def course(self, mechanism: Mechanism, paces: Sequence[float]) -> Course:
+        """The same over time, at any of some paces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +47,14 @@ class Effect:
         Where the coefficients are what is expected beforehand.
     columns : (n, k) array
         Of one standard deviation of each.
+    about : callable, or None
+        Of a course: from its coefficients (k,) to the columns (n, k) there.
     """
 
     proposal: Proposal | None
     mean: Floats
     columns: Floats
+    about: Callable[[Floats], Floats] | None = None
 
     @property
     def proposed(self) -> Proposal:
@@ -60,13 +73,13 @@ class Effects:
     Parameters
     ----------
     at : Linearisation
-    switched : callable
-        See `Switched`; asked for proposals that are switches.
+    solved : Solved, optional
+        Asked for proposals that are switches or courses.
     """
 
-    def __init__(self, at: Linearisation, switched: Switched) -> None:
+    def __init__(self, at: Linearisation, solved: Solved | None = None) -> None:
         self.at = at
-        self._switched = switched
+        self._given = solved
         self._internal: Floats | None = None
         model = at.system.model
         acting = [m for m in (*model.loads, *model.mechanisms) if isinstance(m, Mechanism) and not m.several]
@@ -74,9 +87,9 @@ class Effects:
         self._own = {mechanism.kind: mechanism for mechanism in acting}
 
     @property
-    def switches(self) -> dict[str, Any]:
-        """States of switches that were solved."""
-        return getattr(self._switched, "known", {})
+    def _solved(self) -> Solved:
+        assert self._given is not None, "switches and courses keep their columns"
+        return self._given
 
     def of(self, proposals: Sequence[Proposal], present: Mechanism | None = None) -> list[Effect]:
         """Columns of each proposal, in one pass over what they have in common.
@@ -87,14 +100,29 @@ class Effects:
         present : Mechanism, optional
             What of them acts at the state already.
         """
+        courses = self._courses([proposal for proposal in proposals if proposal.pace is not None])
         points = [self._points(proposal) for proposal in proposals]
         answers = self._answers([mechanism for own in points for mechanism in own], present)
         found, next_one = [], 0
         for proposal, own in zip(proposals, points, strict=True):
             columns = answers[:, next_one : next_one + len(own)]
-            found.append(self._effect(proposal, self._over_time(proposal, columns)))
+            course = courses.get(repr(proposal.make(proposal.start))) if proposal.pace is not None else None
+            found.append(
+                self._effect(proposal, self._over_time(proposal, columns))
+                if course is None
+                else _effect_of_course(proposal, course)
+            )
             next_one += len(own)
         return found
+
+    def _courses(self, proposals: Sequence[Proposal]) -> dict[str, Course]:
+        """Courses that proposals share, by what is solved."""
+        makes = {repr(made): made for made in (proposal.make(proposal.start) for proposal in proposals)}
+        paces: dict[str, list[float]] = {key: [] for key in makes}
+        for proposal in proposals:
+            assert proposal.pace is not None
+            paces[repr(proposal.make(proposal.start))].append(proposal.pace(proposal.mean))
+        return {key: self._solved.course(made, paces[key]) for key, made in makes.items()}
 
     def _over_time(self, proposal: Proposal, answers: Floats) -> Floats:
         if proposal.history is None:
@@ -105,7 +133,7 @@ class Effects:
     @staticmethod
     def _points(proposal: Proposal) -> list[Mechanism]:
         """Mechanisms whose answers make the columns."""
-        if proposal.is_there_or_not:
+        if proposal.is_there_or_not or proposal.pace is not None:
             return []
         axes = np.diag(proposal.sd)
         if proposal.follows == "proportional":
@@ -119,7 +147,7 @@ class Effects:
                 assert proposal.patch is not None
                 answer = self.at.released(proposal.patch.members, _lifts(proposal.make(proposal.mean)))
             else:
-                answer = self._switched(proposal.make(proposal.mean))
+                answer = self._solved.there(proposal.make(proposal.mean))
             return Effect(proposal, proposal.mean[0] * answer, proposal.sd[0] * answer[:, None])
         if proposal.follows == "proportional":
             return Effect(proposal, answers @ (proposal.mean / proposal.sd), answers)
@@ -197,6 +225,19 @@ class Effects:
         other = replace(model, materials=substituted(model.materials, mechanism))
         beside = System(other, str(system.device), system.precision.name)
         return self.at.internal_forces(beside) - self._internal
+
+
+def _effect_of_course(proposal: Proposal, course: Course) -> Effect:
+    pace = proposal.pace
+    assert pace is not None
+
+    def about(c: Floats) -> Floats:
+        # wide enough that rounding does not matter, narrow beside what a course changes over
+        steps = [_STEP_OF_COURSE * axis for axis in np.diag(proposal.sd)]
+        ends = [(course.at(pace(c + step)) - course.at(pace(c - step))) / (2.0 * _STEP_OF_COURSE) for step in steps]
+        return np.column_stack(ends)
+
+    return Effect(proposal, course.at(pace(proposal.mean)), about(proposal.mean), about)
 
 
 def _lifts(mechanism: Mechanism) -> bool:

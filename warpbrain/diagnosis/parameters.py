@@ -90,11 +90,11 @@ def smallest_of(effect: Effect, whitened_length: float, wanted: float) -> Smalle
     ----------
     effect : Effect
     whitened_length : float
-        Its detectability per standard deviation of its first coefficient (of a switch: when it is there).
+        Its detectability per standard deviation of its first coefficient (of a switch, or a course: when it is there).
     wanted : float
     """
     factor = wanted / max(whitened_length, 1e-12)
-    if effect.proposed.is_there_or_not:
+    if effect.proposed.is_there_or_not or effect.about is not None:
         return Smallest(factor, "of being there", "share")
     z = np.zeros(effect.columns.shape[1])
     start = -effect.proposed.mean / effect.proposed.sd if effect.proposed.follows == "proportional" else z

@@ -171,7 +171,8 @@ class Refitting:
         # along what it is: its coefficients, each in standard deviations
         scaled = away / effect.proposed.sd
         length = float(scaled @ scaled)
-        if length < 1e-6 or effect.proposed.history is not None:
+        # of what changes in time the finer mesh says nothing: it is computed in the end state alone
+        if length < 1e-6 or effect.proposed.history is not None or effect.about is not None:
             return None
         try:
             error = mesh_error(self.states, state.hypothesis, state)
@@ -295,14 +296,16 @@ class Refitting:
         q = self._U.shape[1]
         if all(effect.proposed.is_there_or_not for effect in effects):
             return columns
-        at = Linearisation(state.system, state.u, state.reactions, state.sensors)
-        anew, place, found = Effects(at, _none), 0, [columns[:, :q]]
+        place, found = 0, [columns[:, :q]]
         for effect in effects:
             size = effect.columns.shape[1]
+            here = effect.coefficients(z[place : place + size])
             if effect.proposed.is_there_or_not:
                 found.append(effect.columns)
+            elif effect.about is not None:
+                found.append(effect.about(here))
             else:
-                here = effect.coefficients(z[place : place + size])
+                anew = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors))
                 about = replace(effect.proposed, follows="smooth", start=here)
                 found.append(anew.of([about], effect.proposed.make(here))[0].columns)
             place += size
@@ -346,7 +349,3 @@ class Refitting:
             kappa,
             converged,
         )
-
-
-def _none(_mechanism: object) -> Floats:
-    raise AssertionError("switches keep their columns")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +28,10 @@ Floats = NDArray[np.float64]
 
 #: Out-of-balance force of an equilibrium, relative.
 TOLERANCE = 1e-6
+#: The same of a course in time, whose steps are less exact than that.
+_COURSE = 1e-5
+#: Short steps after a load has come, as parts of the first time that counts.
+_SHORT = (1e-3, 0.1, 0.4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,13 +130,12 @@ class States:
             If there is none.
         """
         self.solves += 1
-        model, _ = model_of(self.case_of(hypothesis))
-        if hypothesis.field.any():
-            field = StiffnessField(log_factor=self.modes @ hypothesis.field)
-            model = replace(model, mechanisms=(*model.mechanisms, field))
-        system = System(model, self.device)
+        system = self._system(hypothesis)
+        model = system.model
         options = EquilibriumOptions(tolerance=TOLERANCE)
-        if any(term.forgets_in is not None for term in system.terms):
+        # relaxing stress or fluid of its own: what a term has in its memory beside that changes no state in time
+        in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
+        if in_time and np.isfinite(self.times[0]):
             found = {moment.time: moment.state for moment in follow_slowly(system, self._steps(), options)}
             states = [found[time] for time in self.times]
         else:
@@ -142,10 +146,44 @@ class States:
         instants = [(time, observations, state.u, R) for time, observations, state, R in parts]
         return SolvedState(hypothesis, system, states[-1].u, reactions[-1], sensors_at(instants, self.centre))
 
+    def course(self, hypothesis: Hypothesis, times: Sequence[float], start: Floats) -> list[tuple[Floats, Floats]]:
+        """Displacement and reactions (N, 3) under a hypothesis at increasing times [s] after all loads came at once.
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis
+        times : sequence of float
+        start : (N, 3) array
+            A displacement [m] that is near to the first.
+
+        Raises
+        ------
+        SolveError
+            If there is no equilibrium at one of the times.
+        """
+        self.solves += 1
+        system = self._system(hypothesis)
+        external = system.model.external_forces()
+        solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=_COURSE))
+        system.forget()
+        u, now, found = start, 0.0, []
+        for time in (*(times[0] * part for part in _SHORT), *times):
+            state = solver.step(u, time - now)
+            u, now = state.u, time
+            found.append((u, system.model.reactions(state.internal, external)))
+        return found[len(_SHORT) :]
+
+    def _system(self, hypothesis: Hypothesis) -> System:
+        model, _ = model_of(self.case_of(hypothesis))
+        if hypothesis.field.any():
+            field = StiffnessField(log_factor=self.modes @ hypothesis.field)
+            model = replace(model, mechanisms=(*model.mechanisms, field))
+        return System(model, self.device)
+
     def _steps(self) -> list[float]:
         """Times [s] of the steps from rest to the last recorded time: short ones after the load, longer ones later."""
         first = self.times[0]
-        found = [first * part for part in (1e-3, 0.1, 0.4)]
+        found = [first * part for part in _SHORT]
         for before, after in itertools.pairwise((0.0, *self.times)):
             found += [before + part * (after - before) for part in ((1.0,) if before == 0.0 else (0.3, 0.6, 1.0))]
         return found

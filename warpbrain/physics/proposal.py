@@ -24,8 +24,8 @@ Floats = NDArray[np.float64]
 Place = tuple[float, float, float]
 
 #: How the effect of a proposal follows its coefficients: in proportion, to first order about a start that does nothing,
-#: all at once, or all at once where something that held it lets go.
-Follows = Literal["proportional", "smooth", "switch", "release"]
+#: all at once, all at once where something that held it lets go, or as a course in time that coefficients hasten.
+Follows = Literal["proportional", "smooth", "switch", "release", "course"]
 
 
 class NotTestableError(Exception):
@@ -110,7 +110,8 @@ class Proposal:
     mean, sd : (k,) array
         Of the coefficients beforehand.
     follows : str
-        One of `Follows`. A smooth one does nothing at `start`; a switch has one coefficient, its share.
+        One of `Follows`. A smooth one does nothing at `start`; a switch has one coefficient, its share; a course is
+        solved once, at `start`.
     start : (k,) array
         About which a smooth one is differentiated; zero if proportional.
     nothing : (k,) array
@@ -119,6 +120,8 @@ class Proposal:
         What the case's own boundaries no longer hold.
     history : callable, or None
         From the time since the load came [s] to the part of its effect that is there; None: all of it, always.
+    pace : callable, or None
+        Of a course: from coefficients to how many times faster than at `start` all of it goes.
     centre, radius : (3,) array and float, or None
         Where it acts [m], if somewhere.
     region : str
@@ -133,6 +136,7 @@ class Proposal:
     nothing: Floats = field(default_factory=lambda: np.zeros(0))
     patch: Patch | None = None
     history: Callable[[float], float] | None = None
+    pace: Callable[[Floats], float] | None = None
     centre: Floats | None = None
     radius: float | None = None
     region: str = ""

@@ -25,6 +25,8 @@ A step shorter than `d^2 / (6 c)`, `d` the size of the elements at a drained fac
 follow the pressure there, which overshoots (Vermeer and Verruijt 1981).
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -37,6 +39,7 @@ from warpbrain.kernels.pore import pore_kernels
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import LogNormal, Normal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body, Coupling, Term
 
@@ -44,6 +47,8 @@ from warpbrain.physics.term import Body, Coupling, Term
 _MAX_ITERATIONS = 20_000
 #: Relative change of a steady pressure that is worth another solve.
 _STEADY = 1e-7
+#: Permeabilities that are looked for: so many equally probable ones.
+_LOOKED_FOR = 7
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +115,44 @@ class Drainage(Mechanism):
     sentence: ClassVar[str] = "Fluid in the tissue carries load at first, and flows away over minutes."
     confused_with: ClassVar[tuple[str, ...]] = ("viscoelasticity", "compressibility", "swelling")
     needs: ClassVar[tuple[str, ...]] = ("two times or more", "a change of volume, or bodies of two sizes")
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """Permeabilities as they are expected, of tissue that drains through its whole surface into fluid or blood.
+
+        Without storage and exchange only the product of permeability and time counts: one course serves them all. An
+        exchange with the blood is not looked for: what it leaves in the end is a swelling, and said as that.
+        """
+        situation.require_new(cls.kind)
+        if situation.instants < 2:
+            raise NotTestableError(f"needs {cls.needs[0]}")
+        if "viscoelasticity" in situation.assumed:
+            raise NotTestableError("needs tissue that does not relax by itself: the case assumes viscoelasticity")
+        expected = cls.parameters()["permeability"].expectation
+        assert isinstance(expected, LogNormal)
+        start = math.log(expected.median)
+        edges = [expected.quantile(part / _LOOKED_FOR) for part in range(1, _LOOKED_FOR)]
+        # the outermost reach as far as their neighbours do
+        width = math.log(edges[-1] / edges[-2])
+
+        def drained(c: NDArray[np.float64]) -> "Drainage":
+            return cls(permeability=math.exp(float(c[0])))
+
+        def pace(c: NDArray[np.float64]) -> float:
+            return math.exp(float(c[0]) - start)
+
+        return [
+            Proposal(
+                drained,
+                np.array([math.log(expected.quantile((number + 0.5) / _LOOKED_FOR))]),
+                np.full(1, width),
+                "course",
+                np.array([start]),
+                pace=pace,
+                region="all tissue",
+            )
+            for number in range(_LOOKED_FOR)
+        ]
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

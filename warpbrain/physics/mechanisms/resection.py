@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +30,14 @@ class Resection(Mechanism):
     switches: ClassVar[bool] = True
     sentence: ClassVar[str] = "Tissue was taken out, and what it held moves into the cavity."
     example: ClassVar[str] = "resection:elements=ball"
+
+    @classmethod
+    def proposals(cls, situation: Situation) -> Sequence[Proposal]:
+        """None: elements that are gone leave no state to compare with."""
+        situation.require_new(cls.kind)
+        raise NotTestableError(
+            "tissue that was taken out is looked for as 'cavity', which takes it out little by little"
+        )
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
