@@ -155,8 +155,10 @@ class Refitting:
         found = self._descend(effects, self._limited(begin), columns, kappa, self.start, 1)
         if self.difference is None or not effects:
             return self._refit(effects, *found)
-        self._share = self._share_of(effects[0], found[0], found[1])
-        state, z, _, columns, _ = found
+        state, z, _, columns, converged = found
+        self._share = self._share_of(effects[0], state, z)
+        if self._share is None and converged:
+            return self._refit(effects, *found)
         if self._share is not None:
             columns = columns.copy()
             own = slice(self._U.shape[1], self._U.shape[1] + len(self._share.along))

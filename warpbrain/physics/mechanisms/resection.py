@@ -35,9 +35,7 @@ class Resection(Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """None: elements that are gone leave no state to compare with."""
         situation.require_new(cls.kind)
-        raise NotTestableError(
-            "tissue that was taken out is looked for as 'cavity', which takes it out little by little"
-        )
+        raise NotTestableError("what was taken out is looked for as 'cavity', which empties the same elements")
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
