@@ -21,10 +21,11 @@ from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo, scattered_
 from warpbrain.diagnosis.locating import ScoreMap, ball_of, score_map
 from warpbrain.diagnosis.measuring import next_measurements
 from warpbrain.diagnosis.observable import require_observable
+from warpbrain.diagnosis.onset import onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions, Listener
 from warpbrain.diagnosis.parameters import SEEN, scanned_values, smallest_of, values_of
 from warpbrain.diagnosis.refitting import Refit, Refitting
-from warpbrain.diagnosis.result import Diagnosis, Fit, Ranked, Smallest
+from warpbrain.diagnosis.result import NOT_PHYSICS, NOTHING, Diagnosis, Fit, Ranked, Smallest
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening, log_unknown
 from warpbrain.diagnosis.sentences import assumptions_of, sentence_of
 from warpbrain.diagnosis.states import States
@@ -184,6 +185,10 @@ class Diagnosing:
             adequacy_p = self._adequacy(base, fits[best], rng)
             size = float(np.abs(fits[best].coefficients[0]).max())
         verdict = decide(Evidence(options.alpha, p_value, ranking, likely, placebo_p, adequacy_p, size))
+        when = None
+        if verdict.verdict not in (NOTHING, NOT_PHYSICS):
+            first = ranking[0]
+            when = onset_of(first.kind if first.physics else UNKNOWN, base, candidates, screen)
         named = tuple(r for r in ranking if r.kind in verdict.kinds) if "named" in verdict.verdict else ()
         explained = self._explained(fits, named)
         fit = self._fit(base, fits, without[way], predicted, named, gain, placebo_p, band, ceiling)
@@ -200,6 +205,7 @@ class Diagnosing:
             ranking,
             candidates.rejected,
             where,
+            when,
             base,
             fits,
             {"none": without[way], **predicted},

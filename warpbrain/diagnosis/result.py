@@ -12,6 +12,7 @@ from warpbrain.cases.case import Case
 from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.locating import ScoreMap
+from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.refitting import Refit
 
 Floats = NDArray[np.float64]
@@ -167,6 +168,8 @@ class Diagnosis:
     rejected : dict of str to str
         Kinds that were not tried, and why.
     map : ScoreMap
+    when : Onset or None
+        When what explains the mismatch best set in; None with one time, or where nothing physical is missing.
     base : Base
     fits : dict of str to Refit
         By kind; ``"none"`` without any.
@@ -191,6 +194,7 @@ class Diagnosis:
     ranking: tuple[Ranked, ...]
     rejected: dict[str, str]
     map: ScoreMap
+    when: Onset | None
     base: Base
     fits: dict[str, Refit]
     held_out: dict[str, Predicted]

@@ -75,24 +75,25 @@ class Screening:
     def run(self, residuals: Floats) -> Screen:
         """Evidence for whitened residuals (n, b)."""
         none = self.explanation.log_marginal(residuals)
-        places = self._places(self.explanation, residuals) - none
+        places = log_places(self.explanation, self.stack, residuals) - none
         by_kind = self._by_kind(places)
         unknown = log_unknown(self.flexible, residuals) - none
         return Screen((*self.candidates.kinds, UNKNOWN), none, np.vstack([by_kind, unknown]), places)
-
-    def _places(self, explanation: Explanation, residuals: Floats) -> Floats:
-        """Log density (v, b) of residuals with each effect."""
-        from scipy.special import logsumexp
-
-        base = explanation.log_none(residuals)[:, None, :]
-        factors = explanation.log_factors(self.stack, residuals)
-        return np.asarray(logsumexp(base + factors + kappa_log_prior()[:, None, None], axis=0))
 
     def _by_kind(self, places: Floats) -> Floats:
         from scipy.special import logsumexp
 
         rows = [logsumexp(places[own], axis=0) - np.log(len(own)) for own in self.candidates.of_kind.values()]
         return np.array(rows).reshape(len(rows), places.shape[1])
+
+
+def log_places(explanation: Explanation, stack: Stack, residuals: Floats) -> Floats:
+    """Log density (v, b) of whitened residuals with each effect."""
+    from scipy.special import logsumexp
+
+    base = explanation.log_none(residuals)[:, None, :]
+    factors = explanation.log_factors(stack, residuals)
+    return np.asarray(logsumexp(base + factors + kappa_log_prior()[:, None, None], axis=0))
 
 
 def log_unknown(flexible: Sequence[Explanation], residuals: Floats) -> Floats:

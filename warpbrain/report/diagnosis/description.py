@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis, Ranked, Value
 from warpbrain.diagnosis.sentences import effect_sentence
@@ -24,7 +25,7 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
         "probability": best.probability if best else found.ranking[0].probability,
         "parameters": _values(best.values) if best else {},
         "where": _where(found, best),
-        "when": None,
+        "when": _when(found.when),
         "ranking": [_ranked(ranked, found.case.gravity_axis) for ranked in found.ranking]
         + [_rejected(kind, why) for kind, why in found.rejected.items()],
         "group": list(found.group),
@@ -88,6 +89,17 @@ def _where(found: Diagnosis, best: Ranked | None) -> dict[str, Any] | None:
         "region": best.region if best is not None else "",
         "local_p": found.map.local_p,
         "global_p": found.map.global_p,
+    }
+
+
+def _when(onset: Onset | None) -> dict[str, Any] | None:
+    if onset is None:
+        return None
+    return {
+        "seconds": [onset.first, onset.last],
+        "probability": onset.probability,
+        "course": onset.course,
+        "intervals": [{"seconds": [a, b], "probability": p} for a, b, p in onset.intervals],
     }
 
 

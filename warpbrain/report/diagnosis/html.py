@@ -26,6 +26,7 @@ from warpbrain.report.diagnosis.tables import (
     table,
     text,
 )
+from warpbrain.report.diagnosis.text import when_in_words
 from warpbrain.report.diagnosis.units import unit_of
 from warpbrain.report.diagnosis.viewer import asset, viewer
 from warpbrain.report.files import MILLIMETRES
@@ -172,8 +173,7 @@ def _where(saved: Saved) -> str:
             f"stretches or shears from {low:.3g} to {high:.3g}.</p>"
         )
     if said.get("when") is not None:
-        first, last = said["when"]["seconds"]
-        parts.append(f"<p>When: {first:.3g} to {last:.3g} s.</p>")
+        parts.append(f"<p>When: {text(when_in_words(said['when']))}.</p>")
     if saved.anatomy is not None:
         parts.append(map_figure(said, saved.anatomy))
     return _section("Where", *parts)

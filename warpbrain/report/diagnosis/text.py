@@ -24,6 +24,8 @@ def diagnosis_lines(said: Mapping[str, Any]) -> list[str]:
             f"  where: ({x:.1f}, {y:.1f}, {z:.1f}) mm, within {MILLIMETRES * where['radius_m']:.1f} mm; "
             f"p = {where['global_p']:.2g} looking everywhere"
         )
+    if said["when"] is not None:
+        lines.append(f"  when: {when_in_words(said['when'])}")
     lines += ["", "  candidate          probability   log evidence        d    held-out RMSE    estimate"]
     lines += [_line(one) for one in said["ranking"] if one["log_evidence"] is not None]
     rejected = [one for one in said["ranking"] if one["log_evidence"] is None]
@@ -35,6 +37,18 @@ def diagnosis_lines(said: Mapping[str, Any]) -> list[str]:
         lines += ["", "  what to measure next (expected nats between the two most probable mechanisms):"]
         lines += [f"    {one['expected_nats']:8.1f}  {one['what']}" for one in said["next_measurement"][:5]]
     return lines
+
+
+def when_in_words(when: Mapping[str, Any]) -> str:
+    """When something set in, how surely, and how it came."""
+    first, last = when["seconds"]
+    if "course" not in when:
+        # of a laboratory test it is the part of the record
+        return f"{first:.3g} to {last:.3g} s"
+    between = f"by {last:.3g} s" if first == 0.0 else f"between {first:.3g} and {last:.3g} s"
+    sure = "" if when["probability"] is None else f" (probability {when['probability']:.2f})"
+    course = f", {when['course']}" if when["course"] else ""
+    return f"it set in {between}{sure}{course}"
 
 
 def _line(one: Mapping[str, Any]) -> str:
