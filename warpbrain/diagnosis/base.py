@@ -24,6 +24,7 @@ from warpbrain.diagnosis.sensing import explanation_of, known_sigma
 from warpbrain.diagnosis.sensors import tracked_points
 from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
 from warpbrain.diagnosis.switching import Known, Solving
+from warpbrain.diagnosis.time_courses import main_courses
 from warpbrain.diagnosis.tissue_prior import declared, tissue_prior
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference
@@ -101,9 +102,16 @@ class Base:
         return float(np.median(self.noise[self.at.sensors.is_displacement]))
 
     @property
-    def smooth_forces(self) -> list[Floats]:
-        """Columns of smooth forces of each length and size."""
+    def constant_forces(self) -> list[Floats]:
+        """Columns of smooth forces of each length and size that are always there."""
         return smooth_forces(self.flexible, self.typical_noise)
+
+    @property
+    def smooth_forces(self) -> list[Floats]:
+        """The same of each course in time."""
+        times = self.at.sensors.times
+        factors = [course.factor(times)[:, None] for course in main_courses(self.states.times)]
+        return [factor * columns for columns in self.constant_forces for factor in factors]
 
     def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
         """What nuisances do to the displacement of other points (k, 3) [m], and what makes effects there."""

@@ -1,19 +1,12 @@
 """When something set in: what explains the mismatch, there from one of the recorded times on.
 
-Between two recorded times nothing is known of when it began, so what is scanned is the interval: before the first time,
-or between two that follow each other. What begins there comes all at once, grows evenly, or nears its full size ever
-more slowly,
-
-    f(t) = 1,    (t - t0) / (T - t0),    1 - exp(-3 (t - t0) / (T - t0)),      f = 0 before,
-
-`t0` the beginning of the interval and `T` the last time. Place and interval are scanned together. Each interval is as
-probable as another beforehand, and each course within it; at the last time alone they are the same.
+Place and interval (`warpbrain.diagnosis.time_courses`) are scanned together. Each interval is as probable as another
+beforehand, and each course within it.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +16,7 @@ from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, log_places, log_unknown
+from warpbrain.diagnosis.time_courses import TimeCourse, time_courses
 
 Floats = NDArray[np.float64]
 
@@ -30,12 +24,7 @@ Floats = NDArray[np.float64]
 CREDIBLE = 0.9
 #: Most places that are scanned.
 _PLACES = 40
-#: Words for the courses, and each from the part of the time that has gone by since the beginning.
-_COURSES: dict[str, Callable[[Floats], Floats]] = {
-    "all at once": np.ones_like,
-    "growing evenly": lambda part: part,
-    "growing ever more slowly": lambda part: -np.expm1(-3.0 * part),
-}
+#: Of what has a history without anything that sets in later.
 OF_ITS_OWN = "as its own law says, since the load came"
 
 
@@ -81,17 +70,13 @@ def onset_of(kind: str, base: Base, candidates: Candidates, screen: Screen) -> O
     effects = [] if kind == UNKNOWN else _best_effects(kind, candidates, screen)
     if any(effect.about is not None or effect.proposed.history is not None for effect in effects):
         return Onset(0.0, float(times[0]), None, OF_ITS_OWN)
-    edges = [0.0, *times.tolist()]
-    said: list[tuple[int, str]] = []
-    evidence: list[float] = []
-    for number, begin in enumerate(edges[:-1]):
-        courses = list(_COURSES)[:1] if number == len(times) - 1 else list(_COURSES)
-        for course in courses:
-            part = (base.at.sensors.times - begin) / (times[-1] - begin)
-            factor = np.where(part > 0.0, _COURSES[course](part), 0.0)
-            said.append((number, course))
-            evidence.append(_log_evidence(base, effects, factor) - float(np.log(len(courses))))
-    return _summary(edges, said, np.array(evidence))
+    courses = time_courses(base.states.times)
+    alike = np.bincount([course.interval for course in courses])
+    evidence = [
+        _log_evidence(base, effects, course.factor(base.at.sensors.times)) - float(np.log(alike[course.interval]))
+        for course in courses
+    ]
+    return _summary([0.0, *times.tolist()], courses, np.array(evidence))
 
 
 def _best_effects(kind: str, candidates: Candidates, screen: Screen) -> list[Effect]:
@@ -106,7 +91,7 @@ def _log_evidence(base: Base, effects: list[Effect], factor: Floats) -> float:
 
     whitened = base.whitened[:, None]
     if not effects:
-        loose = [base.explanation.with_more(factor[:, None] * columns) for columns in base.smooth_forces]
+        loose = [base.explanation.with_more(factor[:, None] * columns) for columns in base.constant_forces]
         return float(log_unknown(loose, whitened)[0])
     scaled = [
         replace(effect, mean=factor * effect.mean, columns=factor[:, None] * effect.columns) for effect in effects
@@ -115,26 +100,26 @@ def _log_evidence(base: Base, effects: list[Effect], factor: Floats) -> float:
     return float(logsumexp(found)) - float(np.log(len(found)))
 
 
-def _summary(edges: list[float], said: list[tuple[int, str]], evidence: Floats) -> Onset:
+def _summary(edges: list[float], courses: list[TimeCourse], evidence: Floats) -> Onset:
     from scipy.special import softmax
 
     weights = softmax(evidence)
     count = len(edges) - 1
-    of_interval = np.bincount([number for number, _ in said], weights, minlength=count)
+    of_interval = np.bincount([course.interval for course in courses], weights, minlength=count)
     # the shortest run of intervals that holds enough
     runs = itertools.combinations(range(count + 1), 2)
     total = np.r_[0.0, np.cumsum(of_interval)]
     enough = [(edges[j] - edges[i], i, j) for i, j in runs if total[j] - total[i] >= min(CREDIBLE, total[-1])]
     _, i, j = min(enough)
     # what begins before the last time alone has no course
-    of_course = dict.fromkeys(_COURSES, 0.0)
-    for (number, course), weight in zip(said, weights.tolist(), strict=True):
-        of_course[course] += weight if number < count - 1 else 0.0
-    likeliest = max(of_course, key=lambda course: of_course[course])
+    of_shape: dict[str, float] = {}
+    for course, weight in zip(courses, weights.tolist(), strict=True):
+        of_shape[course.shape] = of_shape.get(course.shape, 0.0) + (weight if course.interval < count - 1 else 0.0)
+    likeliest = max(of_shape, key=lambda shape: of_shape[shape])
     return Onset(
         edges[i],
         edges[j],
         min(1.0, float(total[j] - total[i])),
-        likeliest if of_course[likeliest] >= CREDIBLE else "",
+        likeliest if of_shape[likeliest] >= CREDIBLE else "",
         tuple((a, b, float(p)) for a, b, p in zip(edges[:-1], edges[1:], of_interval, strict=True)),
     )
