@@ -1,7 +1,9 @@
 """When something set in: what explains the mismatch, there from one of the recorded times on.
 
 Place and interval (`warpbrain.diagnosis.time_courses`) are scanned together. Each interval is as probable as another
-beforehand, and each course within it.
+beforehand, and each course within it. A smooth force is only nearly what acts, and the state that all is linear about
+only nearly that of each time: the evidence is sharper than it should be, and is divided by a temperature that growing
+and sudden swellings of a phantom gave.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ Floats = NDArray[np.float64]
 
 #: What the interval that is said holds at least.
 CREDIBLE = 0.9
+#: Temperature of the evidence.
+TEMPERATURE = 4.0
 #: Most places that are scanned.
 _PLACES = 40
 #: Of what has a history without anything that sets in later.
@@ -103,7 +107,7 @@ def _log_evidence(base: Base, effects: list[Effect], factor: Floats) -> float:
 def _summary(edges: list[float], courses: list[TimeCourse], evidence: Floats) -> Onset:
     from scipy.special import softmax
 
-    weights = softmax(evidence)
+    weights = softmax(evidence / TEMPERATURE)
     count = len(edges) - 1
     of_interval = np.bincount([course.interval for course in courses], weights, minlength=count)
     # the shortest run of intervals that holds enough

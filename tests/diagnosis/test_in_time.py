@@ -1,0 +1,100 @@
+"""Where there are several times: fluid that flows away beside stress that relaxes, and when something set in."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from slow_block import CAUSES, PERMEABILITY, TIMES, write_slow
+
+from warpbrain.diagnosis.course import Course, course_times
+from warpbrain.diagnosis.diagnose import Diagnosing
+from warpbrain.diagnosis.onset import OF_ITS_OWN, Onset, onset_of
+from warpbrain.diagnosis.options import DiagnosisOptions
+from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.diagnosis.screening import UNKNOWN
+from warpbrain.diagnosis.states import Hypothesis, States
+from warpbrain.diagnosis.switching import Known, Solving
+from warpbrain.diagnosis.time_courses import AT_ONCE, EVENLY, time_courses
+from warpbrain.diagnosis.tissue_prior import declared
+from warpbrain.physics.mechanisms.drainage import Drainage
+from warpbrain.report.diagnosis.text import when_in_words
+
+_OPTIONS = DiagnosisOptions(candidates=("drainage", "viscoelasticity", "swelling"), mesh_error=False, draws=100)
+
+
+@pytest.fixture(scope="module", params=list(CAUSES))
+def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Diagnosis]:
+    case = write_slow(tmp_path_factory.mktemp("slow") / "case", CAUSES[request.param])
+    return request.param, Diagnosing(case, _OPTIONS, "cpu").run()
+
+
+def test_fluid_and_relaxing_stress_are_told_apart(diagnosed: tuple[str, Diagnosis]) -> None:
+    cause, found = diagnosed
+    best = found.ranking[0]
+    assert found.verdict.startswith("named")
+    assert best.kind == cause
+    assert best.probability > 0.9
+    assert found.when == Onset(0.0, TIMES[0], None, OF_ITS_OWN)
+
+
+def test_the_permeability_is_found_with_its_spread(diagnosed: tuple[str, Diagnosis]) -> None:
+    cause, found = diagnosed
+    if cause != "drainage":
+        pytest.skip("nothing flows")
+    [value] = [value for value in found.ranking[0].values if value.name == "permeability"]
+    assert 0.0 < value.sd < 0.3 * PERMEABILITY
+    # steps in time are as coarse as the fit's own
+    assert abs(value.value - PERMEABILITY) < 0.3 * PERMEABILITY
+
+
+def test_one_course_is_that_of_every_permeability(tmp_path) -> None:
+    states = States(write_slow(tmp_path / "case", CAUSES["drainage"]), "cpu")
+    theta = declared(states.case, states.parameters)
+    hypothesis = Hypothesis(theta, np.zeros(states.modes.shape[1]))
+    base = states.solve(hypothesis)
+    course = Solving(states, base, base.sensors, Known()).course(Drainage(permeability=1e-9), (0.1, 1.0))
+    for pace in (0.1, 0.3, 1.0):
+        other = states.solve(replace(hypothesis, mechanisms=(Drainage(permeability=pace * 1e-9),)))
+        expected = other.sensors.computed - base.sensors.computed
+        assert np.linalg.norm(course.at(pace) - expected) < 0.05 * np.linalg.norm(expected)
+
+
+def test_a_course_holds_all_recorded_times_at_all_paces(small_diagnosis: Diagnosis) -> None:
+    times = course_times(np.array([2.0, 30.0]), (0.1, 10.0))
+    np.testing.assert_allclose(times[[0, -1]], [0.2, 300.0])
+    sensors = small_diagnosis.base.at.sensors
+    sensors = replace(sensors, times=np.where(np.arange(len(sensors)) % 2, 2.0, 30.0))
+    course = Course(sensors, times, np.tile(np.log(times), (len(sensors), 1)))
+    np.testing.assert_allclose(course.at(3.0), np.log(3.0 * sensors.times), atol=1e-9)
+    # before and after, as at the ends
+    np.testing.assert_allclose(course.at(1e-9), np.log(0.2), atol=1e-9)
+    np.testing.assert_allclose(course.at(1e9), np.log(300.0), atol=1e-9)
+
+
+@pytest.mark.parametrize(("number", "shape"), [(0, AT_ONCE), (0, EVENLY), (1, AT_ONCE), (2, AT_ONCE)])
+def test_it_is_said_when_an_unknown_force_set_in(number: int, shape: str, diagnosed: tuple[str, Diagnosis]) -> None:
+    base = diagnosed[1].base
+    [course] = [c for c in time_courses(TIMES) if (c.interval, c.shape) == (number, shape)]
+    rng = np.random.default_rng(number)
+    columns = base.constant_forces[1]
+    force = course.factor(base.at.sensors.times) * (columns @ rng.normal(size=columns.shape[1]))
+    acting = replace(base, residual=20.0 * force + base.sigma * rng.normal(size=len(force)))
+    found = onset_of(UNKNOWN, acting, None, None)  # type: ignore[arg-type]
+    assert found is not None and found.probability is not None
+    edges = (0.0, *TIMES)
+    assert found.first <= edges[number] < edges[number + 1] <= found.last
+    assert found.probability >= 0.9
+    assert sum(p for *_, p in found.intervals) == pytest.approx(1.0)
+    assert found.course in (("", shape) if number < 2 else ("",))
+
+
+def test_with_one_time_nothing_is_said(small_diagnosis: Diagnosis) -> None:
+    assert small_diagnosis.when is None
+    assert onset_of(UNKNOWN, small_diagnosis.base, None, None) is None  # type: ignore[arg-type]
+
+
+def test_when_in_words() -> None:
+    said = {"seconds": [5.0, 20.0], "probability": 0.973, "course": AT_ONCE, "intervals": []}
+    assert when_in_words(said) == "it set in between 5 and 20 s (probability 0.97), all at once"
+    assert when_in_words({**said, "seconds": [0.0, 5.0], "course": ""}) == "it set in by 5 s (probability 0.97)"
+    assert when_in_words({"seconds": [0.0, 5.0]}) == "0 to 5 s"
