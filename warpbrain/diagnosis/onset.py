@@ -2,8 +2,8 @@
 
 Place and interval (`warpbrain.diagnosis.time_courses`) are scanned together. Each interval is as probable as another
 beforehand, and each course within it. A smooth force is only nearly what acts, and the state that all is linear about
-only nearly that of each time: the evidence is sharper than it should be, and is divided by a temperature that growing
-and sudden swellings of a phantom gave.
+only nearly that of each time: the evidence is sharper than it should be, and is divided by a temperature with which
+nothing wrong was said of six sudden and growing swellings of a phantom.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 #: What the interval that is said holds at least.
 CREDIBLE = 0.9
 #: Temperature of the evidence.
-TEMPERATURE = 4.0
+TEMPERATURE = 8.0
 #: Most places that are scanned.
 _PLACES = 40
 #: Of what has a history without anything that sets in later.
