@@ -83,7 +83,7 @@ def test_it_is_said_when_an_unknown_force_set_in(number: int, shape: str, diagno
     assert found is not None and found.probability is not None
     edges = (0.0, *TIMES)
     assert found.first <= edges[number] < edges[number + 1] <= found.last
-    assert found.probability >= 0.9
+    assert found.probability >= 0.95
     assert sum(p for *_, p in found.intervals) == pytest.approx(1.0)
     assert found.course in (("", shape) if number < 2 else ("",))
 

@@ -3,7 +3,7 @@
 Place and interval (`warpbrain.diagnosis.time_courses`) are scanned together. Each interval is as probable as another
 beforehand, and each course within it. A smooth force is only nearly what acts, and the state that all is linear about
 only nearly that of each time: the evidence is sharper than it should be, and is divided by a temperature with which
-nothing wrong was said of six sudden and growing swellings of a phantom.
+what is said held for sudden and growing swellings of a phantom.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from warpbrain.diagnosis.time_courses import TimeCourse, time_courses
 Floats = NDArray[np.float64]
 
 #: What the interval that is said holds at least.
-CREDIBLE = 0.9
+CREDIBLE = 0.95
 #: Temperature of the evidence.
 TEMPERATURE = 8.0
 #: Most places that are scanned.
