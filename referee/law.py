@@ -98,6 +98,11 @@ class Response:
     shape: tuple[Floats, Floats]
     volume: tuple[Floats, Floats]
 
+    def of(self, some: slice) -> Response:
+        """That of some tetrahedra."""
+        shape, volume = ((t[some], H[some]) for t, H in (self.shape, self.volume))
+        return Response(self.u[some], self.v[some], self.stretch[some], shape, volume)
+
     def stress(self, factor: float = 1.0) -> Floats:
         """First Piola-Kirchhoff stress (m, q, 3, 3) [Pa], the isochoric part multiplied by a factor."""
         t = factor * self.shape[0] + self.volume[0]

@@ -6,18 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_matrix
+from scipy.sparse import bsr_matrix, csr_matrix
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """Blocks of a sparse matrix and which of them each pair of nodes of a tetrahedron adds to."""
+    """Blocks of a sparse matrix, and what adds up those of each pair of nodes of a tetrahedron."""
 
     columns: NDArray[np.int64]
     starts: NDArray[np.int64]
-    place: NDArray[np.int64]
+    adding: csr_matrix
     diagonal: NDArray[np.int64]
 
     @classmethod
@@ -27,14 +27,13 @@ class Pattern:
         keys, place = np.unique(rows.ravel() * n + columns.ravel(), return_inverse=True)
         starts = np.searchsorted(keys, np.arange(n + 1) * n)
         diagonal = np.searchsorted(keys, np.arange(n) * (n + 1))
-        return cls(keys % n, starts, place, diagonal)
+        count = len(place)
+        adding = csr_matrix((np.ones(count), (place, np.arange(count))), shape=(len(keys), count))
+        return cls(keys % n, starts, adding, diagonal)
 
     def matrix(self, local: Floats, springs: Floats | None) -> bsr_matrix:
-        """Assemble local matrices (m, a, i, k, b)."""
-        data = np.empty((len(self.columns), 3, 3))
-        for i in range(3):
-            for k in range(3):
-                data[:, i, k] = np.bincount(self.place, local[:, :, i, k, :].ravel(), minlength=len(data))
+        """Assemble local matrices (m, a, b, 3, 3)."""
+        data = (self.adding @ local.reshape(-1, 9)).reshape(-1, 3, 3)
         if springs is not None:
             data[self.diagonal] += springs
         n = len(self.starts) - 1

@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 #: Forces (n, 3) [N] at a displacement (n, 3) [m].
 Load = Callable[[Floats], Floats]
+#: Tetrahedra whose matrices are made together: what they need stays in the processor's cache.
+_TOGETHER = 128
 
 
 class Inverted(Exception):
@@ -86,17 +88,19 @@ class Problem:
 
     def tangent(self, u: Floats, response: Response) -> bsr_matrix:
         """Derivative of the residual, without that of the loads."""
-        A = response.tangent(self.factor)
-        if self.stress is not None:
-            # delta_ik S_JL
-            for i in range(3):
-                A[..., 3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += self.stress
         G, volumes, _ = self.body.region
-        cells, q = A.shape[:2]
-        # (i J, k L) -> (J, i k L)
-        A = (A * volumes[..., None, None]).reshape(cells, q, 3, 3, 3, 3).transpose(0, 1, 3, 2, 4, 5)
-        local = np.zeros((cells, 90, 10))
-        for k in range(q):
-            left = G[:, k] @ np.ascontiguousarray(A[:, k]).reshape(cells, 3, 27)
-            local += left.reshape(cells, 90, 3) @ np.swapaxes(G[:, k], 1, 2)
-        return self.body.pattern.matrix(local.reshape(cells, 10, 3, 3, 10), self.springs and self.springs(u))
+        cells, q = volumes.shape
+        local = np.empty((cells, 10, 10, 3, 3))
+        for start in range(0, cells, _TOGETHER):
+            some = slice(start, start + _TOGETHER)
+            A = response.of(some).tangent(self.factor)
+            if self.stress is not None:
+                # delta_ik S_JL
+                for i in range(3):
+                    A[..., 3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += self.stress[some]
+            g = np.ascontiguousarray(G[some])
+            # (i J, k L) -> (J, i k L)
+            A = (A * volumes[some, :, None, None]).reshape(-1, q, 3, 3, 3, 3).transpose(0, 1, 3, 2, 4, 5)
+            blocks = ((g @ A.reshape(-1, q, 3, 27)).reshape(-1, q, 90, 3) @ np.swapaxes(g, 2, 3)).sum(axis=1)
+            local[some] = blocks.reshape(-1, 10, 3, 3, 10).transpose(0, 1, 4, 2, 3)
+        return self.body.pattern.matrix(local, self.springs and self.springs(u))
