@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from referee.equilibrium import Balance, balance
-from referee.multigrid import Coarse
+from referee.multigrid import Linear
 from referee.problem import Problem
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,8 @@ def creep(
     branches: Sequence[tuple[float, float]],
     times: Sequence[float],
     start: Floats | None = None,
-    coarse: Coarse | None = None,
+    near: Linear | None = None,
+    until: float = np.inf,
 ) -> list[Balance]:
     """Equilibria at times [s] after a load was put on at once.
 
@@ -43,10 +44,12 @@ def creep(
         Increasing, above zero; each is reached in one step from the one before.
     start : (n, 3) array, optional
         Where to begin [m].
-    coarse : Coarse, optional
+    near : Linear, optional
+    until : float
+        See `referee.equilibrium.balance`.
     """
     stress = np.zeros((*problem.body.region[2].shape, 3))
-    found = [balance(replace(problem, factor=1.0 + sum(beta for beta, _ in branches)), start, coarse)]
+    found = [balance(replace(problem, factor=1.0 + sum(beta for beta, _ in branches)), start, near, until)]
     elastic = _second(problem, found[0].u)
     stresses = [beta * elastic for beta, _ in branches]
     before = 0.0
@@ -57,7 +60,7 @@ def creep(
         kept = [w * q - h * elastic for w, h, q in zip(whole, half, stresses, strict=True)]
         given = sum(kept, stress if problem.stress is None else problem.stress)
         now = replace(problem, factor=1.0 + sum(half), stress=given)
-        found.append(balance(now, found[-1].u, coarse))
+        found.append(balance(now, found[-1].u, found[-1].linear, until))
         elastic = _second(problem, found[-1].u)
         stresses = [k + h * elastic for k, h in zip(kept, half, strict=True)]
         before = time

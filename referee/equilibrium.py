@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from referee.law import Response
 from referee.multigrid import Coarse, Linear, NotSolved
 from referee.problem import Inverted, Problem
 
@@ -14,6 +16,8 @@ Floats = NDArray[np.float64]
 
 #: Forces balance when what is left of them is smaller than this part of the forces that act.
 BALANCED = 1e-5
+#: A tangent is kept for the next step if the last left no larger part of the forces than this.
+_KEPT = 0.1
 _STEPS = 30
 _HALVINGS = 6
 
@@ -31,7 +35,7 @@ class Balance:
     u : (n, 3) array
         Displacement [m].
     linear : Linear
-        The tangent near it.
+        A tangent near it.
     left : float
         What is left of the forces, relative to those that act.
     steps : int
@@ -44,7 +48,7 @@ class Balance:
     steps: int
 
 
-def balance(problem: Problem, start: Floats | None = None, coarse: Coarse | None = None) -> Balance:
+def balance(problem: Problem, start: Floats | None = None, near: Linear | None = None, until: float = np.inf) -> Balance:
     """Displacement at which all forces balance.
 
     Parameters
@@ -52,13 +56,15 @@ def balance(problem: Problem, start: Floats | None = None, coarse: Coarse | None
     problem : Problem
     start : (n, 3) array, optional
         Where to begin [m].
-    coarse : Coarse, optional
-        Of a problem like this one.
+    near : Linear, optional
+        The tangent of a problem like this one, near where to begin.
+    until : float
+        When to give up, on the clock of `time.monotonic` [s].
 
     Raises
     ------
     NoTruth
-        If elements invert, the tangent is not positive or forces do not balance.
+        If elements invert, the tangent is not positive, forces do not balance or it takes too long.
     """
     u = np.zeros_like(problem.body.points) if start is None else start.copy()
     missing = np.where(problem.held, problem.value - u, 0.0)
@@ -66,34 +72,38 @@ def balance(problem: Problem, start: Floats | None = None, coarse: Coarse | None
         F = problem.gradient(u)
         if np.abs(missing).max() > 0.0:
             # what is prescribed is reached by the linear answer to it, so that no element is crushed
-            linear = linearised(problem, u, F, coarse)
-            coarse = linear.coarse
-            right = -(linear.whole @ missing.ravel()).reshape(u.shape) - problem.residual(u, F, problem.response(F))
-            u = u + missing + linear.solve(right.ravel(), 1e-3).reshape(u.shape)
+            response = problem.response(F)
+            near = linearised(problem, u, response, near)
+            right = -(near.whole @ missing.ravel()).reshape(u.shape) - problem.residual(u, F, response)
+            u = u + missing + near.solve(right.ravel(), 1e-2).reshape(u.shape)
             F = problem.gradient(u)
-        return _newton(problem, u, F, coarse)
+        return _newton(problem, u, F, near, until)
     except (Inverted, NotSolved, np.linalg.LinAlgError) as error:
         raise NoTruth(str(error) or type(error).__name__) from error
 
 
-def linearised(problem: Problem, u: Floats, F: Floats, coarse: Coarse | None = None) -> Linear:
-    """The tangent at a displacement."""
-    matrix = problem.tangent(u, problem.response(F))
-    return Linear(matrix, problem.held, coarse or Coarse(problem.body, matrix, problem.held))
+def linearised(problem: Problem, u: Floats, response: Response, near: Linear | None = None) -> Linear:
+    """The tangent at a displacement; one `near` lends what it was factorised for, if it holds the same."""
+    matrix = problem.tangent(u, response)
+    if near is not None and (near.held == problem.held).all():
+        return Linear(matrix, problem.held, near.coarse)
+    return Linear(matrix, problem.held, Coarse(problem.body, matrix, problem.held))
 
 
-def _newton(problem: Problem, u: Floats, F: Floats, coarse: Coarse | None) -> Balance:
+def _newton(problem: Problem, u: Floats, F: Floats, near: Linear | None, until: float) -> Balance:
     free = ~problem.held
     response = problem.response(F)
     r = problem.residual(u, F, response)
     size = first = float(np.linalg.norm(r[free]))
-    last = np.inf
+    fits = near is not None and (near.held == problem.held).all()
+    linear = near if fits else linearised(problem, u, response)
+    gained, acting = 0.1, 0.0
     for step in range(_STEPS):
-        matrix = problem.tangent(u, response)
-        coarse = coarse or Coarse(problem.body, matrix, problem.held)
-        linear = Linear(matrix, problem.held, coarse)
-        # near the end a step should gain what Newton's method can, before it that is wasted
-        close = float(np.clip(0.1 * size / last, 1e-4, 1e-2))
+        if time.monotonic() > until:
+            raise NoTruth("it takes too long")
+        # a step should gain what the one before did, and less once forces nearly balance
+        close = float(np.clip(0.3 * gained, 1e-3, 0.03)) if step else 0.03
+        close = max(close, 0.3 * BALANCED * acting / size)
         move = -linear.solve(r.ravel(), close).reshape(u.shape)
         last = size
         for _ in range(_HALVINGS):
@@ -120,4 +130,7 @@ def _newton(problem: Problem, u: Floats, F: Floats, coarse: Coarse | None) -> Ba
         )
         if size <= BALANCED * acting:
             return Balance(u, linear, size / acting, step + 1)
+        gained = size / last
+        if gained > _KEPT:
+            linear = Linear(problem.tangent(u, response), problem.held, linear.coarse)
     raise NoTruth(f"forces do not balance in {_STEPS} steps: {size:.1e} N are left")
