@@ -24,6 +24,7 @@ from referee.effects import (
     Wire,
 )
 from referee.effects.effect import Place, unit
+from referee.equilibrium import NoTruth
 from referee.setting import DOWN, Setting
 
 Floats = NDArray[np.float64]
@@ -37,9 +38,12 @@ _TILTED = np.deg2rad(8.0)
 _AWAY = 0.03
 
 
-def wanted(random: Random, least: float = WANTED[0]) -> float:
-    """How much an effect shall stand out."""
-    return float(np.exp(random.uniform(np.log(least), np.log(WANTED[1]))))
+def wanted(random: Random, most: float, least: float = WANTED[0]) -> float:
+    """How much an effect shall stand out, if it can by `most`; `NoTruth` if that is too little."""
+    most = min(most, WANTED[1])
+    if most < least:
+        raise NoTruth(f"an effect can stand out by {most:.2g} only")
+    return float(np.exp(random.uniform(np.log(least), np.log(most))))
 
 
 def draw_effect(random: Random, kind: str, setting: Setting) -> Effect:

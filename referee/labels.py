@@ -34,14 +34,17 @@ def label_of(name: str, plan: Planned, truth: Truth, attempts: list[str]) -> dic
     clean = truth.effect(fitted)
     noise = seen(truth, checked, 2) - _registered(truth, checked)
     effects = []
-    for effect, d in zip(truth.effects, truth.d, strict=True):
-        effects.append({**effect.told(), "detectability": _number(d)})
+    for one in truth.found:
+        stands = {"detectability": one.d, "upper": one.upper, "wanted": one.wanted}
+        told = {name: _number(value) for name, value in stands.items()}
+        effects.append({**one.effect.told(), **told, "drawn_again": one.again})
     return {
         "case": name,
         "kind": plan.kind,
         "names": list(plan.names),
         "effects": effects,
         "detectability": _number(truth.whole),
+        "upper": _number(truth.upper),
         "rms_effect_m": _number(np.sqrt((clean**2).sum(axis=2).mean())),
         "rms_declared_m": _number(np.sqrt((truth.declared[fitted] ** 2).sum(axis=1).mean())),
         "setting": truth.setting.told(),

@@ -8,23 +8,27 @@ import shutil
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
-from referee.draw import draw_effect, trapped, wanted
+from referee.draw import WANTED, draw_effect, trapped, wanted
 from referee.equilibrium import NoTruth
 from referee.folder import write_folder
 from referee.labels import label_of, seal, write_commitments
 from referee.plan import BOTH, Planned, planned
 from referee.setting import draw_setting
+from referee.sizing import Wish
 from referee.truth import Truth, solve_truth
 
 #: Rooms of a set.
 CASES, LABELS = "cases", "labels"
 #: Draws of a case at most.
 ATTEMPTS = 12
+#: Processor time for one draw at most [s], after which it is given up.
+LIMIT = 90.0
 
 
 def seed_of(text: str) -> int:
@@ -104,8 +108,11 @@ def _draw(plan: Planned, seed: Sequence[int]) -> Truth:
     setting = draw_setting(random, plan.geometry, timed="viscoelasticity" in plan.names)
     if plan.kind == "trap":
         setting = trapped(random, plan.names[0], setting)
+    until = time.process_time() + LIMIT
     if plan.kind in ("none", "trap"):
-        return solve_truth(setting, (), ())
-    effects = [draw_effect(random, name, setting) for name in plan.names]
-    least = {"least": BOTH} if plan.kind == "two" else {}
-    return solve_truth(setting, effects, [wanted(random, **least) for _ in effects])
+        return solve_truth(setting, (), until)
+    least = BOTH if plan.kind == "two" else WANTED[0]
+    wishes = [
+        Wish(partial(draw_effect, random, name, setting), partial(wanted, random, least=least)) for name in plan.names
+    ]
+    return solve_truth(setting, wishes, until)

@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from referee.sensing import FORCE_ERROR
 from referee.truth import Truth
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Points on the moved wall of the ventricles, and error of a force relative to it.
-SURFACE_POINTS, FORCE_ERROR = 150, 0.02
 #: Gross errors are as long as this [m].
 GROSS = (0.002, 0.004)
 #: Name of the declared load.
@@ -27,7 +26,7 @@ def recordings(truth: Truth) -> tuple[Recording, ...]:
     fitted = _points(truth, "points", "fit", truth.sensors.fitted, mistakes=True)
     checked = _points(truth, "check", "check", truth.sensors.checked, mistakes=False)
     made: list[Recording] = [fitted]
-    if setting.surface and not setting.times:
+    if len(truth.sensors.wall[0]):
         made.append(_surface(truth))
     if setting.total is None:
         made.append(_force(truth))
@@ -86,14 +85,7 @@ def _points(truth: Truth, name: str, role: str, nodes: Ints, mistakes: bool) -> 
 
 def _surface(truth: Truth) -> SurfaceRecording:
     setting = truth.setting
-    random = np.random.default_rng([setting.seed, 3])
-    faces = setting.body.faces(setting.body.mesh.node_sets["ventricle"])
-    areas = faces.areas.sum(axis=1)
-    chosen = random.choice(len(areas), size=SURFACE_POINTS, p=areas / areas.sum())
-    r = np.sort(random.random((SURFACE_POINTS, 2)), axis=1)
-    b = np.stack([r[:, 0], r[:, 1] - r[:, 0], 1.0 - r[:, 1]], axis=1)
-    shapes = np.concatenate([b * (2.0 * b - 1.0), 4.0 * b * np.roll(b, -1, axis=1)], axis=1)
-    nodes = faces.nodes[chosen]
+    nodes, shapes = truth.sensors.wall
     points = np.einsum("pa,pai->pi", shapes, setting.body.points[nodes])
     u = np.einsum("pa,pai->pi", shapes, truth.u[-1][nodes])
     blur = replace(setting.blur, seed=(setting.seed + 5000) % 2**31)

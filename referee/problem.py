@@ -70,16 +70,23 @@ class Problem:
         """Of the law."""
         return respond(self.law, F, self.mu, self.bulk, self.growth)
 
+    def local(self, P: Floats) -> Floats:
+        """Forces (m, 10, 3) [N] of a stress (m, q, 3, 3) [Pa] on the nodes of each tetrahedron."""
+        G, volumes, _ = self.body.region
+        forces: Floats = (G @ np.swapaxes(P * volumes[..., None, None], -1, -2)).sum(axis=1)
+        return forces
+
+    def gathered(self, local: Floats) -> Floats:
+        """Forces (n, 3) [N] on all nodes."""
+        cells, n = self.body.cells.ravel(), len(self.body.points)
+        return np.stack([np.bincount(cells, local[..., k].ravel(), minlength=n) for k in range(3)], axis=1)
+
     def residual(self, u: Floats, F: Floats, response: Response) -> Floats:
         """Internal minus external forces (n, 3) [N]."""
         P = response.stress(self.factor)
         if self.stress is not None:
             P = P + F @ self.stress
-        G, volumes, _ = self.body.region
-        inner = (G @ np.swapaxes(P * volumes[..., None, None], -1, -2)).sum(axis=1)
-        out = np.zeros_like(u)
-        for k in range(3):
-            out[:, k] = np.bincount(self.body.cells.ravel(), inner[..., k].ravel(), minlength=len(u))
+        out = self.gathered(self.local(P))
         for load in self.loads:
             out -= load(u)
         if self.springs is not None:

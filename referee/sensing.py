@@ -1,4 +1,4 @@
-"""Where a truth is seen, and how well an effect could be seen there by anybody."""
+"""Where a truth is seen."""
 
 from __future__ import annotations
 
@@ -6,16 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from referee.body import Body
-from referee.setting import SHARED, SHARED_LENGTH, Setting
+from referee.setting import Setting
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: What is taken as known beforehand: error of registration [m] and [rad], logarithm of stiffness of each tissue.
-SHIFT, TURN, STIFFNESS = 2e-3, np.deg2rad(2.0), 0.5
+#: Points on the moved wall of the ventricles, and error of a force relative to it.
+SURFACE_POINTS, FORCE_ERROR = 150, 0.02
 #: Part of the points that lie on walls, and least distance between points [m].
 _WALLS, _APART = 0.4, 0.005
 
@@ -28,10 +27,14 @@ class Sensors:
     ----------
     fitted, checked : int arrays
         Nodes that are tracked to be fitted, and apart to be compared with.
+    wall : (nodes (p, 6), shapes (p, 6))
+        Places on the wall of the ventricles: quadratic triangles and weights of their nodes. None of them if it is not
+        recorded.
     """
 
     fitted: Ints
     checked: Ints
+    wall: tuple[Ints, Floats]
 
 
 def place_sensors(setting: Setting) -> Sensors:
@@ -50,7 +53,20 @@ def place_sensors(setting: Setting) -> Sensors:
         [_apart(body, walls, many, setting.geometry), _apart(body, inside, count - many, setting.geometry)]
     )
     chosen = random.permutation(chosen)
-    return Sensors(np.sort(chosen[: setting.points]), np.sort(chosen[setting.points :]))
+    return Sensors(np.sort(chosen[: setting.points]), np.sort(chosen[setting.points :]), _place_wall(setting))
+
+
+def _place_wall(setting: Setting) -> tuple[Ints, Floats]:
+    if not setting.surface or setting.times:
+        return np.zeros((0, 6), dtype=np.int64), np.zeros((0, 6))
+    random = np.random.default_rng([setting.seed, 3])
+    faces = setting.body.faces(setting.body.mesh.node_sets["ventricle"])
+    areas = faces.areas.sum(axis=1)
+    chosen = random.choice(len(areas), size=SURFACE_POINTS, p=areas / areas.sum())
+    r = np.sort(random.random((SURFACE_POINTS, 2)), axis=1)
+    b = np.stack([r[:, 0], r[:, 1] - r[:, 0], 1.0 - r[:, 1]], axis=1)
+    shapes = np.concatenate([b * (2.0 * b - 1.0), 4.0 * b * np.roll(b, -1, axis=1)], axis=1)
+    return faces.nodes[chosen], shapes
 
 
 def _apart(body: Body, nodes: Ints, count: int, name: str) -> Ints:
@@ -61,34 +77,3 @@ def _apart(body: Body, nodes: Ints, count: int, name: str) -> Ints:
         if len(chosen) == count:
             return np.array(chosen)
     raise ValueError(f"{name}: {len(chosen)} points are {1000 * _APART:g} mm apart, {count} wanted")
-
-
-def detectability(points: Floats, effect: Floats, stiffness: Floats, sigma: float) -> float:
-    """How far an effect stands out of all that is not known of a case, ``sqrt(D^T S^-1 D)``.
-
-    `S` holds noise as it is declared (each point's own, and what neighbours share), a rigid motion and the stiffness of
-    each tissue, all with a normal prior: what these can explain does not count. Neither the tool's mesh nor its
-    stiffness that varies within a tissue is in it, so that it is an upper bound of what the tool can see.
-
-    Parameters
-    ----------
-    points : (k, 3) array
-        Where is seen [m].
-    effect : (times, k, 3) array
-        Displacement that is due to the effect [m].
-    stiffness : (tissues, k, 3) array
-        Change of displacement with the logarithm of each tissue's stiffness [m].
-    sigma : float
-        [m]
-    """
-    times, k, _ = effect.shape
-    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
-    shared = (SHARED * sigma) ** 2 * np.exp(-apart / SHARED_LENGTH)
-    noise = np.kron(np.eye(times), np.kron(sigma**2 * np.eye(k) + shared, np.eye(3)))
-    arm = points - points.mean(axis=0)
-    turns = np.stack([np.cross(axis, arm) for axis in np.eye(3)])
-    shifts = np.broadcast_to(np.eye(3)[:, None, :], (3, k, 3))
-    columns = np.concatenate([SHIFT * shifts, TURN * turns, STIFFNESS * stiffness])
-    nuisance = np.tile(columns.reshape(len(columns), -1), (1, times))
-    delta = effect.ravel()
-    return float(np.sqrt(delta @ cho_solve(cho_factor(noise + nuisance.T @ nuisance), delta)))

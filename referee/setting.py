@@ -24,6 +24,34 @@ Random = np.random.Generator
 DOWN = (0.0, -1.0, 0.0)
 #: Noise that neighbours share, in parts of the noise of each alone, and over which distance [m].
 SHARED, SHARED_LENGTH = 0.4, 0.025
+#: Logarithm of stiffness: standard deviation of all tissue together, and of each tissue.
+OVERALL, EACH = 0.25, 0.12
+#: Least and largest standard deviation of its field, and lengths [m] of two kinds of it.
+FIELD, LENGTHS = (0.08, 0.16), ((0.012, 0.018), (0.045, 0.07))
+#: Least and largest Poisson ratio, scale of the noise, and error of registration [m] and [rad] (root mean square length).
+POISSON, NOISE = (0.46, 0.48), (0.8, 1.25)
+SHIFT, TURN = 0.7e-3, float(np.deg2rad(0.7))
+#: Demiray's exponent; share of the first of two terms of Ogden's law, and both exponents.
+DEMIRAY, OGDEN = (0.3, 2.0), ((0.4, 0.7), (2.0, 5.0), (-3.0, -1.0))
+
+
+def _middling(ends: tuple[float, float]) -> tuple[float, float]:
+    """Two values with the mean and the variance of what is even between ends."""
+    middle, sd = 0.5 * (ends[0] + ends[1]), (ends[1] - ends[0]) / np.sqrt(12.0)
+    return middle - sd, middle + sd
+
+
+def _laws() -> tuple[tuple[Law, float], ...]:
+    # of Ogden's eight corners every other one has the same means and covariance of its three numbers
+    half = [(i, j, (i + j) % 2) for i in (0, 1) for j in (0, 1)]
+    corners = [tuple(_middling(ends)[k] for ends, k in zip(OGDEN, choice, strict=True)) for choice in half]
+    ogden: list[Law] = [Ogden((w, 1.0 - w), (a, b)) for w, a, b in corners]
+    demiray: list[Law] = [Demiray(b) for b in _middling(DEMIRAY)]
+    return tuple((law, 0.5 / len(kind)) for kind in (demiray, ogden) for law in kind)
+
+
+#: Laws that stand for all which are drawn, with the share of each.
+BOTH_LAWS = _laws()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,34 +210,34 @@ def draw_setting(random: Random, geometry: str, timed: bool) -> Setting:
     """
     shape: tuple[float, ...]
     if random.random() < 0.5:
-        law, shape = "demiray", (float(random.uniform(0.3, 2.0)),)
+        law, shape = "demiray", (float(random.uniform(*DEMIRAY)),)
     else:
-        law, shape = "ogden", (float(random.uniform(0.4, 0.7)), *map(float, random.uniform([2.0, -3.0], [5.0, -1.0])))
+        law, shape = "ogden", tuple(float(random.uniform(*ends)) for ends in OGDEN)
     force = timed or random.random() < 0.7
     tilt = random.normal(size=2) * 0.25
     pressed = np.array([*tilt, -1.0])
     amount = random.uniform(1.6, 3.0) if force else random.uniform(0.004, 0.007)
     load = _triple(amount * pressed)
     declared = [tissue.known_law.shear_modulus for _, tissue in sorted(declared_case(geometry).tissues.items())]
-    mu = np.array(declared) * np.exp(0.25 * random.normal() + 0.12 * random.normal(size=len(declared)))
+    mu = np.array(declared) * np.exp(OVERALL * random.normal() + EACH * random.normal(size=len(declared)))
     return Setting(
         geometry=geometry,
         mesh=geometry,
         law=law,
         shape=shape,
         mu=tuple(map(float, mu)),
-        poisson=float(random.uniform(0.46, 0.48)),
-        field_sd=float(random.uniform(0.08, 0.16)),
-        field_length=float(random.choice([random.uniform(0.012, 0.018), random.uniform(0.045, 0.07)])),
+        poisson=float(random.uniform(*POISSON)),
+        field_sd=float(random.uniform(*FIELD)),
+        field_length=float(random.choice([random.uniform(*ends) for ends in LENGTHS])),
         field_seed=int(random.integers(2**31)),
         total=load if force else None,
         moved=None if force else load,
         sigma=float(np.round(random.uniform(0.15e-3, 0.30e-3), 6)),
         declares_sigma=bool(random.random() < 0.8),
-        noise=float(random.uniform(0.8, 1.25)),
+        noise=float(random.uniform(*NOISE)),
         gross=0.04,
-        shift=_within(random, 0.7e-3),
-        turn=_within(random, np.deg2rad(0.7)),
+        shift=_within(random, SHIFT),
+        turn=_within(random, TURN),
         points=int(random.integers(50, 111)),
         checks=30,
         surface=bool(random.random() < 0.6),

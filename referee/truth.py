@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -9,19 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from referee.creep import creep
+from referee.detectability import Detectability
 from referee.effects import Effect, Viscoelasticity
-from referee.equilibrium import Balance, NoTruth, balance, linearised
-from referee.multigrid import NotSolved
-from referee.problem import Inverted, Problem
-from referee.sensing import Sensors, detectability, place_sensors
+from referee.equilibrium import Balance, NoTruth, balance
+from referee.problem import Problem
+from referee.sensing import Sensors, place_sensors
 from referee.setting import Setting
+from referee.sight import Change, Sight
+from referee.sizing import Sized, Wish, sized
+from referee.unknowns import unknowns_of
 
 Floats = NDArray[np.float64]
 
 #: An effect that stands out less or more than so is drawn again.
 LEAST, MOST = 1.0, 45.0
-#: Relative residual to which linear answers are solved.
-_CLOSE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +33,8 @@ class Truth:
     Attributes
     ----------
     setting : Setting
-    effects : tuple of Effect
-        At the size that they have.
+    found : tuple of Sized
+        Effects at the size that they have, and how much each stands out, alone and to first order.
     sensors : Sensors
     u : (times, n, 3) array
         Displacement of all nodes [m]; one time if none is told.
@@ -40,129 +42,94 @@ class Truth:
         Displacement without the effects [m].
     force : (3,) array
         With which the superior cap acts on the tissue in the end [N].
-    d : tuple of float
-        How much each effect stands out, alone and to first order; see `referee.sensing.detectability`.
-    whole : float
-        How much all stand out together; 0 if nothing is missing.
+    whole, upper : float
+        How much all stand out together, see `referee.detectability`; 0 if nothing is missing.
     left : float
         Largest part of the forces that is not balanced.
     """
 
     setting: Setting
-    effects: tuple[Effect, ...]
+    found: tuple[Sized, ...]
     sensors: Sensors
     u: Floats
     declared: Floats
     force: Floats
-    d: tuple[float, ...]
     whole: float
+    upper: float
     left: float
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Effects at the size that they have."""
+        return tuple(one.effect for one in self.found)
 
     def effect(self, nodes: NDArray[np.int64]) -> Floats:
         """Displacement (times, k, 3) [m] of nodes that is due to the effects."""
         return self.u[:, nodes] - self.declared[nodes]
 
 
-def solve_truth(setting: Setting, effects: Sequence[Effect], wanted: Sequence[float]) -> Truth:
+def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf) -> Truth:
     """Make effects so large that they stand out as much as is wanted, and solve.
 
     Parameters
     ----------
     setting : Setting
-    effects : sequence of Effect
-        Of any size.
-    wanted : sequence of float
-        Detectability of each.
+    wishes : sequence of Wish
+    until : float
+        See `referee.equilibrium.balance`.
 
     Raises
     ------
     NoTruth
-        If there is no equilibrium, or the effects stand out too little or too much whatever their size.
+        If there is no equilibrium, the effects stand out too little or too much, or it takes too long.
     """
     problem = setting.problem()
     sensors = place_sensors(setting)
-    nodes = sensors.fitted
-    base = balance(problem)
-    stiffness = _stiffness(problem, base)[:, nodes]
-    points = problem.body.points[nodes]
-
-    def seen(move: Floats) -> float:
-        # what does not change with time is seen at each of them
-        often = max(1, len(setting.times)) // len(move)
-        return detectability(points, np.repeat(move, often, axis=0), stiffness, setting.sigma)
-
-    sized, moves, ds = [], [], []
-    for effect, target in zip(effects, wanted, strict=True):
-        for _ in range(2):
-            move = _first_order(effect.act(problem), base)
-            d = seen(move[None, nodes])
-            fresh = effect.resized(effect.size * (target / d) ** (1.0 / effect.power))
-            if effect.power == 1.0 or abs(d / target - 1.0) < 0.2:
-                move, d = move * fresh.size / effect.size, d * fresh.size / effect.size
-                effect = fresh
-                break
-            effect = fresh
-        sized.append(effect)
-        moves.append(move)
-        ds.append(d)
-    found = _settle(problem, sized, setting.times, base, moves) if sized else [base]
-    u = np.stack([state.u for state in found])
-    if setting.times and len(u) == 1:
-        u = np.repeat(u, len(setting.times), axis=0)
-    whole = seen(u[:, nodes] - base.u[nodes]) if sized else 0.0
-    if sized and not LEAST <= whole <= MOST:
+    base = balance(problem, until=until)
+    held = _cap_force(problem, base.u)
+    if not wishes:
+        u = np.repeat(base.u[None], max(1, len(setting.times)), axis=0)
+        return Truth(setting, (), sensors, u, base.u, held, 0.0, 0.0, base.left)
+    seen = Detectability(Sight(setting, sensors, base.u, held), unknowns_of(problem, base))
+    found = [sized(wish, problem, base, seen, setting.times) for wish in wishes]
+    acting, states = _settle(problem, found, setting.times, base, until)
+    u = np.stack([state.u for state in states])
+    force = _cap_force(acting, u[-1])
+    change = Change(u - base.u, force - held)
+    whole = seen.d(change)
+    if not LEAST <= whole <= MOST:
         raise NoTruth(f"the effects stand out by {whole:.2g}")
-    force = _cap_force(problem, found[-1].u)
-    left = max(base.left, *(state.left for state in found))
-    return Truth(setting, tuple(sized), sensors, u, base.u, force, tuple(ds), whole, left)
+    if len(u) < len(setting.times):
+        u = np.repeat(u, len(setting.times), axis=0)
+    left = max(base.left, *(state.left for state in states))
+    return Truth(setting, tuple(found), sensors, u, base.u, force, whole, seen.upper(change), left)
 
 
 def _settle(
-    problem: Problem, effects: Sequence[Effect], times: Sequence[float], base: Balance, moves: Sequence[Floats]
-) -> list[Balance]:
+    problem: Problem, found: Sequence[Sized], times: tuple[float, ...], base: Balance, until: float
+) -> tuple[Problem, list[Balance]]:
+    """The problem with its effects at the end, and equilibria at each time, or one if none is told."""
     acting, branches = problem, []
-    for effect in effects:
-        if isinstance(effect, Viscoelasticity):
-            branches = [(effect.size / len(effect.times), tau) for tau in effect.times]
+    for one in found:
+        if isinstance(one.effect, Viscoelasticity):
+            branches = [(one.effect.size / len(one.effect.times), tau) for tau in one.effect.times]
         else:
-            acting = effect.act(acting)
-    coarse = base.linear.coarse if (acting.held == base.linear.held).all() else None
-    if branches:
-        return creep(acting, branches, times, base.u, coarse)
-    start = base.u + sum(moves)
-    try:
-        return [balance(acting, start, coarse)]
-    except NoTruth:
-        # the first guess may turn elements inside out
-        return [balance(acting, base.u, coarse)]
-
-
-def _first_order(acting: Problem, base: Balance) -> Floats:
-    """First step (n, 3) of Newton's method towards a problem from what the body does without its effect."""
-    try:
-        F = acting.gradient(base.u)
-        coarse = base.linear.coarse if (acting.held == base.linear.held).all() else None
-        linear = linearised(acting, base.u, F, coarse)
-        r = acting.residual(base.u, F, acting.response(F))
-        return -linear.solve(r.ravel(), _CLOSE).reshape(base.u.shape)
-    except (Inverted, NotSolved) as error:
-        raise NoTruth(str(error) or type(error).__name__) from error
-
-
-def _stiffness(problem: Problem, base: Balance) -> Floats:
-    """Change (tissues, n, 3) of displacement with the logarithm of each tissue's stiffness [m]."""
-    tissue = problem.body.mesh.tissue
-    F = problem.gradient(base.u)
-    columns = []
-    for label in np.unique(tissue):
-        mask = (tissue == label)[:, None]
-        alone = replace(problem, mu=problem.mu * mask, bulk=problem.bulk * mask, loads=())
-        inner = alone.residual(base.u, F, alone.response(F))
-        columns.append(-base.linear.solve(inner.ravel(), _CLOSE).reshape(base.u.shape))
-    return np.stack(columns)
+            acting = one.effect.act(acting)
+    # the first guess may turn elements inside out; then what the body does without effects is the next
+    guesses = [base.u + sum(one.change.move[0] for one in found), base.u]
+    for k, guess in enumerate(guesses):
+        try:
+            if branches:
+                return acting, creep(acting, branches, times, guess, base.linear, until)
+            return acting, [balance(acting, guess, base.linear, until)]
+        except NoTruth:
+            if k or time.process_time() > until:
+                raise
+    raise AssertionError
 
 
 def _cap_force(problem: Problem, u: Floats) -> Floats:
+    """Force [N] with which the cap is held, or that acts on it."""
     F = problem.gradient(u)
     cap = problem.body.nodes("superior")
     return replace(problem, loads=()).residual(u, F, problem.response(F))[cap].sum(axis=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar, Self
 
@@ -32,6 +33,8 @@ class Effect(abc.ABC):
     limits: ClassVar[tuple[float, float]]
     #: Displacement grows about with this power of the size.
     power: ClassVar[float] = 1.0
+    #: Whether it acts by forces beside a tangent that stays as it is, to first order.
+    forces: ClassVar[bool] = False
     #: Names that are right as well.
     also: ClassVar[tuple[str, ...]] = ()
     #: The tool's parameter that the size is an amount of, empty if there is none that means the same, and how many of
@@ -47,6 +50,10 @@ class Effect(abc.ABC):
     def resized(self, size: float) -> Self:
         """The same effect of another size, within its limits."""
         return replace(self, size=float(np.clip(size, *self.limits)))
+
+    def course(self, times: Sequence[float]) -> Floats:
+        """About which part (times,) of it is seen at each time [s]; of one that does not change (1,)."""
+        return np.ones(1)
 
     @property
     def amount(self) -> float | None:

@@ -36,6 +36,7 @@ class Gravity(Effect):
     kind: ClassVar[str] = "gravity"
     unit: ClassVar[str] = "m"
     limits: ClassVar[tuple[float, float]] = (0.002, 0.12)
+    forces: ClassVar[bool] = True
     power: ClassVar[float] = 2.0
     parameter: ClassVar[str] = "csf_level"
 
@@ -66,6 +67,7 @@ class Pressure(Effect):
     kind: ClassVar[str] = "pressure"
     unit: ClassVar[str] = "Pa"
     limits: ClassVar[tuple[float, float]] = (3.0, 600.0)
+    forces: ClassVar[bool] = True
     parameter: ClassVar[str] = "value"
 
     sign: int
@@ -95,6 +97,7 @@ class Traction(Effect):
     kind: ClassVar[str] = "traction"
     unit: ClassVar[str] = "Pa"
     limits: ClassVar[tuple[float, float]] = (30.0, 8000.0)
+    forces: ClassVar[bool] = True
     parameter: ClassVar[str] = "value"
 
     centre: Place

@@ -29,6 +29,7 @@ class Tether(Effect):
     kind: ClassVar[str] = "tether"
     unit: ClassVar[str] = "N"
     limits: ClassVar[tuple[float, float]] = (0.005, 2.0)
+    forces: ClassVar[bool] = True
 
     centre: Place
     radius: float
@@ -63,6 +64,7 @@ class PreStress(Effect):
     kind: ClassVar[str] = "pre-stress"
     unit: ClassVar[str] = "Pa"
     limits: ClassVar[tuple[float, float]] = (10.0, 1500.0)
+    forces: ClassVar[bool] = True
     also: ClassVar[tuple[str, ...]] = ("residual-stress",)
 
     centre: Place
@@ -93,6 +95,7 @@ class Wire(Effect):
     kind: ClassVar[str] = "wire"
     unit: ClassVar[str] = "N"
     limits: ClassVar[tuple[float, float]] = (0.005, 2.0)
+    forces: ClassVar[bool] = True
 
     centre: Place
     other: Place

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
-from referee.effects.effect import Effect, Place, plateau
+from referee.effects.effect import Effect, Floats, Place, plateau
 from referee.law import Ogden
 from referee.problem import Problem
 
@@ -27,6 +28,7 @@ class Swelling(Effect):
     kind: ClassVar[str] = "swelling"
     unit: ClassVar[str] = "1"
     limits: ClassVar[tuple[float, float]] = (0.001, 0.4)
+    forces: ClassVar[bool] = True
     parameter: ClassVar[str] = "amount"
 
     sign: int
@@ -105,6 +107,11 @@ class Viscoelasticity(Effect):
 
     def act(self, problem: Problem) -> Problem:
         return replace(problem, factor=1.0 + self.size)
+
+    def course(self, times: Sequence[float]) -> Floats:
+        # a solid with one such branch creeps in the time in which it relaxes, times the moduli together
+        creeping = [np.exp(-np.asarray(times) / (tau * (1.0 + self.size / len(self.times)))) for tau in self.times]
+        return np.mean(creeping, axis=0)
 
     @property
     def amount(self) -> float:

@@ -1,0 +1,125 @@
+"""What the recordings of a case tell of a change: its rows, and their noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from referee.body import Body
+from referee.sensing import FORCE_ERROR, Sensors
+from referee.setting import NOISE, SHARED, SHARED_LENGTH, Setting
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """How a body differs from what it does without something.
+
+    Attributes
+    ----------
+    move : (times, n, 3) or (1, n, 3) array
+        Of all nodes [m].
+    force : (3,) array
+        With which the superior cap acts on the tissue in the end [N].
+    """
+
+    move: Floats
+    force: Floats
+
+    def times(self, factor: float) -> Change:
+        """The same of another size."""
+        return Change(factor * self.move, factor * self.force)
+
+
+class Sight:
+    """Rows of everything that is recorded to be fitted: points at each time, the moved wall along its normals, a force.
+
+    A point of the wall has no partner, so that it tells nothing of motion along the wall.
+
+    Parameters
+    ----------
+    setting : Setting
+    sensors : Sensors
+    u : (n, 3) array
+        What the body does without effects [m].
+    force : (3,) array
+        Of the superior cap then [N].
+    """
+
+    def __init__(self, setting: Setting, sensors: Sensors, u: Floats, force: Floats) -> None:
+        body: Body = setting.body
+        self.setting, self._nodes, self._wall = setting, sensors.fitted, sensors.wall
+        self._middle = 0.5 * (body.points.min(axis=0) + body.points.max(axis=0))
+        self._points = body.points
+        moved = body.points + u
+        nodes, shapes = sensors.wall
+        along, across = (moved[nodes[:, k]] - moved[nodes[:, 0]] for k in (1, 2))
+        normals = np.cross(along, across)
+        self._normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        self._places = np.einsum("pa,pai->pi", shapes, body.points[nodes])
+        self._moved = moved
+        self._force = FORCE_ERROR * float(np.linalg.norm(force)) if setting.total is None else None
+
+    @property
+    def points(self) -> Floats:
+        """Points (k, 3) that are tracked [m]."""
+        return self._points[self._nodes]
+
+    @property
+    def count(self) -> int:
+        """How many of the rows are of points."""
+        return 3 * self.often * len(self._nodes)
+
+    @property
+    def often(self) -> int:
+        """How many times points are recorded at."""
+        return max(1, len(self.setting.times))
+
+    def rows(self, change: Change) -> Floats:
+        """What is recorded of a change (rows,) [m], forces [N]."""
+        points = change.move[:, self._nodes]
+        # what does not change with time is seen at each of them
+        parts = [np.repeat(points, self.often // len(points), axis=0).ravel()]
+        nodes, shapes = self._wall
+        wall = np.einsum("pa,pai->pi", shapes, change.move[-1][nodes])
+        parts.append((wall * self._normals).sum(axis=1))
+        if self._force is not None:
+            parts.append(change.force)
+        return np.concatenate(parts)
+
+    @cached_property
+    def rigid(self) -> Floats:
+        """Rows (6, rows) of shifts of 1 m and turns of 1 rad about the middle."""
+        arm = self._moved - self._middle
+        moves = [np.broadcast_to(axis, arm.shape) for axis in np.eye(3)]
+        moves += [np.cross(axis, arm) for axis in np.eye(3)]
+        return np.stack([self.rows(Change(move[None], np.zeros(3))) for move in moves])
+
+    @cached_property
+    def noise(self) -> Floats:
+        """Covariance (rows, rows) of noise as it is drawn, gross errors counted as points that are lost."""
+        setting = self.setting
+        # mean square of its scale, which nobody declares
+        square = (NOISE[0] ** 2 + NOISE[0] * NOISE[1] + NOISE[1] ** 2) / 3.0 * setting.sigma**2
+        points = _noise(self.points, square, square / (1.0 - setting.gross))
+        points = np.kron(np.eye(self.often), np.kron(points, np.eye(3)))
+        aligned = self._normals @ self._normals.T
+        wall = _noise(self._places, square, square) * aligned
+        blocks = [points, wall]
+        if self._force is not None:
+            blocks.append(self._force**2 * square / setting.sigma**2 * np.eye(3))
+        size = sum(map(len, blocks))
+        out, at = np.zeros((size, size)), 0
+        for block in blocks:
+            out[at : at + len(block), at : at + len(block)] = block
+            at += len(block)
+        return out
+
+
+def _noise(points: Floats, square: float, alone: float) -> Floats:
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+    return alone * np.eye(len(points)) + SHARED**2 * square * np.exp(-apart / SHARED_LENGTH)
