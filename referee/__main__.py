@@ -1,4 +1,4 @@
-"""The referee: ``python -m referee make|run|score``; ``mesh`` makes its meshes anew. See docs/referee.md."""
+"""The referee: ``python -m referee make|run|score|calibrate``; ``mesh`` makes its meshes anew. See docs/referee.md."""
 
 from __future__ import annotations
 
@@ -29,14 +29,16 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--workers", type=int, default=1, help="processes")
     run.add_argument("--tool-args", default="", help='more for the tool, such as "--ablation no-nuisances"')
     score = commands.add_parser("score", help="open the labels and compare")
-    score.add_argument("--cases", type=Path, required=True)
-    score.add_argument("--labels", type=Path, required=True)
-    score.add_argument(
-        "--commitments", type=Path, help="the published hashes; commitments.txt beside the labels if absent"
-    )
-    score.add_argument("--diagnoses", type=Path, required=True, help="where run wrote")
     score.add_argument("--out", type=Path, required=True)
     score.add_argument("--no-baselines", action="store_true", help="leave the baselines out")
+    calibrate = commands.add_parser("calibrate", help="fit the tool's temperature and offsets to a calibration set")
+    for parser_of in (score, calibrate):
+        parser_of.add_argument("--cases", type=Path, required=True)
+        parser_of.add_argument("--labels", type=Path, required=True)
+        parser_of.add_argument(
+            "--commitments", type=Path, help="the published hashes; commitments.txt beside the labels if absent"
+        )
+        parser_of.add_argument("--diagnoses", type=Path, required=True, help="where run wrote")
     commands.add_parser("mesh", help="make the meshes of truths anew, with MMG")
     return parser
 
@@ -76,9 +78,20 @@ def _run(given: argparse.Namespace) -> int:
 def _score(given: argparse.Namespace) -> int:
     from referee.score import score_all
 
-    commitments = given.commitments or given.labels / "commitments.txt"
-    print(score_all(given.cases, given.labels, commitments, given.diagnoses, given.out, not given.no_baselines))
+    print(score_all(given.cases, given.labels, _commitments(given), given.diagnoses, given.out, not given.no_baselines))
     return 0
+
+
+def _calibrate(given: argparse.Namespace) -> int:
+    from referee.calibrate import calibrate
+
+    print(calibrate(given.cases, given.labels, _commitments(given), given.diagnoses))
+    return 0
+
+
+def _commitments(given: argparse.Namespace) -> Path:
+    path: Path = given.commitments or given.labels / "commitments.txt"
+    return path
 
 
 def _mesh(given: argparse.Namespace) -> int:
@@ -88,7 +101,7 @@ def _mesh(given: argparse.Namespace) -> int:
     return 0
 
 
-_COMMANDS = {"make": _make, "run": _run, "score": _score, "mesh": _mesh}
+_COMMANDS = {"make": _make, "run": _run, "score": _score, "calibrate": _calibrate, "mesh": _mesh}
 
 if __name__ == "__main__":
     sys.exit(main())

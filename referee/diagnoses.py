@@ -15,6 +15,8 @@ VERDICTS = ("nothing missing", "named", "group", "named + rest", "unknown", "not
 ALARMS = ("named", "group", "named + rest", "unknown")
 #: Those that say which.
 NAMING = ("named", "group", "named + rest")
+#: A force without a name.
+UNKNOWN = "unknown"
 _UNITS = {"": 1.0, "1": 1.0, "%": 0.01, "mm": 1e-3, "m": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N": 1.0, "s": 1.0}
 
 
@@ -28,11 +30,26 @@ class Ranked:
     probability : float
     detectability : float or None
         At its typical size.
+    log_evidence : float or None
+        Against nothing missing; None if it was not tried.
+    physics : bool
     """
 
     name: str
     probability: float
     detectability: float | None
+    log_evidence: float | None
+    physics: bool
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of what acts together."""
+        return tuple(part.strip() for part in self.name.split("+"))
+
+    @property
+    def alternative(self) -> bool:
+        """Whether it is no physics."""
+        return not self.physics and self.name != UNKNOWN
 
 
 @dataclass(frozen=True)
@@ -43,6 +60,8 @@ class Diagnosis:
     ----------
     verdict : str
         One of `VERDICTS`.
+    p_value : float
+        Of nothing missing.
     names : tuple of str
         What it names: several if it says that several act.
     probability : float or None
@@ -60,6 +79,7 @@ class Diagnosis:
     """
 
     verdict: str
+    p_value: float
     names: tuple[str, ...]
     probability: float | None
     group: tuple[str, ...]
@@ -82,6 +102,11 @@ class Diagnosis:
     def said(self) -> set[str]:
         """Every name that it gives."""
         return {*self.names, *self.group} if self.verdict in NAMING else set()
+
+    @property
+    def tried(self) -> tuple[Ranked, ...]:
+        """Candidates that there is evidence of."""
+        return tuple(row for row in self.ranking if row.log_evidence is not None)
 
     @property
     def first(self) -> str:
@@ -113,11 +138,19 @@ def _diagnosis(data: dict[str, Any]) -> Diagnosis:
     centre = where.get("centre_m")
     return Diagnosis(
         verdict=verdict,
+        p_value=float(data["p_value"]),
         names=tuple(part.strip() for name in names for part in name.split("+")),
         probability=data.get("probability"),
         group=tuple(data.get("group") or ()),
         ranking=tuple(
-            Ranked(row["mechanism"], float(row["probability"]), row.get("detectability")) for row in data["ranking"]
+            Ranked(
+                name=row["mechanism"],
+                probability=float(row["probability"]),
+                detectability=row.get("detectability"),
+                log_evidence=row.get("log_evidence"),
+                physics=bool(row.get("physics", True)),
+            )
+            for row in data["ranking"]
         ),
         parameters={name: _parameter(said) for name, said in (data.get("parameters") or {}).items()},
         centre=None if centre is None else (float(centre[0]), float(centre[1]), float(centre[2])),

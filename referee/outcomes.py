@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from referee.diagnoses import Diagnosis, read_diagnosis
+from referee.diagnoses import UNKNOWN, Diagnosis, Ranked, read_diagnosis
 from referee.run import DIAGNOSIS
 
 
@@ -51,6 +51,11 @@ class Outcome:
         return float(self.label["detectability"])
 
     @property
+    def upper(self) -> float:
+        """The same by the measure of run 1, which knows noise, a rigid motion and the stiffness of tissues alone."""
+        return float(self.label.get("upper", self.label["detectability"]))
+
+    @property
     def d_of_tool(self) -> float | None:
         """Of the true mechanism at its typical size, by the tool."""
         return next((row.detectability for row in self.said.ranking if row.name == self.truth), None)
@@ -59,6 +64,14 @@ class Outcome:
         """Whether a name is that of something that acts."""
         also = [other for effect in self.label["effects"] for other in effect["also"]]
         return self.kind != "trap" and name in (*self.label["names"], *also)
+
+    def holds(self, row: Ranked) -> bool:
+        """Whether a candidate is true: all its parts act; the unknown outside the dictionary; no physics in a trap."""
+        if row.alternative:
+            return self.kind == "trap"
+        if row.name == UNKNOWN:
+            return self.kind == "outside"
+        return all(self.right(part) for part in row.parts)
 
     @property
     def top(self) -> bool:

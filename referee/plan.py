@@ -12,6 +12,11 @@ from referee.draw import MECHANISMS, OUTSIDE, TRAPS
 
 #: Sets, and how many cases each has if nobody says.
 SETS = {"development": 18, "calibration": 80, "scored": 120}
+#: Shares of cases; all others have one mechanism each, in turn.
+SHARES = {
+    "scored": {"none": 0.2, "two": 0.1, "outside": 0.05, "trap": 0.05},
+    "calibration": {"none": 0.375, "two": 0.075, "outside": 0.075, "trap": 0.075},
+}
 #: Least detectability of each of two effects at once.
 BOTH = 5.0
 
@@ -42,8 +47,8 @@ def planned(which: str, count: int, geometries: Sequence[str], seed: int) -> lis
         A name in `SETS`.
     count : int
         The scored set of 120 has 24 cases in which nothing is missing, 9 of each mechanism, 12 of two at once, 6
-        outside the dictionary and 6 traps, and any other number has the same shares; of calibration half has nothing
-        missing and half a mechanism; development takes one of everything in turn.
+        outside the dictionary and 6 traps; calibration of 80 has 30, 4 of each, 6, 6 and 6; any other number has the
+        same shares. Development takes one of everything in turn.
     geometries : sequence of str
         In turn.
     seed : int
@@ -52,15 +57,7 @@ def planned(which: str, count: int, geometries: Sequence[str], seed: int) -> lis
     random = np.random.default_rng([seed, count])
     pairs = list(itertools.combinations(MECHANISMS, 2))
     two = [pairs[k] for k in random.permutation(len(pairs))]
-    if which == "calibration":
-        turn = itertools.chain.from_iterable(
-            (("none", ()), ("effect", (name,))) for name in itertools.cycle(MECHANISMS)
-        )
-        chosen = list(itertools.islice(turn, count))
-    elif which == "development":
-        chosen = _development(count, two)
-    else:
-        chosen = _scored(count, two)
+    chosen = _development(count, two) if which == "development" else _shared(count, SHARES[which], two)
     # each kind meets every geometry
     of_kind: dict[tuple[str, ...], int] = {}
     cases = []
@@ -87,8 +84,7 @@ def _development(count: int, two: list[tuple[str, str]]) -> Chosen:
     return [once[k % len(once)] for k in range(count)]
 
 
-def _scored(count: int, two: list[tuple[str, str]]) -> Chosen:
-    shares = {"none": 24, "two": 12, "outside": 6, "trap": 6}
+def _shared(count: int, shares: dict[str, float], two: list[tuple[str, str]]) -> Chosen:
     of_kind: dict[str, list[tuple[str, ...]]] = {
         "none": [()],
         "two": list(two),
@@ -96,8 +92,8 @@ def _scored(count: int, two: list[tuple[str, str]]) -> Chosen:
         "trap": [(name,) for name in TRAPS],
     }
     rows: Chosen = []
-    for kind, share in shares.items():
+    for kind, part in shares.items():
         names = of_kind[kind]
-        rows += [(kind, names[k % len(names)]) for k in range(round(share * count / 120))]
+        rows += [(kind, names[k % len(names)]) for k in range(round(part * count))]
     rest = count - len(rows)
     return rows + [("effect", (MECHANISMS[k % len(MECHANISMS)],)) for k in range(rest)]
