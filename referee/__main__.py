@@ -28,6 +28,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--device", help="given to the tool")
     run.add_argument("--workers", type=int, default=1, help="processes")
     run.add_argument("--tool-args", default="", help='more for the tool, such as "--ablation no-nuisances"')
+    run.add_argument("--limit", type=float, help="seconds of a case, after which it counts as without a diagnosis")
     score = commands.add_parser("score", help="open the labels and compare")
     score.add_argument("--out", type=Path, required=True)
     score.add_argument("--no-baselines", action="store_true", help="leave the baselines out")
@@ -72,7 +73,9 @@ def _make(given: argparse.Namespace) -> int:
 def _run(given: argparse.Namespace) -> int:
     from referee.run import run_all
 
-    return run_all(given.cases, given.out, given.device, given.workers, given.tool_args.split())
+    if given.limit is not None and not given.limit > 0.0:
+        raise InputError(f"--limit {given.limit:g}: expected more than 0 s")
+    return run_all(given.cases, given.out, given.device, given.workers, given.tool_args.split(), given.limit)
 
 
 def _score(given: argparse.Namespace) -> int:

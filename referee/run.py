@@ -18,11 +18,15 @@ from warpbrain.errors import InputError
 #: The list of runs, in the folder of results.
 RUNS = "runs.csv"
 COLUMNS = ("case", "status", "seconds", "version", "commit", "arguments")
+#: Status of a run that took too long.
+NO_DIAGNOSIS = "no diagnosis"
 #: What the tool writes into the folder of a case.
 DIAGNOSIS = "diagnosis.json"
 
 
-def run_all(cases: Path, out: Path, device: str | None, workers: int, more: Sequence[str]) -> int:
+def run_all(
+    cases: Path, out: Path, device: str | None, workers: int, more: Sequence[str], limit: float | None = None
+) -> int:
     """Run the tool on every case that has not been run; list every run.
 
     Parameters
@@ -36,29 +40,32 @@ def run_all(cases: Path, out: Path, device: str | None, workers: int, more: Sequ
         How many run at a time.
     more : sequence of str
         Further arguments of the tool.
+    limit : float, optional
+        Seconds of a case, after which it is stopped and listed as `NO_DIAGNOSIS`.
 
     Returns
     -------
     int
-        1 if any run ended with another exit status than 0, else 0.
+        1 if any run was stopped or ended with another exit status than 0, else 0.
     """
     folders = sorted(path.parent for path in cases.glob("*/case.toml"))
     if not folders:
         raise InputError(f"{cases}: no folder in it has a case.toml")
     out.mkdir(parents=True, exist_ok=True)
-    done = {row["case"]: int(row["status"]) for row in read_runs(out)}
+    done = {row["case"]: row["status"] for row in read_runs(out)}
     arguments = [*(["--device", device] if device else []), *more]
     about = (warpbrain.__version__, _commit())
     with ThreadPoolExecutor(workers) as pool:
         waiting = [folder for folder in folders if folder.name not in done]
-        jobs = {pool.submit(_run, folder, out / folder.name, arguments): folder.name for folder in waiting}
+        jobs = {pool.submit(_run, folder, out / folder.name, arguments, limit): folder.name for folder in waiting}
         for job in as_completed(jobs):
             status, seconds = job.result()
             done[jobs[job]] = status
             # a row is written once its run has ended: what was interrupted is run again
             _add(out, (jobs[job], status, f"{seconds:.1f}", *about, " ".join(arguments)))
-            print(f"{jobs[job]}: exit status {status} after {seconds:.0f} s", flush=True)
-    return int(any(done[folder.name] != 0 for folder in folders))
+            said = status if status == NO_DIAGNOSIS else f"exit status {status}"
+            print(f"{jobs[job]}: {said} after {seconds:.0f} s", flush=True)
+    return int(any(done[folder.name] != "0" for folder in folders))
 
 
 def read_runs(out: Path) -> list[dict[str, str]]:
@@ -70,20 +77,26 @@ def read_runs(out: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(lines))
 
 
-def _run(folder: Path, out: Path, arguments: Sequence[str]) -> tuple[int, float]:
+def _run(folder: Path, out: Path, arguments: Sequence[str], limit: float | None) -> tuple[str, float]:
     shutil.rmtree(out, ignore_errors=True)
     out.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="referee-") as alone:
+    log = out.parent / f"{out.name}.log"
+    with tempfile.TemporaryDirectory(prefix="referee-") as alone, log.open("w", encoding="utf-8") as told:
         # a copy, so that nothing beside the folder can be found from it
         copy = Path(alone) / folder.name
         shutil.copytree(folder, copy)
         command = [sys.executable, "-m", "warpbrain", "diagnose", "--case", str(copy), "--out", str(out.absolute())]
         started = time.perf_counter()
-        ended = subprocess.run([*command, *arguments], cwd=alone, capture_output=True, text=True, check=False)
-        seconds = time.perf_counter() - started
-    log = out.parent / f"{out.name}.log"
-    log.write_text(ended.stdout + ended.stderr, encoding="utf-8")
-    return ended.returncode, seconds
+        try:
+            ended = subprocess.run(
+                [*command, *arguments], cwd=alone, stdout=told, stderr=subprocess.STDOUT, check=False, timeout=limit
+            )
+            status = str(ended.returncode)
+        except subprocess.TimeoutExpired:
+            status = NO_DIAGNOSIS
+            shutil.rmtree(out, ignore_errors=True)
+            told.write(f"stopped after {limit:g} s\n")
+        return status, time.perf_counter() - started
 
 
 def _add(out: Path, row: Sequence[object]) -> None:

@@ -97,16 +97,29 @@ def sized(wish: Wish, problem: Problem, base: Balance, seen: Detectability, time
 def _sized(
     effect: Effect, wanted: float, problem: Problem, base: Balance, seen: Detectability, times: tuple[float, ...]
 ) -> tuple[Effect, Change]:
+    good: tuple[Effect, Change] | None = None
+    stable = effect.limits[1]
     for _ in range(_TRIES):
-        change = first_order(effect, problem, base, times)
-        d = seen.d(change)
+        try:
+            change = first_order(effect, problem, base, times)
+        except NoTruth:
+            # tissue that would give way: nearer to what could be solved, or to the least there is of it
+            stable = float(np.sqrt(effect.size * (good[0].size if good else effect.limits[0])))
+            if stable > (1.0 - _NEAR) * effect.size:
+                raise
+            effect = effect.resized(stable)
+            continue
+        good = effect, change
         most = effect.size * (FARTHEST / np.abs(change.move).max()) ** (1.0 / effect.power)
-        fresh = effect.resized(min(effect.size * (wanted / d) ** (1.0 / effect.power), most))
+        size = effect.size * (wanted / seen.d(change)) ** (1.0 / effect.power)
+        fresh = effect.resized(min(size, most, stable))
         ratio = fresh.size / effect.size
         if abs(ratio - 1.0) < _NEAR or (effect.forces and effect.power == 1.0):
             return fresh, change.times(ratio**effect.power)
         effect = fresh
-    return effect, first_order(effect, problem, base, times)
+    if good is None:
+        raise NoTruth("the tissue gives way at every size that was tried")
+    return good
 
 
 def first_order(effect: Effect, problem: Problem, base: Balance, times: tuple[float, ...]) -> Change:

@@ -20,14 +20,15 @@ def cases(tmp_path):
 def test_runs_are_listed_and_resumed(cases, tmp_path, monkeypatch):
     calls = []
 
-    def runs(command, cwd, **_):
+    def runs(command, cwd, stdout, **_):
         from pathlib import Path
         from subprocess import CompletedProcess
 
         calls.append(command)
         # nothing but the case folder lies there
         assert [path.name for path in Path(cwd).iterdir()] == [Path(command[command.index("--case") + 1]).name]
-        return CompletedProcess(command, 1 if command[5].endswith("b") else 0, "said", "")
+        stdout.write("said")
+        return CompletedProcess(command, 1 if command[5].endswith("b") else 0)
 
     monkeypatch.setattr(run, "_commit", lambda: "c0ffee")
     monkeypatch.setattr(run.subprocess, "run", runs)
@@ -41,6 +42,21 @@ def test_runs_are_listed_and_resumed(cases, tmp_path, monkeypatch):
     assert (out / "a.log").read_text() == "said"
     run.run_all(cases, out, None, 1, [])
     assert len(calls) == 2
+
+
+def test_a_case_that_takes_too_long_has_no_diagnosis(cases, tmp_path, monkeypatch):
+    # not the tool but something that sleeps in its stead, and has written half of a folder
+    tool = tmp_path / "python"
+    tool.write_text('#!/bin/sh\nmkdir -p "${7}"\nexec sleep 60\n')
+    tool.chmod(0o755)
+    monkeypatch.setattr(run.sys, "executable", str(tool))
+    out = tmp_path / "out"
+    assert run.run_all(cases, out, None, 2, [], limit=0.5) == 1
+    assert {row["status"] for row in run.read_runs(out)} == {"no diagnosis"}
+    assert not (out / "a").exists() and "stopped after 0.5 s" in (out / "a.log").read_text()
+    # it is not run again
+    assert run.run_all(cases, out, None, 2, [], limit=0.5) == 1
+    assert len(run.read_runs(out)) == 2
 
 
 def test_a_folder_without_cases_is_refused(tmp_path):
