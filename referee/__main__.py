@@ -32,6 +32,9 @@ def _parser() -> argparse.ArgumentParser:
     score = commands.add_parser("score", help="open the labels and compare")
     score.add_argument("--out", type=Path, required=True)
     score.add_argument("--no-baselines", action="store_true", help="leave the baselines out")
+    score.add_argument(
+        "--beside", action="append", default=[], metavar="NAME=DIR", help="another run to compare with; may be repeated"
+    )
     calibrate = commands.add_parser("calibrate", help="fit the tool's temperature and offsets to a calibration set")
     for parser_of in (score, calibrate):
         parser_of.add_argument("--cases", type=Path, required=True)
@@ -81,7 +84,13 @@ def _run(given: argparse.Namespace) -> int:
 def _score(given: argparse.Namespace) -> int:
     from referee.score import score_all
 
-    print(score_all(given.cases, given.labels, _commitments(given), given.diagnoses, given.out, not given.no_baselines))
+    beside = {}
+    for text in given.beside:
+        name, equals, folder = text.partition("=")
+        if not (name and equals and Path(folder).is_dir()):
+            raise InputError(f"--beside {text}: expected NAME=DIR with a folder that is there")
+        beside[name] = Path(folder)
+    print(score_all(given.cases, given.labels, _commitments(given), given.diagnoses, given.out, not given.no_baselines, beside))
     return 0
 
 

@@ -13,12 +13,11 @@ from referee.intervals import share
 from referee.labels import open_labels
 from referee.outcomes import Outcome, read_outcomes
 from referee.reliability import reliability
+from referee.scores import ALPHA
 from referee.temperature import Ballots, Scale, conformal, fit, held_out, intervals
 from warpbrain.diagnosis.calibration import ALTERNATIVE_OFFSET, TEMPERATURE, UNKNOWN_OFFSET
 from warpbrain.errors import InputError
 
-#: Level of the alarm.
-ALPHA = 0.05
 #: Fewest cases that a temperature is fitted to.
 FEWEST = 10
 

@@ -15,6 +15,8 @@ VERDICTS = ("nothing missing", "named", "group", "named + rest", "unknown", "not
 ALARMS = ("named", "group", "named + rest", "unknown")
 #: Those that say which.
 NAMING = ("named", "group", "named + rest")
+#: Probability of a label set.
+TOGETHER = 0.9
 #: A force without a name.
 UNKNOWN = "unknown"
 _UNITS = {"": 1.0, "1": 1.0, "%": 0.01, "mm": 1e-3, "m": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N": 1.0, "s": 1.0}
@@ -107,6 +109,16 @@ class Diagnosis:
     def tried(self) -> tuple[Ranked, ...]:
         """Candidates that there is evidence of."""
         return tuple(row for row in self.ranking if row.log_evidence is not None)
+
+    @property
+    def label_set(self) -> tuple[Ranked, ...]:
+        """The fewest candidates whose probabilities are 0.9 together."""
+        total = 0.0
+        for count, row in enumerate(self.ranking, start=1):
+            total += row.probability
+            if total >= TOGETHER:
+                return self.ranking[:count]
+        return self.ranking
 
     @property
     def first(self) -> str:

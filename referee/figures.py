@@ -27,7 +27,7 @@ def draw_figures(
 
     matplotlib.use("Agg")
     _confusion(folder / "confusion.png", *confused)
-    _reliability(folder / "reliability.png", calibrated["rows"])
+    _reliability(folder / "reliability.png", calibrated)
     _accuracy(folder / "accuracy.png", [o for o in outcomes if o.kind == "effect"])
 
 
@@ -49,18 +49,23 @@ def _confusion(file: Path, rows: list[str], columns: list[str], table: list[list
     plt.close(figure)
 
 
-def _reliability(file: Path, rows: Sequence[Sequence[float]]) -> None:
+def _reliability(file: Path, calibrated: Mapping[str, Any]) -> None:
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(4.2, 4.0), layout="constrained")
-    axes.plot([0, 1], [0, 1], color=GREY, linestyle=":", label="as stated")
-    for p, right, count in rows:
-        low, high = share([True] * round(right * count) + [False] * round((1 - right) * count)).interval
-        axes.errorbar(p, right, [[right - low], [high - right]], fmt="o", color=BLUE, capsize=3)
-        axes.annotate(f"{count:.0f}", (p, right), textcoords="offset points", xytext=(7, -11))
-    axes.set(xlim=(0, 1.05), ylim=(0, 1.05), xlabel="stated probability of the name", ylabel="share that is right")
-    axes.set_title("Spoken names: how many, with 95 % intervals", fontsize=10)
-    axes.legend(loc="upper left", frameon=False)
+    titles = {"all": "Every candidate after an alarm", "spoken": "Spoken names"}
+    figure, both = plt.subplots(1, 2, figsize=(8.0, 4.2), layout="constrained", sharey=True)
+    for axes, (key, title) in zip(both, titles.items(), strict=True):
+        axes.plot([0, 1], [0, 1], color=GREY, linestyle=":", label="as stated")
+        for p, right, count in calibrated[key]["rows"]:
+            low, high = share([True] * round(right * count) + [False] * round((1 - right) * count)).interval
+            axes.errorbar(p, right, [[max(right - low, 0.0)], [max(high - right, 0.0)]], fmt="o", color=BLUE, capsize=3)
+            # beside the point on the side where there is room
+            end = {"xytext": (-7, 0), "ha": "right"} if p > 0.8 else {"xytext": (7, 0), "ha": "left"}
+            axes.annotate(f"{count:.0f}", (p, right), textcoords="offset points", va="center", **end)
+        axes.set(xlim=(-0.05, 1.05), ylim=(-0.05, 1.05), xlabel="stated probability")
+        axes.set_title(f"{title}: how many, with 95 % intervals", fontsize=10)
+    both[0].set_ylabel("share that is right")
+    both[0].legend(loc="upper left", frameon=False)
     figure.savefig(file, dpi=150)
     plt.close(figure)
 

@@ -79,6 +79,11 @@ class Outcome:
         return self.right(self.said.first)
 
     @property
+    def covered(self) -> bool:
+        """Whether something in the 90 % label set is true."""
+        return any(self.holds(row) for row in self.said.label_set)
+
+    @property
     def named(self) -> bool:
         """Whether it gives one name, and that is right."""
         return self.said.spoken and all(self.right(name) for name in self.said.names)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from referee.figures import draw_figures
+from referee.intervals import Share
 from referee.labels import open_labels
-from referee.outcomes import read_outcomes
+from referee.outcomes import Outcome, read_outcomes
 from referee.scores import amounts, calibration, confusion, shares
 from referee.tables import score_text
 from warpbrain.errors import InputError
 
 
-def score_all(cases: Path, labels: Path, commitments: Path, diagnoses: Path, out: Path, compared: bool) -> str:
+def score_all(
+    cases: Path, labels: Path, commitments: Path, diagnoses: Path, out: Path, compared: bool, beside: Mapping[str, Path]
+) -> str:
     """Write `score.json`, `score.md` and figures.
 
     Parameters
@@ -25,6 +30,8 @@ def score_all(cases: Path, labels: Path, commitments: Path, diagnoses: Path, out
     out : Path
     compared : bool
         Whether the baselines diagnose the cases too.
+    beside : mapping of str to Path
+        Other runs of the same cases by name, such as an ablation, to be compared with.
 
     Returns
     -------
@@ -34,7 +41,7 @@ def score_all(cases: Path, labels: Path, commitments: Path, diagnoses: Path, out
     Raises
     ------
     InputError
-        If a label is not the one that was committed to, or a diagnosis is not one.
+        If a label is not the one that was committed to, a diagnosis is not one, or another run has no case in common.
     """
     opened = open_labels(labels, commitments)
     outcomes, missing = read_outcomes(opened, diagnoses)
@@ -47,7 +54,8 @@ def score_all(cases: Path, labels: Path, commitments: Path, diagnoses: Path, out
         from referee.baselines import compare
 
         baselines = compare(cases, outcomes)
-    text = score_text(found, calibrated, measured, confused, baselines, outcomes, missing)
+    others = _beside(opened, outcomes, beside) if beside else {}
+    text = score_text(found, calibrated, measured, confused, baselines, others, outcomes, missing)
     out.mkdir(parents=True, exist_ok=True)
     told = {
         "cases": len(outcomes),
@@ -56,9 +64,21 @@ def score_all(cases: Path, labels: Path, commitments: Path, diagnoses: Path, out
         "calibration": calibrated,
         "measured": measured,
         "baselines": {m: {name: value.told() for name, value in row.items()} for m, row in baselines.items()},
+        "beside": {name: {key: value.told() for key, value in row.items()} for name, row in others.items()},
         "draws_given_up": sum(len(label["attempts"]) for label in opened.values()),
     }
     (out / "score.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     (out / "score.md").write_text(text, encoding="utf-8")
     draw_figures(out, confused, calibrated, outcomes)
     return text
+
+
+def _beside(
+    opened: Mapping[str, Mapping[str, Any]], outcomes: Sequence[Outcome], beside: Mapping[str, Path]
+) -> dict[str, dict[str, Share]]:
+    """Shares of the run and of others, in the cases that all of them have diagnosed."""
+    runs = {"the run": outcomes, **{name: read_outcomes(opened, folder)[0] for name, folder in beside.items()}}
+    all_of = set.intersection(*({o.name for o in found} for found in runs.values()))
+    if not all_of:
+        raise InputError(f"--beside: no case that the run, {' and '.join(beside)} all have diagnosed")
+    return {name: shares([o for o in found if o.name in all_of]) for name, found in runs.items()}

@@ -10,6 +10,7 @@ import numpy as np
 from referee.diagnoses import NAMING
 from referee.intervals import Share, share
 from referee.outcomes import Outcome
+from referee.reliability import reliability
 
 #: Bins of detectability.
 BINS = ((0.0, 3.0), (3.0, 5.0), (5.0, 8.0), (8.0, np.inf))
@@ -21,11 +22,14 @@ BARS = {
     "traps named as physics": 0.05,
     "right name or group holding it, d >= 8": 0.95,
     "right name alone, d >= 8": 0.85,
+    "90 % label set holds the truth": 0.9,
     "spoken names right": 0.95,
     "centre within 10 mm": 0.5,
     "unknown found": 0.6,
     "both of two named": 0.6,
 }
+#: Level of the tool's alarm.
+ALPHA = 0.05
 #: A centre is found if it is nearer than this [m].
 NEAR = 0.010
 
@@ -47,13 +51,16 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
     }
     for low, high in BINS:
         found[f"best candidate right, {bin_name(low, high)}"] = share(o.top for o in effects if low <= o.d < high)
-    by_tool = [(o, o.d_of_tool) for o in effects]
-    for low, high in BINS:
-        within = (o.top for o, d in by_tool if d is not None and low <= d < high)
-        found[f"best candidate right, tool's own {bin_name(low, high)}"] = share(within)
+    others = {"the old": [(o, o.upper) for o in effects], "tool's own": [(o, o.d_of_tool) for o in effects]}
+    for measure, by in others.items():
+        for low, high in BINS:
+            within = (o.top for o, d in by if d is not None and low <= d < high)
+            found[f"best candidate right, {measure} {bin_name(low, high)}"] = share(within)
     found |= {
         "right name or group holding it, d >= 8": share(o.held for o in plain),
         "right name alone, d >= 8": share(o.named for o in plain),
+        "right name alone, the old d >= 8": share(o.named for o in effects if o.upper >= PLAIN),
+        "90 % label set holds the truth": share(o.covered for o in effects if o.d >= VISIBLE and o.said.alarm),
         "spoken names right": share(o.named for o in outcomes if o.said.spoken),
         "centre within 10 mm": share(e < NEAR for o in effects if o.d >= VISIBLE and (e := o.centre_error) is not None),
         "amount within 2 sd": share(a[1] for o in effects if (a := o.amount) is not None and a[1] is not None),
@@ -64,25 +71,21 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
     return found
 
 
-def calibration(outcomes: Sequence[Outcome], bins: int = 5) -> dict[str, Any]:
-    """Reliability of the probabilities of names that are spoken, and their expected calibration error.
+def calibration(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:
+    """Reliability, see `referee.reliability`.
 
     Returns
     -------
     dict
-        `ece` (None if no name was spoken) and `rows` of (mean probability, share that is right, count).
+        `all`: of every candidate that was tried in every case with an alarm; `spoken`: of names that are spoken.
     """
+    rows = [(row.probability, o.holds(row)) for o in outcomes if o.said.p_value <= ALPHA for row in o.said.tried]
     spoken = [(o.said.probability, o.named) for o in outcomes if o.said.spoken and o.said.probability is not None]
-    if not spoken:
-        return {"ece": None, "rows": []}
-    p, right = (np.array(column, dtype=float) for column in zip(*spoken, strict=True))
-    place = np.minimum((p * bins).astype(int), bins - 1)
-    rows = [
-        (float(p[place == k].mean()), float(right[place == k].mean()), int((place == k).sum()))
-        for k in range(bins)
-        if (place == k).any()
-    ]
-    return {"ece": sum(abs(q - r) * n for q, r, n in rows) / len(p), "rows": [list(row) for row in rows]}
+    return {"all": _reliability(rows), "spoken": _reliability(spoken)}
+
+
+def _reliability(pairs: Sequence[tuple[float, bool]]) -> dict[str, Any]:
+    return reliability(np.array([p for p, _ in pairs], dtype=float), np.array([right for _, right in pairs], dtype=bool))
 
 
 def amounts(outcomes: Sequence[Outcome]) -> dict[str, Any]:
@@ -91,7 +94,9 @@ def amounts(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     centres = [e for o in effects if (e := o.centre_error) is not None]
     errors = [a[0] for o in effects if (a := o.amount) is not None]
     cuts = [c for o in effects if o.held and (c := o.cut) is not None]
+    sets = [float(len(o.said.label_set)) for o in effects if o.said.alarm]
     return {
+        "candidates in a 90 % label set": {**_median(sets), "mean": float(np.mean(sets)) if sets else None},
         "centre error [m]": _median(centres),
         "relative error of amount": _median(errors),
         "held-out error above noise that is gone": _median(cuts),
