@@ -63,8 +63,8 @@ def _reliability(file: Path, calibrated: Mapping[str, Any]) -> None:
             end = {"xytext": (-7, 0), "ha": "right"} if p > 0.8 else {"xytext": (7, 0), "ha": "left"}
             axes.annotate(f"{count:.0f}", (p, right), textcoords="offset points", va="center", **end)
         axes.set(xlim=(-0.05, 1.05), ylim=(-0.05, 1.05), xlabel="stated probability")
-        axes.set_title(f"{title}: how many, with 95 % intervals", fontsize=10)
-    both[0].set_ylabel("share that is right")
+        axes.set_title(title, fontsize=10)
+    both[0].set_ylabel("share that is right, of how many, with 95 % interval")
     both[0].legend(loc="upper left", frameon=False)
     figure.savefig(file, dpi=150)
     plt.close(figure)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import shutil
 import time
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ from referee.labels import label_of, seal, write_commitments
 from referee.plan import BOTH, Planned, planned
 from referee.setting import draw_setting
 from referee.sizing import Wish
+from referee.threads import single
 from referee.truth import LEAST, Truth, solve_truth
 
 #: Rooms of a set.
@@ -28,7 +28,7 @@ CASES, LABELS = "cases", "labels"
 #: Draws of a case at most.
 ATTEMPTS = 12
 #: Draws of which each effect must stand out by as much as is wanted at least.
-STRICT = 6
+STRICT = 4
 #: Processor time for one draw at most [s], after which it is given up.
 LIMIT = 90.0
 
@@ -64,7 +64,7 @@ def make_set(which: str, count: int, out: Path, geometries: Sequence[str], worke
     missing.sort(key=lambda k: -_work(plans[k]))
     lines = []
     # a fresh process knows nothing of the threads of this one
-    with ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"), initializer=_single) as pool:
+    with ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"), initializer=single) as pool:
         jobs = [pool.submit(make_case, out, names[k], plans[k], [number, k]) for k in missing]
         for job in as_completed(jobs):
             lines.append(job.result())
@@ -80,11 +80,6 @@ def _work(plan: Planned) -> float:
         return 1.0
     each = {"viscoelasticity": 6.0, "asymmetry": 6.0, "contact": 4.0, "inclusion": 4.0}
     return 1.0 + sum(each.get(name, 2.0) for name in plan.names)
-
-
-def _single() -> None:
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
 
 
 def make_case(out: Path, name: str, plan: Planned, seed: Sequence[int]) -> str:

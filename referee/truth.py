@@ -115,15 +115,17 @@ def _settle(
             branches = [(one.effect.size / len(one.effect.times), tau) for tau in one.effect.times]
         else:
             acting = one.effect.act(acting)
-    # the first guess may turn elements inside out; then what the body does without effects is the next
-    guesses = [base.u + sum(one.change.move[0] for one in found), base.u]
+    # the first guess may turn elements inside out; what the body does without effects is a better one then, and rest
+    # for tissue that becomes so stiff that it would give way there
+    guesses = [base.u + sum(one.change.move[0] for one in found), base.u, np.zeros_like(base.u)]
     for k, guess in enumerate(guesses):
         try:
+            near = base.linear if guess.any() else None
             if branches:
-                return acting, creep(acting, branches, times, guess, base.linear, until)
-            return acting, [balance(acting, guess, base.linear, until)]
+                return acting, creep(acting, branches, times, guess, near, until)
+            return acting, [balance(acting, guess, near, until)]
         except NoTruth:
-            if k or time.process_time() > until:
+            if k == len(guesses) - 1 or time.process_time() > until:
                 raise
     raise AssertionError
 

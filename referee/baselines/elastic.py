@@ -12,6 +12,7 @@ from scipy.sparse.linalg import splu
 from referee.faces import Floats
 from warpbrain.cases.boundary import Displaced, Fixed, Forced
 from warpbrain.cases.case import Case
+from warpbrain.errors import SolveError
 
 Bools = NDArray[np.bool_]
 
@@ -70,17 +71,37 @@ class Elastic:
                 value[members] = boundary.values[-1]
         return held.ravel(), value.ravel()
 
-    def solver(self, loose: Bools | None = None) -> Solver:
-        """Solver, with nodes that are not held after all."""
-        held = self.held[0].copy()
-        if loose is not None:
-            held[np.repeat(loose, 3)] = False
-        return Solver(self.matrix, held)
-
     @cached_property
     def fast(self) -> Solver:
         """Solver with all that the case holds."""
-        return self.solver()
+        return Solver(self.matrix, self.held[0])
+
+    def released(self, loose: Bools) -> Floats:
+        """Displacement (3 n,) [m] if nodes (n,) are not held after all.
+
+        By conjugate gradients, for which what the case holds is factorised already.
+        """
+        from scipy.sparse.linalg import LinearOperator, cg
+
+        held = self.held[0]
+        freed = held & np.repeat(loose, 3)
+        free = ~held | freed
+        diagonal = self.matrix.diagonal()
+
+        def times(u: Floats) -> Floats:
+            return np.where(free, self.matrix @ np.where(free, u, 0.0), u)
+
+        def near(r: Floats) -> Floats:
+            return self.fast(r) + np.where(~held, 0.0, np.where(freed, r / diagonal, r))
+
+        shape = self.matrix.shape
+        # what is left of the forces where nodes were held is what moves them
+        left = np.where(free, self.load - self.matrix @ self.declared, 0.0)
+        matrix, inverse = (LinearOperator(shape, act, dtype=np.float64) for act in (times, near))
+        move, failed = cg(matrix, left, rtol=1e-2, maxiter=300, M=inverse)
+        if failed:
+            raise SolveError(f"{self.case.name}: no linear answer with {loose.sum()} nodes that are not held")
+        return self.declared + move
 
     @cached_property
     def load(self) -> Floats:
