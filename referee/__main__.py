@@ -90,7 +90,11 @@ def _score(given: argparse.Namespace) -> int:
         if not (name and equals and Path(folder).is_dir()):
             raise InputError(f"--beside {text}: expected NAME=DIR with a folder that is there")
         beside[name] = Path(folder)
-    print(score_all(given.cases, given.labels, _commitments(given), given.diagnoses, given.out, not given.no_baselines, beside))
+    print(
+        score_all(
+            given.cases, given.labels, _commitments(given), given.diagnoses, given.out, not given.no_baselines, beside
+        )
+    )
     return 0
 
 

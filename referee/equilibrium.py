@@ -48,7 +48,9 @@ class Balance:
     steps: int
 
 
-def balance(problem: Problem, start: Floats | None = None, near: Linear | None = None, until: float = np.inf) -> Balance:
+def balance(
+    problem: Problem, start: Floats | None = None, near: Linear | None = None, until: float = np.inf
+) -> Balance:
     """Displacement at which all forces balance.
 
     Parameters

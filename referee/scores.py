@@ -85,7 +85,9 @@ def calibration(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:
 
 
 def _reliability(pairs: Sequence[tuple[float, bool]]) -> dict[str, Any]:
-    return reliability(np.array([p for p, _ in pairs], dtype=float), np.array([right for _, right in pairs], dtype=bool))
+    return reliability(
+        np.array([p for p, _ in pairs], dtype=float), np.array([right for _, right in pairs], dtype=bool)
+    )
 
 
 def amounts(outcomes: Sequence[Outcome]) -> dict[str, Any]:

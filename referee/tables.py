@@ -53,7 +53,11 @@ def score_text(
     lines += ["", f"| true \\ said | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
     for true, counts in zip(rows, table, strict=True):
         lines.append(f"| {true} | {' | '.join(str(count) if count else '' for count in counts)} |")
-    lines += ["", "| case | true | d | the old d | effect at points [mm] | said | best candidate |", "|---|---|---|---|---|---|---|"]
+    lines += [
+        "",
+        "| case | true | d | the old d | effect at points [mm] | said | best candidate |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for o in outcomes:
         said = " + ".join(o.said.names) or ", ".join(o.said.group)
         true = " + ".join(o.label["names"]) or "nothing"

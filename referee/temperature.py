@@ -75,11 +75,23 @@ def fit(ballots: Ballots) -> Scale:
     """The scale of highest likelihood of the truth, with weak priors."""
     from scipy.optimize import minimize
 
-    def cost(x: Floats) -> float:
-        scale = Scale(float(np.exp(x[0])), float(x[1]), float(x[2]))
-        return len(ballots) * ballots.loss(scale) + 0.5 * float(((x / _SPREADS) ** 2).sum())
+    tried = np.isfinite(ballots.evidence)
 
-    found = minimize(cost, np.zeros(3), method="L-BFGS-B", bounds=[(-3.0, 5.0), (-30.0, 30.0), (-30.0, 30.0)])
+    def cost(x: Floats) -> tuple[float, Floats]:
+        scale = Scale(float(np.exp(x[0])), float(x[1]), float(x[2]))
+        p = ballots.probabilities(scale)
+        true = np.maximum((p * ballots.right).sum(axis=1, keepdims=True), 1e-300)
+        # by the exponents of the softmax
+        slope = p - p * ballots.right / true
+        offset = scale.unknown * ballots.unknown + scale.alternative * ballots.alternative
+        exponent = np.where(tried, ballots.evidence + offset, 0.0) / scale.temperature
+        slopes = [-(slope * exponent).sum()]
+        slopes += [(slope * flag).sum() / scale.temperature for flag in (ballots.unknown, ballots.alternative)]
+        value = -np.log(true).sum() + 0.5 * ((x / _SPREADS) ** 2).sum()
+        return float(value), np.array(slopes) + x / _SPREADS**2
+
+    bounds = [(-3.0, 5.0), (-30.0, 30.0), (-30.0, 30.0)]
+    found = minimize(cost, np.zeros(3), jac=True, method="L-BFGS-B", bounds=bounds)
     return Scale(float(np.exp(found.x[0])), float(found.x[1]), float(found.x[2]))
 
 

@@ -40,9 +40,7 @@ class Unknowns:
     @property
     def drawn(self) -> list[Change]:
         """With amounts of mean 0 and variance 1, all of them as they are drawn."""
-        together = Change(
-            OVERALL * sum(c.move for c in self.tissues), OVERALL * sum(c.force for c in self.tissues)
-        )
+        together = Change(OVERALL * sum(c.move for c in self.tissues), OVERALL * sum(c.force for c in self.tissues))
         return [together, *(c.times(EACH) for c in self.tissues), *self.others]
 
 

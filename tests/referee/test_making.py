@@ -35,7 +35,8 @@ def test_a_case_of_every_class(plan, small, tmp_path):
     assert len(label["effects"]) == (0 if plan.kind in ("none", "trap") else len(plan.names))
     if label["effects"]:
         assert 1.0 <= label["detectability"] <= 45.0
-        assert label["rms_effect_m"] > 0.0
+        assert label["rms_effect_m"] > 0.0 and label["upper"] > 0.0
+        assert all(effect["wanted"] > 0.0 and effect["drawn_again"] >= 0 for effect in label["effects"])
     else:
         assert label["detectability"] == 0.0 and label["rms_effect_m"] == 0.0
     if "viscoelasticity" in plan.names:
@@ -84,8 +85,10 @@ def test_the_scored_set_is_what_was_announced():
     assert {case.names[0] for case in cases if case.kind == "outside"} == set(OUTSIDE)
 
 
-def test_calibration_is_half_without_effects():
-    assert Counter(case.kind for case in planned("calibration", 80, ["phantom"], 1)) == {"none": 40, "effect": 40}
+def test_calibration_has_something_of_everything():
+    cases = planned("calibration", 80, ["phantom"], 1)
+    assert Counter(case.kind for case in cases) == {"none": 30, "effect": 32, "two": 6, "outside": 6, "trap": 6}
+    assert {case.names[0] for case in cases if case.kind == "effect"} == set(MECHANISMS)
 
 
 def test_a_seed_is_any_text():

@@ -7,7 +7,7 @@ from shapes import cube
 
 from referee.body import Body
 from referee.creep import creep
-from referee.equilibrium import balance
+from referee.equilibrium import balance, linearised
 from referee.law import Demiray, Ogden, respond
 from referee.problem import Problem
 from warpbrain.mesh import TetMesh
@@ -87,6 +87,24 @@ def test_growth_that_is_free_swells_by_itself():
     found = balance(problem_of(body, LAWS[0], held, np.zeros_like(force), growth=growth, loads=(lambda u: force,)))
     # a cube of 1 with a volume of 1.1
     np.testing.assert_allclose(found.u, body.points * (1.1 ** (1 / 3) - 1.0), atol=1e-5)
+
+
+def test_several_right_sides_are_solved_as_each_alone():
+    mesh = cube(3)
+    body = Body(TetMesh(mesh.points, mesh.tetrahedra, np.ones(len(mesh.tetrahedra), dtype=np.int32)))
+    held = np.repeat((body.points[:, 2] == 0.0)[:, None], 3, axis=1)
+    problem = problem_of(body, LAWS[0], held, np.zeros(held.shape), nu=0.47)
+    u = np.zeros(held.shape)
+    linear = linearised(problem, u, problem.response(problem.gradient(u)))
+    right = np.random.default_rng(0).normal(size=(u.size, 3))
+    right[:, 2] = 0.0
+    together = linear.solve(right, 1e-5)
+    free = np.flatnonzero(~held)
+    matrix = linear.whole.toarray().astype(float)[np.ix_(free, free)]
+    exact = np.linalg.solve(matrix, right[free])
+    np.testing.assert_allclose(together[free], exact, atol=1e-3 * np.abs(exact).max())
+    assert not together[held.ravel()].any() and not together[:, 2].any()
+    np.testing.assert_allclose(linear.solve(right[:, 0], 1e-5), together[:, 0], atol=1e-3 * np.abs(exact).max())
 
 
 def test_creep_goes_from_the_stiff_answer_to_the_soft_one():

@@ -82,11 +82,32 @@ def test_what_is_measured(outcomes):
 
 
 def test_calibration_by_hand(outcomes):
-    found = calibration(outcomes)
+    found = calibration(outcomes)["spoken"]
     p = [0.9, 0.95, 0.9, 1.0, 0.9, 0.9, 0.9]
     right = [0, 1, 0, 1, 0, 1, 1]
     assert found["rows"] == [[pytest.approx(np.mean(p)), pytest.approx(np.mean(right)), 7]]
     assert found["ece"] == pytest.approx(np.mean(p) - np.mean(right))
+
+
+def test_every_stated_probability_counts_after_an_alarm(tmp_path):
+    ranking = [
+        {"mechanism": name, "probability": p, "log_evidence": e, "physics": name != "unknown"}
+        for name, p, e in (("gravity", 0.7, 3.0), ("pressure", 0.25, 1.0), ("unknown", 0.05, 0.0), ("falx", 0.0, None))
+    ]
+    true = label("g", "effect", ("pressure",), 6.0)
+    pairs = [
+        (true, diagnosis("group", p_value=0.01, ranking=ranking)),
+        (label("n"), diagnosis(p_value=0.3, ranking=ranking)),
+        (label("o", "outside", ("tether",), 6.0), diagnosis("unknown", p_value=0.01, ranking=ranking)),
+    ]
+    found = [outcome(tmp_path, *pair) for pair in pairs]
+    told = calibration(found)["all"]
+    # of what was tried: 0.05 twice, 0.25 twice and 0.7 twice
+    assert told["rows"] == [[pytest.approx(0.05), 0.5, 2], [pytest.approx(0.25), 0.5, 2], [pytest.approx(0.7), 0.0, 2]]
+    assert [row.name for row in found[0].said.label_set] == ["gravity", "pressure"]
+    assert found[0].covered and not found[2].covered
+    of_effects = shares(found)["90 % label set holds the truth"]
+    assert (of_effects.hits, of_effects.of) == (1, 1)
 
 
 def test_confusion_counts_every_case_once(outcomes):
@@ -115,6 +136,9 @@ def test_the_command_scores_and_refuses(tmp_path, outcomes, capsys):
     assert told["without_diagnosis"] == ["never"]
     assert told["shares"]["false alarms"]["hits"] == 1
     assert "| false alarms | 1 of 3 = 33 % (1 to 91) | <= 5 % | NOT met |" in capsys.readouterr().out
+    assert main([*map(str, words), "--no-baselines", "--beside", f"plain={tmp_path}"]) == 0
+    assert "| score, in cases of all | the run | plain |" in capsys.readouterr().out
+    assert main([*map(str, words), "--no-baselines", "--beside", "plain=nowhere"]) == 2
     for name in ("confusion", "reliability", "accuracy"):
         assert (tmp_path / "out" / f"{name}.png").stat().st_size > 5000
     (labels / "commitments.txt").write_text("0" * 64 + "  n1\n")

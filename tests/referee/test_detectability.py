@@ -1,0 +1,112 @@
+"""What is not known of a case: against full equilibria, the field as it is drawn, and what it can hide."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from referee.detectability import Detectability
+from referee.draw import wanted
+from referee.equilibrium import NoTruth, balance
+from referee.fields import random_field
+from referee.law import Demiray, Ogden
+from referee.sensing import place_sensors
+from referee.setting import BOTH_LAWS, DEMIRAY, FIELD, LENGTHS, OGDEN, draw_setting
+from referee.sight import Change, Sight
+from referee.truth import _cap_force
+from referee.unknowns import stiffness_modes, unknowns_of
+
+
+@pytest.fixture(params=[3, 4], ids=["moved", "force"])
+def known(request, small):
+    """A setting, its problem, what its body does, what is not known of it and what is seen."""
+    random = np.random.default_rng(request.param)
+    setting = draw_setting(random, "phantom", False)
+    while (setting.total is None) != (request.param == 3) or not setting.surface or setting.times:
+        setting = draw_setting(random, "phantom", False)
+    setting = replace(setting, points=40, checks=10)
+    problem = setting.problem()
+    base = balance(problem)
+    force = _cap_force(problem, base.u)
+    sight = Sight(setting, place_sensors(setting), base.u, force)
+    return setting, problem, base, unknowns_of(problem, base), sight
+
+
+def test_columns_are_those_of_full_equilibria(known):
+    _, problem, base, unknowns, sight = known
+    step = 0.02
+    for k, label in enumerate(np.unique(problem.body.mesh.tissue)):
+        factor = np.exp(step * (problem.body.mesh.tissue == label))[:, None]
+        other = replace(problem, mu=problem.mu * factor, bulk=problem.bulk * factor)
+        found = balance(other, base.u)
+        full = Change((found.u - base.u)[None], _cap_force(other, found.u) - _cap_force(problem, base.u))
+        rows = sight.rows(full.times(1.0 / step))
+        np.testing.assert_allclose(sight.rows(unknowns.tissues[k]), rows, atol=0.06 * np.abs(rows).max())
+
+
+def test_what_is_not_known_does_not_stand_out(known):
+    setting, _, _, unknowns, sight = known
+    seen = Detectability(sight, unknowns)
+    own = [seen.d(change) for change in unknowns.drawn]
+    # an amount of one standard deviation is never more than one of all that is not known
+    assert 0.0 < max(own) < 1.0
+    assert len(sight.rows(unknowns.drawn[0])) == 3 * 40 + 150 + (3 if setting.total is None else 0)
+    # a patch of its own is seen by noise, though less than by noise alone
+    move = np.zeros((1, *setting.body.points.shape))
+    move[0, place_sensors(setting).fitted[:5]] = [0.0, 0.0, 2e-3]
+    patch = Change(move, np.zeros(3))
+    rows = sight.rows(patch)
+    alone = np.sqrt(rows @ np.linalg.solve(sight.noise, rows))
+    assert 1.0 < seen.d(patch) < alone
+    assert seen.d(patch.times(2.0)) == pytest.approx(2.0 * seen.d(patch))
+
+
+def test_noise_is_as_it_is_drawn(known):
+    setting, _, _, _, sight = known
+    random = np.random.default_rng(0)
+    draws = []
+    for _ in range(1500):
+        blur = replace(setting.blur, seed=int(random.integers(2**31)), noise_scale=1.0)
+        scale = random.uniform(0.8, 1.25) * setting.sigma / 0.3e-3
+        draws.append(scale * blur.noise(sight.points)[:, 0])
+    found = np.cov(np.array(draws).T)
+    # gross errors are lost points, not noise
+    square = np.diag(sight.noise)[0] - np.diag(found).mean()
+    assert square == pytest.approx(np.diag(found).mean() * 0.04 / 0.96 / 1.16, rel=0.6)
+    expected = sight.noise[: 3 * 40 : 3, : 3 * 40 : 3]
+    away = ~np.eye(40, dtype=bool)
+    np.testing.assert_allclose(found[away], expected[away], atol=0.12 * expected.max())
+
+
+def test_modes_have_the_covariance_of_the_field():
+    points = np.random.default_rng(0).uniform(0.0, 0.06, size=(80, 3))
+    modes = stiffness_modes(points, np.linspace(1.0, 2.0, 80), 80)
+    random = np.random.default_rng(1)
+    draws = [
+        random.uniform(*FIELD)
+        * random_field(points, random.uniform(*LENGTHS[k % 2]), int(random.integers(2**31)))[:, 0]
+        for k in range(1500)
+    ]
+    np.testing.assert_allclose(modes @ modes.T, np.cov(np.array(draws).T), atol=0.003)
+    # few of them hold most of what is seen
+    few = stiffness_modes(points, np.ones(80), 24)
+    assert (few**2).sum() > 0.85 * (modes**2).sum()
+
+
+def test_laws_stand_for_all_that_are_drawn():
+    assert sum(share for _, share in BOTH_LAWS) == pytest.approx(1.0)
+    numbers = np.array([(law.shares[0], *law.exponents) for law, _ in BOTH_LAWS if isinstance(law, Ogden)])
+    ends = np.array(OGDEN)
+    np.testing.assert_allclose(numbers.mean(axis=0), ends.mean(axis=1))
+    np.testing.assert_allclose(np.cov(numbers.T, bias=True), np.diag(np.ptp(ends, axis=1) ** 2 / 12.0), atol=1e-12)
+    b = [law.b for law, _ in BOTH_LAWS if isinstance(law, Demiray)]
+    assert (np.mean(b), np.std(b)) == pytest.approx((np.mean(DEMIRAY), np.ptp(DEMIRAY) / np.sqrt(12.0)))
+
+
+def test_what_is_wanted_can_be_reached():
+    random = np.random.default_rng(0)
+    found = [wanted(random, most=4.0) for _ in range(200)]
+    assert 2.5 <= min(found) and max(found) <= 4.0
+    assert max(wanted(random, most=np.inf) for _ in range(200)) > 25.0
+    with pytest.raises(NoTruth, match=r"by 2\.4 only"):
+        wanted(random, most=2.4)
