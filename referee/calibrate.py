@@ -48,8 +48,8 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path) -> 
     useful = [o for o in asked if any(o.holds(row) for row in o.said.tried)]
     if len(useful) < FEWEST:
         raise InputError(
-            f"{diagnoses}: {len(useful)} cases in which something is missing raised an alarm and were asked for what is "
-            f"true; expected {FEWEST} or more"
+            f"{diagnoses}: {len(useful)} cases in which something is missing raised an alarm and had what is true among "
+            f"what was tried; expected {FEWEST} or more"
         )
     ballots = ballots_of(useful)
     found, (low, high) = fit(ballots), intervals(ballots)

@@ -43,9 +43,10 @@ class Detectability:
         return float(np.sqrt(delta @ cho_solve(self._factor, delta)))
 
     def upper(self, change: Change) -> float:
-        """With the declared noise, a rigid motion and the stiffness of each tissue alone, in points alone.
+        """The old measure, which run 1 was drawn and scored by: of points alone.
 
-        What every run before the second was drawn and scored by; nobody can see as well as that.
+        It knows the declared noise, a rigid motion and the stiffness of each tissue. The last two are wider than they
+        are drawn, and neither the wall nor the force is in it: so it is a bound of what points show, not of `d`.
         """
         delta = self._sight.rows(change)[: self._sight.count]
         return float(np.sqrt(delta @ cho_solve(self._upper, delta)))

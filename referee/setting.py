@@ -28,7 +28,7 @@ SHARED, SHARED_LENGTH = 0.4, 0.025
 OVERALL, EACH = 0.25, 0.12
 #: Least and largest standard deviation of its field, and lengths [m] of two kinds of it.
 FIELD, LENGTHS = (0.08, 0.16), ((0.012, 0.018), (0.045, 0.07))
-#: Least and largest Poisson ratio, scale of the noise, and error of registration [m] and [rad] (root mean square length).
+#: Least and largest Poisson ratio and scale of the noise; root mean square error of registration [m] and [rad].
 POISSON, NOISE = (0.46, 0.48), (0.8, 1.25)
 SHIFT, TURN = 0.7e-3, float(np.deg2rad(0.7))
 #: Demiray's exponent; share of the first of two terms of Ogden's law, and both exponents.

@@ -7,13 +7,15 @@ import pytest
 
 from referee.detectability import Detectability
 from referee.draw import wanted
+from referee.effects import Inclusion
 from referee.equilibrium import NoTruth, balance
 from referee.fields import random_field
 from referee.law import Demiray, Ogden
 from referee.sensing import place_sensors
 from referee.setting import BOTH_LAWS, DEMIRAY, FIELD, LENGTHS, OGDEN, draw_setting
 from referee.sight import Change, Sight
-from referee.truth import _cap_force
+from referee.sizing import Wish
+from referee.truth import _cap_force, solve_truth
 from referee.unknowns import stiffness_modes, unknowns_of
 
 
@@ -103,10 +105,22 @@ def test_laws_stand_for_all_that_are_drawn():
     assert (np.mean(b), np.std(b)) == pytest.approx((np.mean(DEMIRAY), np.ptp(DEMIRAY) / np.sqrt(12.0)))
 
 
+@pytest.mark.parametrize("known", [3], indirect=True, ids=["moved"])
+def test_the_recorded_force_is_that_of_tissue_with_the_effect(known):
+    setting, problem, base, _, _ = known
+    # all tissue stiffer alike: a cap that is moved then moves the body as before, with a larger force
+    whole = Inclusion(size=0.5, sign=1, centre=(0.0, 0.0, 0.0), radius=10.0)
+    truth = solve_truth(setting, [Wish(lambda: whole, lambda most: 2.0)])
+    ratio = np.exp(truth.effects[0].size)
+    assert ratio > 1.2
+    np.testing.assert_allclose(truth.force, ratio * _cap_force(problem, base.u), rtol=1e-3)
+    np.testing.assert_allclose(truth.u[0], truth.declared, atol=1e-5)
+
+
 def test_what_is_wanted_can_be_reached():
     random = np.random.default_rng(0)
     found = [wanted(random, most=4.0) for _ in range(200)]
-    assert 2.5 <= min(found) and max(found) <= 4.0
+    assert min(found) >= 2.5 and max(found) <= 4.0
     assert max(wanted(random, most=np.inf) for _ in range(200)) > 25.0
     with pytest.raises(NoTruth, match=r"by 2\.4 only"):
         wanted(random, most=2.4)
