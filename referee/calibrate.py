@@ -48,7 +48,7 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path) -> 
     useful = [o for o in asked if any(o.holds(row) for row in o.said.tried)]
     if len(useful) < FEWEST:
         raise InputError(
-            f"{diagnoses}: {len(useful)} cases in which something is missing raised an alarm and had what is true among "
+            f"{diagnoses}: {len(useful)} cases in which something is missing raised an alarm and had the truth among "
             f"what was tried; expected {FEWEST} or more"
         )
     ballots = ballots_of(useful)
