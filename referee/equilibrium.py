@@ -97,8 +97,9 @@ def _newton(problem: Problem, u: Floats, F: Floats, near: Linear | None, until: 
     response = problem.response(F)
     r = problem.residual(u, F, response)
     size = first = float(np.linalg.norm(r[free]))
-    fits = near is not None and (near.held == problem.held).all()
-    linear = near if fits else linearised(problem, u, response)
+    if near is None or (near.held != problem.held).any():
+        near = linearised(problem, u, response)
+    linear = near
     gained, acting = 0.1, 0.0
     for step in range(_STEPS):
         if time.process_time() > until:

@@ -133,7 +133,7 @@ class Linear:
             x += length * p
             r = r - length * q
             if np.linalg.norm(r, axis=0).max() <= close:
-                return (x * scale).reshape(right.shape)
+                return (x.astype(np.float64) * scale).reshape(right.shape)
             z = self._precondition(r)
             rz, old = _dots(r, z), rz
             p = z + (rz / np.where(old > 0.0, old, 1.0)).astype(np.float32) * p
@@ -141,4 +141,5 @@ class Linear:
 
 
 def _dots(a: Singles, b: Singles) -> Floats:
-    return np.einsum("nk,nk->k", a, b, dtype=np.float64)
+    found: Floats = np.einsum("nk,nk->k", a, b, dtype=np.float64)
+    return found

@@ -51,7 +51,10 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
     }
     for low, high in BINS:
         found[f"best candidate right, {bin_name(low, high)}"] = share(o.top for o in effects if low <= o.d < high)
-    others = {"the old": [(o, o.upper) for o in effects], "tool's own": [(o, o.d_of_tool) for o in effects]}
+    others: dict[str, list[tuple[Outcome, float | None]]] = {
+        "the old": [(o, o.upper) for o in effects],
+        "tool's own": [(o, o.d_of_tool) for o in effects],
+    }
     for measure, by in others.items():
         for low, high in BINS:
             within = (o.top for o, d in by if d is not None and low <= d < high)

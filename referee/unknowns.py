@@ -40,7 +40,8 @@ class Unknowns:
     @property
     def drawn(self) -> list[Change]:
         """With amounts of mean 0 and variance 1, all of them as they are drawn."""
-        together = Change(OVERALL * sum(c.move for c in self.tissues), OVERALL * sum(c.force for c in self.tissues))
+        moves, forces = np.array([c.move for c in self.tissues]), np.array([c.force for c in self.tissues])
+        together = Change(OVERALL * moves.sum(axis=0), OVERALL * forces.sum(axis=0))
         return [together, *(c.times(EACH) for c in self.tissues), *self.others]
 
 
