@@ -7,6 +7,7 @@ were, a rigid error of registration, and the error of the mesh. A cause is credi
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -21,10 +22,13 @@ from warpbrain.estimation.discretisation import Difference, Discretisation
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
-from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanism import Mechanism, Substituting
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
 from warpbrain.physics.mechanisms.compressibility import Compressibility
 from warpbrain.physics.proposal import Proposal
+from warpbrain.simulation.assumed import substituted
+from warpbrain.simulation.model import Material
+from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
 
@@ -136,8 +140,8 @@ def nuisances_at(
         where = sensors.positions[sensors.is_displacement]
         anchors = where[spread_points(where, _ALIKE, 60)]
     families = [
-        Family("tissue", _tissue(at, states, theta) @ prior.factor),
-        Family("stiffness field", at.answers_of_elements(at.element_forces, states.modes)),
+        Family("tissue", tissue_columns(at, states, theta, prior)),
+        Family("stiffness field", field_columns(at, states)),
         Family("compressibility", _law_columns(effects, _other_volume(states))),
         Family("shape of the law", _law_columns(effects, _other_shape())),
         Family("known loads", _known_loads(at)),
@@ -153,18 +157,32 @@ def nuisances_at(
     return Nuisances(tuple(families), mean, anchors, fraction)
 
 
-def _tissue(at: Linearisation, states: States, theta: Floats) -> Floats:
-    """Derivatives (n, p) of what is recorded by the parameters of the tissues."""
+def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
+    """What one standard deviation of each parameter of the tissues changes of what is recorded: (n, p)."""
     system = at.system
     forces = np.zeros((len(theta), system.size, 3))
     for k in range(len(theta)):
         for sign in (-1.0, 1.0):
             beside = theta.copy()
             beside[k] += sign * _STEP
-            system.set_materials(states.parameters.materials(beside))
+            system.set_materials(_materials(system, states, beside))
             forces[k] -= sign * at.internal_forces() / (2.0 * _STEP)
-    system.set_materials(states.parameters.materials(theta))
-    return at.answers(forces)
+    system.set_materials(_materials(system, states, theta))
+    return at.answers(forces) @ prior.factor
+
+
+def _materials(system: System, states: States, theta: Floats) -> Mapping[int, Material]:
+    """Those of `theta`, as the mechanisms that act have them."""
+    found = states.parameters.materials(theta)
+    for mechanism in system.model.mechanisms:
+        if isinstance(mechanism, Substituting):
+            found = substituted(found, mechanism)
+    return found
+
+
+def field_columns(at: Linearisation, states: States) -> Floats:
+    """What one standard deviation of each mode of the stiffness field changes of what is recorded: (n, k)."""
+    return at.answers_of_elements(at.element_forces, states.modes)
 
 
 def _law_columns(effects: Effects, proposals: list[Proposal]) -> Floats:

@@ -16,7 +16,7 @@ from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.mesh_error import mesh_error
-from warpbrain.diagnosis.nuisances import Nuisances
+from warpbrain.diagnosis.nuisances import Nuisances, field_columns, tissue_columns
 from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference, Discretisation
@@ -212,7 +212,7 @@ class Refitting:
             state, residual, z, best = beside, left, between, value
         converged = False
         for iteration in range(_ITERATIONS):
-            if iteration == anew and effects:
+            if iteration == anew:
                 columns = self._columns_at(state, effects, z[q:], columns)
             white = solve_triangular(self.factor, np.column_stack([residual, columns]), lower=True) / kappa
             gradient = white[:, 1:].T @ white[:, 0] - z
@@ -294,24 +294,31 @@ class Refitting:
         return state, residual
 
     def _columns_at(self, state: SolvedState, effects: tuple[Effect, ...], z: Floats, columns: Floats) -> Floats:
-        """Columns with those of the mechanisms made anew where they act."""
+        """Columns with those of tissue, field and mechanisms made anew where they are now."""
         q = self._U.shape[1]
-        if all(effect.proposed.is_there_or_not for effect in effects):
-            return columns
-        place, found = 0, [columns[:, :q]]
+        columns = columns.copy()
+        if any(effect.about is not None for effect in effects):
+            # what was solved over time has no one state to be linear about
+            at = None
+        else:
+            try:
+                at = Linearisation(state.system, state.u, state.reactions, state.sensors)
+            except SolveError:
+                return columns
+            columns[:, self._tissue] = tissue_columns(at, self.states, state.hypothesis.theta, self.prior)
+            columns[:, self._field] = field_columns(at, self.states)
+        place = 0
         for effect in effects:
             size = effect.columns.shape[1]
+            own = slice(q + place, q + place + size)
             here = effect.coefficients(z[place : place + size])
-            if effect.proposed.is_there_or_not:
-                found.append(effect.columns)
-            elif effect.about is not None:
-                found.append(effect.about(here))
-            else:
-                anew = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors))
+            if effect.about is not None:
+                columns[:, own] = effect.about(here)
+            elif at is not None and not effect.proposed.is_there_or_not:
                 about = replace(effect.proposed, follows="smooth", start=here)
-                found.append(anew.of([about], effect.proposed.make(here))[0].columns)
+                columns[:, own] = Effects(at).of([about], effect.proposed.make(here))[0].columns
             place += size
-        return np.concatenate(found, axis=1)
+        return columns
 
     def _refit(
         self,
