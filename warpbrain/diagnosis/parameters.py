@@ -83,19 +83,25 @@ def _numbers(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
     return found
 
 
-def smallest_of(effect: Effect, whitened_length: float, wanted: float) -> Smallest:
-    """The size at which an effect has a detectability.
+def smallest_of(effect: Effect, whitened_length: float, seen: float, named: float) -> Smallest:
+    """The sizes at which an effect has two detectabilities.
 
     Parameters
     ----------
     effect : Effect
     whitened_length : float
         Its detectability per standard deviation of its first coefficient (of a switch, or a course: when it is there).
-    wanted : float
+    seen, named : float
+        Detectabilities at which it raises an alarm, and at which it is named; infinite if it never is.
     """
-    factor = wanted / max(whitened_length, 1e-12)
+    size, unit, name = _size_at(effect, seen / max(whitened_length, 1e-12))
+    return Smallest(size, unit, name, _size_at(effect, named / max(whitened_length, 1e-12))[0])
+
+
+def _size_at(effect: Effect, factor: float) -> tuple[float, str, str]:
+    """Size, unit and parameter of an effect that is so many times one standard deviation of its first coefficient."""
     if effect.proposed.is_there_or_not or effect.about is not None:
-        return Smallest(factor, "of being there", "share")
+        return factor, "of being there", "share"
     z = np.zeros(effect.columns.shape[1])
     start = -effect.proposed.mean / effect.proposed.sd if effect.proposed.follows == "proportional" else z
     base = _numbers(effect, start)
@@ -104,8 +110,8 @@ def smallest_of(effect: Effect, whitened_length: float, wanted: float) -> Smalle
     try:
         there = _numbers(effect, z)
     except Exception:  # a mechanism refuses sizes that cannot be
-        return Smallest(float("inf"), "", "")
+        return float("inf"), "", ""
     for name, (value, unit) in there.items():
         if name in base and abs(value - base[name][0]) > 0.0:
-            return Smallest(abs(value - base[name][0]), unit, name)
-    return Smallest(float("inf"), "", "")
+            return (abs(value - base[name][0]) if factor < 1e3 else float("inf")), unit, name
+    return float("inf"), "", ""

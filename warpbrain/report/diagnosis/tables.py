@@ -148,18 +148,3 @@ def aside_table(rows: Rows | None) -> str:
     return table(
         ("recording", "point", "place, RAS [mm]"), found, caption="Set aside: they contradict what surrounds them"
     )
-
-
-def confusion_table(said: dict[str, Any]) -> str:
-    """How often each mechanism would be taken for another with these data; empty if it was not computed."""
-    confusion = said.get("confusion") or {}
-    rows = confusion.get("rows") if isinstance(confusion.get("rows"), dict) else confusion
-    if not rows or not all(isinstance(row, dict) for row in rows.values()):
-        return ""
-    kinds = list(dict.fromkeys(kind for row in rows.values() for kind in row))
-    lines = [[f"<b>{text(true)}</b>", *(_part(row.get(kind)) for kind in kinds)] for true, row in rows.items()]
-    return table(("true, below; said, right", *map(text, kinds)), lines, numbers=range(1, len(kinds) + 1))
-
-
-def _part(value: Any) -> str:
-    return f"{value:.2f}" if isinstance(value, int | float) and value >= 0.005 else ""
