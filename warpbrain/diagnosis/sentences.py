@@ -24,8 +24,8 @@ from warpbrain.diagnosis.verdict import Verdict
 from warpbrain.diagnosis.words import size_in_words, smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
 
-#: A share of virtual cases below this one is hardly ever.
-_SELDOM = 0.05
+#: A share of virtual cases below the first is hardly ever, below the second as good as none.
+_SELDOM, _RARELY = 0.05, 0.01
 
 
 def sentence_of(
@@ -86,11 +86,9 @@ def confusion_sentences(confusion: Confusion) -> tuple[str, str]:
         said += f"; hardly ever: {', '.join(seldom)}"
     wrong = [(share, cause, kind) for cause, row in rows.items() for kind, share in row.items() if kind != cause]
     share, cause, kind = max((one for one in wrong if one[2] in confusion.named), default=(0.0, "", ""))
-    most = (
-        f"at most {_percent(share)} are called by a wrong name ({cause}: {kind})"
-        if share > 0.0
-        else "none would be called by a wrong name"
-    )
+    most = "none is called by a wrong name"
+    if share >= _RARELY:
+        most = f"at most {_percent(share)} are called by a wrong name ({cause}: {kind})"
     return (
         f"{said}.",
         f"Of {confusion.cases} virtual cases of each, {most}; the linear model's own word, and optimistic.",
