@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.alternatives import alternatives_at
 from warpbrain.diagnosis.base import Base, BaseFinder
+from warpbrain.diagnosis.between import between_neighbours
 from warpbrain.diagnosis.calibration import probabilities
 from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
 from warpbrain.diagnosis.evidence import Inner, Stack
@@ -129,12 +130,15 @@ class Diagnosing:
         fits = {}
         for kind in ["none", *chosen]:
             self.listener.stage(f"refit without linearising: {kind}")
-            effects = () if kind == "none" else (candidates.effects[screen.best_effect(candidates, kind)],)
+            number = None if kind == "none" else screen.best_effect(candidates, kind)
+            effects = () if number is None else (candidates.effects[number],)
             if any(effect.proposal is None for effect in effects):
                 continue
             begin = _linear_point(base, candidates, screen, kind, kappa)
+            known = begin[base.nuisances.columns.shape[1] :]
+            between = None if number is None else between_neighbours(candidates, kind, number, known)
             try:
-                fits[kind] = refitting.fit(effects, begin, kappa)
+                fits[kind] = refitting.fit(effects, begin, kappa, between)
             except (SolveError, InputError):
                 continue
         return fits

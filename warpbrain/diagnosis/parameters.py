@@ -27,7 +27,7 @@ def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, .
     weights : (v,) array
         Their probabilities, with the sum 1.
     """
-    numbers = [_numbers(effect, np.zeros(effect.columns.shape[1])) for effect in effects]
+    numbers = [numbers_of(effect, np.zeros(effect.columns.shape[1])) for effect in effects]
     found = []
     for name, (_, unit) in numbers[0].items():
         values = np.array([one[name][0] if name in one else np.nan for one in numbers])
@@ -47,11 +47,11 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
     """
     if effect.proposed.is_there_or_not:
         return ()
-    here = _numbers(effect, z)
+    here = numbers_of(effect, z)
     # a covariance that rounding has left not quite positive is no reason to fail
     spread, along = np.linalg.eigh(covariance)
     factor = along * np.sqrt(np.maximum(spread, 1e-18))
-    beside = [(_numbers(effect, z + 0.1 * column), _numbers(effect, z - 0.1 * column)) for column in factor.T]
+    beside = [(numbers_of(effect, z + 0.1 * column), numbers_of(effect, z - 0.1 * column)) for column in factor.T]
     found = []
     for name, (value, unit) in here.items():
         change = np.array([(up[name][0] - down[name][0]) / 0.2 for up, down in beside if name in up and name in down])
@@ -61,8 +61,8 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
     return tuple(found)
 
 
-def _numbers(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
-    """Numbers of the mechanism at coordinates, with units."""
+def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
+    """Numbers of the mechanism at coordinates (k,), by name, with units."""
     mechanism: Mechanism = effect.proposed.make(effect.coefficients(z))
     found: dict[str, tuple[float, str]] = {}
     if mechanism.ramp:
@@ -104,11 +104,11 @@ def _size_at(effect: Effect, factor: float) -> tuple[float, str, str]:
         return factor, "of being there", "share"
     z = np.zeros(effect.columns.shape[1])
     start = -effect.proposed.mean / effect.proposed.sd if effect.proposed.follows == "proportional" else z
-    base = _numbers(effect, start)
+    base = numbers_of(effect, start)
     z = start.copy()
     z[0] += min(factor, 1e3)
     try:
-        there = _numbers(effect, z)
+        there = numbers_of(effect, z)
     except Exception:  # a mechanism refuses sizes that cannot be
         return float("inf"), "", ""
     for name, (value, unit) in there.items():
