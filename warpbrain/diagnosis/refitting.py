@@ -339,13 +339,16 @@ class Refitting:
         # of the size of the mechanism these say something, of its evidence nothing
         W = model.whitened(np.column_stack([columns, *self._unsure(z[q:])])) / kappa
         covariance = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
+        # where the amount would go with them, or had the search not ended, is not where it is said to be
+        away = (covariance @ (W.T @ white) / kappa)[: len(z)] - z
         coefficients: list[Floats] = []
         covariances: list[Floats] = []
         at = q
         for effect in effects:
             size = effect.columns.shape[1]
             coefficients.append(z[at : at + size])
-            covariances.append(covariance[at : at + size, at : at + size])
+            own = slice(at, at + size)
+            covariances.append(covariance[own, own] + np.outer(away[own], away[own]))
             at += size
         return Refit(
             effects,
