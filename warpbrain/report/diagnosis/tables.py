@@ -129,8 +129,13 @@ def smallest_table(said: dict[str, Any]) -> str:
     rows = []
     for kind, one in said["smallest_detectable"].items():
         size = "" if one["size"] is None else f"{one['parameter']} {one['size']:.2g} {one['unit']}"
-        rows.append([text(kind), text(one.get("says", size))])
-    return table(("mechanism", "is seen"), rows)
+        named = one.get("named_from")
+        # of what is there or not there is no size
+        of_size = named is not None and one["unit"] != "of being there"
+        rows.append([text(kind), text(one.get("says", size)), text(f"{named:.2g} {one['unit']}") if of_size else ""])
+    if not any(row[2] for row in rows):
+        return table(("mechanism", "is seen"), [row[:2] for row in rows])
+    return table(("mechanism", "is seen", "half are named from"), rows)
 
 
 def aside_table(rows: Rows | None) -> str:
