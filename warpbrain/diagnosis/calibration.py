@@ -6,9 +6,12 @@ by a temperature, and the unknown has an offset; both are of calibration cases t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
 
 #: Of the calibration set: temperature, and what is added to the log evidence of the unknown.
 TEMPERATURE, UNKNOWN_OFFSET = 1.5, -1.0
@@ -26,9 +29,15 @@ def probabilities(log_evidence: Mapping[str, float], alternatives: frozenset[str
     alternatives : frozenset of str
         Kinds that are no physics.
     """
+    kinds = tuple(log_evidence)
+    weights = weighed(kinds, np.array([[log_evidence[kind]] for kind in kinds]), alternatives)
+    return dict(zip(kinds, weights[:, 0].tolist(), strict=True))
+
+
+def weighed(kinds: Sequence[str], log_evidence: Floats, alternatives: frozenset[str]) -> Floats:
+    """The same of many cases: from log evidence (kinds, b) to probabilities (kinds, b)."""
     from scipy.special import softmax
 
-    kinds = list(log_evidence)
     offset = dict.fromkeys(alternatives, ALTERNATIVE_OFFSET) | {"unknown": UNKNOWN_OFFSET}
-    weights = softmax(np.array([(log_evidence[k] + offset.get(k, 0.0)) / TEMPERATURE for k in kinds]))
-    return dict(zip(kinds, weights.tolist(), strict=True))
+    offsets = np.array([[offset.get(kind, 0.0)] for kind in kinds])
+    return np.asarray(softmax((log_evidence + offsets) / TEMPERATURE, axis=0))

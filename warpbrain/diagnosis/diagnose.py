@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.alternatives import alternatives_at
 from warpbrain.diagnosis.base import Base, BaseFinder
+from warpbrain.diagnosis.between import between_neighbours
 from warpbrain.diagnosis.calibration import probabilities
 from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
 from warpbrain.diagnosis.evidence import Inner, Stack
@@ -25,11 +26,12 @@ from warpbrain.diagnosis.onset import onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions, Listener
 from warpbrain.diagnosis.parameters import SEEN, scanned_values, smallest_of, values_of
 from warpbrain.diagnosis.refitting import Refit, Refitting
-from warpbrain.diagnosis.result import NOT_PHYSICS, NOTHING, Diagnosis, Fit, Ranked, Smallest
+from warpbrain.diagnosis.result import NOT_PHYSICS, NOTHING, Confusion, Diagnosis, Fit, Ranked, Smallest
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening, log_unknown
 from warpbrain.diagnosis.sentences import assumptions_of, sentence_of
 from warpbrain.diagnosis.states import States
 from warpbrain.diagnosis.verdict import Evidence, decide
+from warpbrain.diagnosis.virtual import VirtualCases
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
 
@@ -104,8 +106,12 @@ class Diagnosing:
             )
         with self._timed("refit"):
             fits = self._refits(base, candidates, screen, kappa)
+        self.listener.stage("virtual cases")
+        with self._timed("virtual cases"):
+            draws_of_cases = np.random.default_rng([options.seed, 11])
+            confusion = VirtualCases(screening, kappa, options.alpha, draws_of_cases).confusion()
         with self._timed("held out"):
-            return self._conclude(base, candidates, screening, screen, fits, where, p_value, kappa, rng)
+            return self._conclude(base, candidates, screening, screen, fits, where, p_value, kappa, rng, confusion)
 
     def _candidates(self, base: Base) -> Candidates:
         alternatives = alternatives_at(base.at.sensors, base.nuisances)
@@ -124,12 +130,15 @@ class Diagnosing:
         fits = {}
         for kind in ["none", *chosen]:
             self.listener.stage(f"refit without linearising: {kind}")
-            effects = () if kind == "none" else (candidates.effects[screen.best_effect(candidates, kind)],)
+            number = None if kind == "none" else screen.best_effect(candidates, kind)
+            effects = () if number is None else (candidates.effects[number],)
             if any(effect.proposal is None for effect in effects):
                 continue
             begin = _linear_point(base, candidates, screen, kind, kappa)
+            known = begin[base.nuisances.columns.shape[1] :]
+            between = None if number is None else between_neighbours(candidates, kind, number, known)
             try:
-                fits[kind] = refitting.fit(effects, begin, kappa)
+                fits[kind] = refitting.fit(effects, begin, kappa, between)
             except (SolveError, InputError):
                 continue
         return fits
@@ -145,6 +154,7 @@ class Diagnosing:
         p_value: float,
         kappa: float,
         rng: np.random.Generator,
+        confusion: Confusion,
     ) -> Diagnosis:
         options = self.options
         sensors = base.at.sensors
@@ -192,7 +202,7 @@ class Diagnosing:
         named = tuple(r for r in ranking if r.kind in verdict.kinds) if "named" in verdict.verdict else ()
         explained = self._explained(fits, named)
         fit = self._fit(base, fits, without[way], predicted, named, gain, placebo_p, band, ceiling)
-        smallest = self._smallest(base, candidates, screening.stack, kappa)
+        smallest = self._smallest(base, candidates, screening.stack, kappa, confusion)
         physical = [r.kind for r in ranking if r.physics and r.kind in candidates.of_kind][:2]
         measurements = next_measurements(base, candidates, screen, physical, fits, kappa)
         return Diagnosis(
@@ -211,7 +221,7 @@ class Diagnosing:
             {"none": without[way], **predicted},
             explained,
             smallest,
-            {},
+            confusion,
             measurements,
             fit,
             assumptions_of(self.case, base, kappa),
@@ -365,7 +375,9 @@ class Diagnosing:
             found.append(float(np.sqrt(np.mean(np.concatenate([values.ravel() for values in lengths]) ** 2))))
         return tuple(found)
 
-    def _smallest(self, base: Base, candidates: Candidates, stack: Stack, kappa: float) -> dict[str, Smallest]:
+    def _smallest(
+        self, base: Base, candidates: Candidates, stack: Stack, kappa: float, confusion: Confusion
+    ) -> dict[str, Smallest]:
         """Of each kind, at the middle one of its places by how well the data see it."""
         found = {}
         for kind, numbers in candidates.of_kind.items():
@@ -377,7 +389,11 @@ class Diagnosing:
                 switch = effect.proposed.is_there_or_not or effect.proposed.mean.any()
                 lengths.append(base.explanation.detectability(stack.of(number)[:, 0 if switch else 1], kappa))
             middle = int(np.argsort(lengths)[len(lengths) // 2])
-            found[kind] = smallest_of(candidates.effects[numbers[middle]], lengths[middle], SEEN)
+            seen = confusion.needed(confusion.alarm, kind, 0.9)
+            named = confusion.needed(confusion.named, kind, 0.5)
+            # of what no plausible size makes so visible it is said how large it would have to be
+            seen = seen if np.isfinite(seen) else SEEN
+            found[kind] = smallest_of(candidates.effects[numbers[middle]], lengths[middle], seen, named)
         return found
 
     @contextmanager

@@ -108,11 +108,11 @@ class Explanation:
         rr, Vr = np.sum(residuals**2, axis=0), self._WV.T @ residuals
         return np.array([self._log_base(rr, Vr, k) for k in kappas])
 
-    def log_marginal(self, residuals: Floats) -> Floats:
+    def log_marginal(self, residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
         """The same averaged over the factor on the noise: (b,)."""
         from scipy.special import logsumexp
 
-        return np.asarray(logsumexp(self.log_none(residuals) + kappa_log_prior()[:, None], axis=0))
+        return np.asarray(logsumexp(self.log_none(residuals, kappas) + kappa_log_prior(kappas)[:, None], axis=0))
 
     def _log_base(self, rr: Floats, Vr: Floats, kappa: float) -> Floats:
         k2 = kappa**2
@@ -129,6 +129,11 @@ class Explanation:
         """`S^-1` of whitened rows (n, b): what is left of them after noise and nuisances, whitened."""
         k2 = kappa**2
         return np.asarray((rows - self._WV @ ((self._WV.T @ rows) / (k2 + self._D)[:, None])) / k2)
+
+    def standardised(self, rows: Floats, kappa: float) -> Floats:
+        """`S^-1/2` of whitened rows (n, b): independent and of variance one where nothing is missing."""
+        root = np.sqrt(kappa**2 + self._D)
+        return np.asarray((rows - self._WV @ ((self._WV.T @ rows) / (root * (root + kappa))[:, None])) / kappa)
 
     def detectability(self, whitened: Floats, kappa: float = 1.0) -> float:
         """`d = sqrt(delta^T S^-1 delta)` of a change of the sensors (n,), whitened."""

@@ -52,7 +52,6 @@ class Linearisation:
         self.reactions = reactions
         self.sensors = sensors
         self._factorise()
-        self.compliance = self.compliance_of(sensors.by_displacement, sensors.by_reactions)
 
     def _factorise(self) -> None:
         from scipy.sparse.linalg import splu
@@ -76,8 +75,13 @@ class Linearisation:
         """The same state with other sensors; nothing is factorised again."""
         other = copy.copy(self)
         other.sensors = sensors
-        other.compliance = self.compliance_of(sensors.by_displacement, sensors.by_reactions)
+        other.__dict__.pop("compliance", None)
         return other
+
+    @cached_property
+    def compliance(self) -> Floats:
+        """`A` (n, 3 N): made when it is needed, since few forces are answered sooner without it."""
+        return self.compliance_of(self.sensors.by_displacement, self.sensors.by_reactions)
 
     def compliance_of(self, by_displacement: Any, by_reactions: Any) -> Floats:
         """`A` (n, 3 N) of sensors with these derivatives, SciPy CSR (n, 3 N)."""
@@ -105,7 +109,7 @@ class Linearisation:
         lifts : bool
         """
         from scipy.sparse import coo_matrix
-        from scipy.sparse.linalg import LinearOperator, cg
+        from scipy.sparse.linalg import LinearOperator, cg, splu
 
         members = np.flatnonzero(patch)
         normals = vertex_normals(self.system.model.mesh)
@@ -118,32 +122,40 @@ class Linearisation:
         columns = (3 * kept[:, None, None] + np.arange(3)[None] + np.zeros((1, 3, 1), dtype=int)).ravel()
         values = (stiff * along[:, :, None] * along[:, None, :]).ravel()
         wall = coo_matrix((values, (rows, columns)), self.stiffness.shape).tocsr()
-        free = self._free.copy()
-        free.reshape(-1, 3)[members] = True
-        load = np.zeros(len(free))
-        load.reshape(-1, 3)[members] = -self.reactions[members]
-        K = (self.stiffness + wall)[free][:, free].tocsr()
-        # what was free before is solved with the factors that there are; few iterations do for the rest
-        inner = self._free[free]
-        diagonal = K.diagonal()
+        let_go = np.zeros(len(self._free), dtype=bool)
+        let_go.reshape(-1, 3)[members] = True
+        own = (self.stiffness + wall)[let_go][:, let_go].tocsc()
+        towards = self.stiffness[self._free][:, let_go].tocsr()
 
-        def precondition(r: Floats) -> Floats:
-            z = np.asarray(r / diagonal)
-            z[inner] = self._factors.solve(np.ascontiguousarray(r[inner]))
-            return z
+        def inner(du_let_go: Floats) -> Floats:
+            return np.asarray(-self._factors.solve(np.asarray(towards @ du_let_go)))
 
-        du = np.zeros(len(free))
-        approximate = LinearOperator(K.shape, precondition)
-        du[free], info = cg(K, load[free], rtol=_RELEASE, maxiter=300, M=approximate)
+        # what was free before is eliminated with the factors that there are; few iterations do for the rest
+        shape = own.shape
+        eliminated = LinearOperator(shape, lambda x: own @ x + towards.T @ inner(x))
+        approximate = LinearOperator(shape, splu(own).solve)
+        found, info = cg(eliminated, -self.reactions[members].ravel(), rtol=_RELEASE, maxiter=300, M=approximate)
         if info:
             raise SolveError(f"letting go of {len(members)} nodes: conjugate gradients did not converge")
-        dR = np.where(free, 0.0, self.stiffness @ du)
+        du = np.zeros(len(self._free))
+        du[let_go], du[self._free] = found, inner(found)
+        dR = np.where(self._free | let_go, 0.0, self.stiffness @ du)
         return self.sensors.answer(du, dR)
 
     def answers(self, forces: Floats) -> Floats:
         """What nodal forces (..., N, 3) [N] change of what is recorded: (n, ...)."""
-        flat = np.asarray(forces).reshape(-1, self.compliance.shape[1])
-        return np.asarray(self.compliance @ flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
+        flat = np.asarray(forces).reshape(-1, len(self._free))
+        return self._answers(flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
+
+    def _answers(self, forces: Any) -> Floats:
+        """What forces (3 N, k) change: by the compliance, or by equilibria if that is fewer of them."""
+        count = forces.shape[1]
+        if "compliance" in self.__dict__ or count >= len(self.sensors):
+            return np.asarray(self.compliance @ forces)
+        du = np.zeros((len(self._free), count))
+        du[self._free] = self._factors.solve(np.ascontiguousarray(forces[self._free]))
+        dR = np.where(self._free[:, None], 0.0, self.stiffness @ du - forces)
+        return np.asarray(self.sensors.by_displacement @ du + self.sensors.by_reactions @ dR)
 
     def answers_of_elements(self, element_forces: Floats, weights: Floats) -> Floats:
         """What internal forces of elements (m, 4, 3) [N], times weights (m, k), change: (n, k)."""
@@ -153,8 +165,8 @@ class Linearisation:
         elements = len(nodes)
         rows = (3 * nodes[:, :, None] + np.arange(3)).ravel()
         columns = np.repeat(np.arange(elements), 12)
-        gather: Any = csr_matrix((element_forces.ravel(), (rows, columns)), (self.compliance.shape[1], elements))
-        return np.asarray(-(self.compliance @ np.asarray(gather @ weights)))
+        gather: Any = csr_matrix((element_forces.ravel(), (rows, columns)), (len(self._free), elements))
+        return -self._answers(np.asarray(gather @ weights))
 
     @cached_property
     def element_forces(self) -> Floats:

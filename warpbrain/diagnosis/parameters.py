@@ -27,7 +27,7 @@ def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, .
     weights : (v,) array
         Their probabilities, with the sum 1.
     """
-    numbers = [_numbers(effect, np.zeros(effect.columns.shape[1])) for effect in effects]
+    numbers = [numbers_of(effect, np.zeros(effect.columns.shape[1])) for effect in effects]
     found = []
     for name, (_, unit) in numbers[0].items():
         values = np.array([one[name][0] if name in one else np.nan for one in numbers])
@@ -47,11 +47,11 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
     """
     if effect.proposed.is_there_or_not:
         return ()
-    here = _numbers(effect, z)
+    here = numbers_of(effect, z)
     # a covariance that rounding has left not quite positive is no reason to fail
     spread, along = np.linalg.eigh(covariance)
     factor = along * np.sqrt(np.maximum(spread, 1e-18))
-    beside = [(_numbers(effect, z + 0.1 * column), _numbers(effect, z - 0.1 * column)) for column in factor.T]
+    beside = [(numbers_of(effect, z + 0.1 * column), numbers_of(effect, z - 0.1 * column)) for column in factor.T]
     found = []
     for name, (value, unit) in here.items():
         change = np.array([(up[name][0] - down[name][0]) / 0.2 for up, down in beside if name in up and name in down])
@@ -61,8 +61,8 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
     return tuple(found)
 
 
-def _numbers(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
-    """Numbers of the mechanism at coordinates, with units."""
+def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
+    """Numbers of the mechanism at coordinates (k,), by name, with units."""
     mechanism: Mechanism = effect.proposed.make(effect.coefficients(z))
     found: dict[str, tuple[float, str]] = {}
     if mechanism.ramp:
@@ -83,29 +83,35 @@ def _numbers(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
     return found
 
 
-def smallest_of(effect: Effect, whitened_length: float, wanted: float) -> Smallest:
-    """The size at which an effect has a detectability.
+def smallest_of(effect: Effect, whitened_length: float, seen: float, named: float) -> Smallest:
+    """The sizes at which an effect has two detectabilities.
 
     Parameters
     ----------
     effect : Effect
     whitened_length : float
         Its detectability per standard deviation of its first coefficient (of a switch, or a course: when it is there).
-    wanted : float
+    seen, named : float
+        Detectabilities at which it raises an alarm, and at which it is named; infinite if it never is.
     """
-    factor = wanted / max(whitened_length, 1e-12)
+    size, unit, name = _size_at(effect, seen / max(whitened_length, 1e-12))
+    return Smallest(size, unit, name, _size_at(effect, named / max(whitened_length, 1e-12))[0])
+
+
+def _size_at(effect: Effect, factor: float) -> tuple[float, str, str]:
+    """Size, unit and parameter of an effect that is so many times one standard deviation of its first coefficient."""
     if effect.proposed.is_there_or_not or effect.about is not None:
-        return Smallest(factor, "of being there", "share")
+        return factor, "of being there", "share"
     z = np.zeros(effect.columns.shape[1])
     start = -effect.proposed.mean / effect.proposed.sd if effect.proposed.follows == "proportional" else z
-    base = _numbers(effect, start)
+    base = numbers_of(effect, start)
     z = start.copy()
     z[0] += min(factor, 1e3)
     try:
-        there = _numbers(effect, z)
+        there = numbers_of(effect, z)
     except Exception:  # a mechanism refuses sizes that cannot be
-        return Smallest(float("inf"), "", "")
+        return float("inf"), "", ""
     for name, (value, unit) in there.items():
         if name in base and abs(value - base[name][0]) > 0.0:
-            return Smallest(abs(value - base[name][0]), unit, name)
-    return Smallest(float("inf"), "", "")
+            return (abs(value - base[name][0]) if factor < 1e3 else float("inf")), unit, name
+    return float("inf"), "", ""

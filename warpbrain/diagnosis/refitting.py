@@ -29,6 +29,9 @@ _ITERATIONS, _HALVINGS = 5, 4
 _SHORT = 0.03
 #: How far [standard deviations] coordinates of tissue and field may go.
 _FARTHEST = 3.0
+#: Standard deviation of the mesh's error that belongs to a mechanism, as a part of what is corrected for. On meshes
+#: that lock it is as large as the effect itself: far from where the power is known with which it falls.
+_UNSURE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +125,7 @@ class Refitting:
         self.states, self.prior, self.nuisances, self.factor = states, prior, nuisances, factor
         self.start, self.difference = start, difference
         self._share: _Share | None = None
+        self._between: Floats | None = None
         self._U = nuisances.columns
         self._tissue, self._field = nuisances.part("tissue"), nuisances.part("stiffness field")
         self._linear = np.ones(self._U.shape[1], dtype=bool)
@@ -134,7 +138,9 @@ class Refitting:
         found[self._field] = hypothesis.field
         return found
 
-    def fit(self, effects: tuple[Effect, ...], begin: Floats, kappa: float = 1.0) -> Refit:
+    def fit(
+        self, effects: tuple[Effect, ...], begin: Floats, kappa: float = 1.0, between: Floats | None = None
+    ) -> Refit:
         """Fit one.
 
         Parameters
@@ -144,13 +150,15 @@ class Refitting:
         begin : (q + k,) array
             Coordinates to begin with, as screening has them.
         kappa : float
+        between : (n, k) array, optional
+            What is not known of the first effect between neighbours of its scan, one standard deviation each.
 
         Raises
         ------
         SolveError
             If there is no equilibrium near the beginning.
         """
-        self._share = None
+        self._share, self._between = None, between
         columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
         found = self._descend(effects, self._limited(begin), columns, kappa, self.start, 1)
         if self.difference is None or not effects:
@@ -335,15 +343,19 @@ class Refitting:
         white = model.whitened(linear)
         log_evidence = float(model.log_marginal(white[:, None])[0])
         kappa = model.best_kappa(white)
-        W = model.whitened(columns) / kappa
-        covariance = np.asarray(np.linalg.inv(np.eye(len(z)) + W.T @ W), dtype=np.float64)
+        # of the size of the mechanism these say something, of its evidence nothing
+        W = model.whitened(np.column_stack([columns, *self._unsure(z[q:])])) / kappa
+        covariance = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
+        # where the amount would go with them, or had the search not ended, is not where it is said to be
+        away = (covariance @ (W.T @ white) / kappa)[: len(z)] - z
         coefficients: list[Floats] = []
         covariances: list[Floats] = []
         at = q
         for effect in effects:
             size = effect.columns.shape[1]
             coefficients.append(z[at : at + size])
-            covariances.append(covariance[at : at + size, at : at + size])
+            own = slice(at, at + size)
+            covariances.append(covariance[own, own] + np.outer(away[own], away[own]))
             at += size
         return Refit(
             effects,
@@ -358,3 +370,11 @@ class Refitting:
             kappa,
             converged,
         )
+
+    def _unsure(self, z: Floats) -> list[Floats]:
+        """Columns (n, k) of what is not known of a mechanism beside its coefficients: the mesh's share, the scan."""
+        found = [] if self._between is None else [self._between]
+        if self._share is not None:
+            size = self._share.constant + float(self._share.along @ z[: len(self._share.along)])
+            found.append(_UNSURE * size * self._share.answer[:, None])
+        return found

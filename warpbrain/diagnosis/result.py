@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,8 @@ NOTHING, NAMED, GROUP, NAMED_AND_REST, UNKNOWN, NOT_PHYSICS, CANNOT_SAY = VERDIC
     "not physics",
     "cannot say",
 )
+#: Of a virtual case: a group that holds the cause, and one that does not.
+WITH_IT, WITHOUT_IT = "group with it", "group without it"
 
 
 @dataclass(frozen=True)
@@ -107,15 +109,54 @@ class Smallest:
     Attributes
     ----------
     size : float
-        In the unit.
+        In the unit: nine of ten raise an alarm.
     unit : str
     name : str
         Of the parameter.
+    named : float
+        The size of which half would be named; infinite if none would.
     """
 
     size: float
     unit: str
     name: str
+    named: float = float("inf")
+
+
+@dataclass(frozen=True, eq=False)
+class Confusion:
+    """What would be said of virtual cases of the linear model.
+
+    Attributes
+    ----------
+    cases : int
+        Of each cause.
+    rows : dict of str to dict of str to float
+        By cause, the share of its cases of which each thing is said.
+    sizes : tuple of float
+        Detectabilities `d`.
+    alarm, named : dict of str to tuple of (float or None)
+        By mechanism, the share with an alarm, and named rightly, at each of these; None where a mechanism would have
+        to be implausibly large.
+    """
+
+    cases: int
+    rows: dict[str, dict[str, float]]
+    sizes: tuple[float, ...]
+    alarm: dict[str, tuple[float | None, ...]]
+    named: dict[str, tuple[float | None, ...]]
+
+    def needed(self, shares: Mapping[str, Sequence[float | None]], kind: str, part: float) -> float:
+        """Detectability from which on a share, `alarm` or `named`, of a mechanism is so large; infinite if never."""
+        known = [(d, share) for d, share in zip(self.sizes, shares[kind], strict=True) if share is not None]
+        sizes, found = np.array([0.0, *(d for d, _ in known)]), np.array([0.0, *(share for _, share in known)])
+        # a larger one is not less visible: what falls with size is the chance of few draws
+        below = np.maximum.accumulate(found)
+        if below[-1] < part:
+            return float("inf")
+        above = int(np.argmax(below >= part))
+        between = (part - below[above - 1]) / (below[above] - below[above - 1])
+        return float(sizes[above - 1] + between * (sizes[above] - sizes[above - 1]))
 
 
 @dataclass(frozen=True)
@@ -178,7 +219,7 @@ class Diagnosis:
     explained : Case or None
         The case with what was named, ready to run.
     smallest : dict of str to Smallest
-    confusion : dict
+    confusion : Confusion or None
     next_measurement : tuple of Measurement
     fit : Fit
     assumptions, remarks : tuple of str
@@ -200,7 +241,7 @@ class Diagnosis:
     held_out: dict[str, Predicted]
     explained: Case | None
     smallest: dict[str, Smallest]
-    confusion: dict[str, Any]
+    confusion: Confusion | None
     next_measurement: tuple[Measurement, ...]
     fit: Fit
     assumptions: tuple[str, ...]

@@ -6,6 +6,7 @@ the unknown: any smooth force.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.evidence import Explanation, Stack, kappa_log_prior
+from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Stack, kappa_log_prior
 
 Floats = NDArray[np.float64]
 
@@ -70,14 +71,26 @@ class Screening:
         self.explanation = explanation
         self.candidates = candidates
         self.stack: Stack = explanation.stack(candidates.effects)
+        self.forces = flexible
         self.flexible = [explanation.with_more(columns) for columns in flexible]
+        self._kappas = KAPPAS
+
+    def standardised(self, kappa: float) -> Screening:
+        """The same for residuals `S^-1/2 r`, in which noise and nuisances are of variance one: the factor is known."""
+        found, known = copy.copy(self), self.explanation
+        found.explanation = Explanation(np.eye(known.size), np.zeros((known.size, 0)))
+        found.stack = Stack(known.standardised(self.stack.columns, kappa), self.stack.first)
+        found.forces = [known.standardised(known.whitened(columns), kappa) for columns in self.forces]
+        found.flexible = [found.explanation.with_more(columns) for columns in found.forces]
+        found._kappas = np.ones(1)
+        return found
 
     def run(self, residuals: Floats) -> Screen:
         """Evidence for whitened residuals (n, b)."""
-        none = self.explanation.log_marginal(residuals)
-        places = log_places(self.explanation, self.stack, residuals) - none
+        none = self.explanation.log_marginal(residuals, self._kappas)
+        places = log_places(self.explanation, self.stack, residuals, self._kappas) - none
         by_kind = self._by_kind(places)
-        unknown = log_unknown(self.flexible, residuals) - none
+        unknown = log_unknown(self.flexible, residuals, self._kappas) - none
         return Screen((*self.candidates.kinds, UNKNOWN), none, np.vstack([by_kind, unknown]), places)
 
     def _by_kind(self, places: Floats) -> Floats:
@@ -87,18 +100,18 @@ class Screening:
         return np.array(rows).reshape(len(rows), places.shape[1])
 
 
-def log_places(explanation: Explanation, stack: Stack, residuals: Floats) -> Floats:
+def log_places(explanation: Explanation, stack: Stack, residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
     """Log density (v, b) of whitened residuals with each effect."""
     from scipy.special import logsumexp
 
-    base = explanation.log_none(residuals)[:, None, :]
-    factors = explanation.log_factors(stack, residuals)
-    return np.asarray(logsumexp(base + factors + kappa_log_prior()[:, None, None], axis=0))
+    base = explanation.log_none(residuals, kappas)[:, None, :]
+    factors = explanation.log_factors(stack, residuals, kappas)
+    return np.asarray(logsumexp(base + factors + kappa_log_prior(kappas)[:, None, None], axis=0))
 
 
-def log_unknown(flexible: Sequence[Explanation], residuals: Floats) -> Floats:
+def log_unknown(flexible: Sequence[Explanation], residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
     """Log density (b,) of whitened residuals with a force of any of some lengths and sizes, all alike likely."""
     from scipy.special import logsumexp
 
-    found = [explanation.log_marginal(residuals) for explanation in flexible]
+    found = [explanation.log_marginal(residuals, kappas) for explanation in flexible]
     return np.asarray(logsumexp(np.array(found), axis=0) - np.log(len(found)))

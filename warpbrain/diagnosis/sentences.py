@@ -15,6 +15,7 @@ from warpbrain.diagnosis.result import (
     NOT_PHYSICS,
     NOTHING,
     UNKNOWN,
+    Confusion,
     Fit,
     Ranked,
     Smallest,
@@ -22,6 +23,9 @@ from warpbrain.diagnosis.result import (
 from warpbrain.diagnosis.verdict import Verdict
 from warpbrain.diagnosis.words import size_in_words, smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
+
+#: A share of virtual cases below the first is hardly ever, below the second as good as none.
+_SELDOM, _RARELY = 0.05, 0.01
 
 
 def sentence_of(
@@ -69,6 +73,26 @@ def effect_sentence(ranked: Ranked, gravity_axis: tuple[float, float, float] | N
     if sizes:
         found.append(f": {sizes}")
     return f"{''.join(found)}.{_where(ranked)}"
+
+
+def confusion_sentences(confusion: Confusion) -> tuple[str, str]:
+    """What virtual cases say: how often each mechanism would be named, and what it would be taken for."""
+    rows = confusion.rows
+    named = sorted(((rows[kind].get(kind, 0.0), kind) for kind in confusion.named), key=lambda one: (-one[0], one[1]))
+    often = [f"{kind} {_percent(share)}" for share, kind in named if share >= _SELDOM]
+    seldom = [kind for share, kind in named if share < _SELDOM]
+    said = f"With these recordings, of usual size would be named: {', '.join(often) or 'nothing'}"
+    if seldom:
+        said += f"; hardly ever: {', '.join(seldom)}"
+    wrong = [(share, cause, kind) for cause, row in rows.items() for kind, share in row.items() if kind != cause]
+    share, cause, kind = max((one for one in wrong if one[2] in confusion.named), default=(0.0, "", ""))
+    most = "none is called by a wrong name"
+    if share >= _RARELY:
+        most = f"at most {_percent(share)} are called by a wrong name ({cause}: {kind})"
+    return (
+        f"{said}.",
+        f"Of {confusion.cases} virtual cases of each, {most}; the linear model's own word, and optimistic.",
+    )
 
 
 def _said(ranked: Ranked) -> str:

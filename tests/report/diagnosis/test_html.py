@@ -50,7 +50,7 @@ def test_the_verdict_is_on_top(diagnosed):
 def test_every_picture_says_what_it_shows(diagnosed):
     page = (diagnosed / "report.html").read_text(encoding="utf-8")
     alternatives = re.findall(r'<img src="data:image/png;base64,[^"]*" width="\d+" alt="([^"]*)"', page)
-    assert len(alternatives) == page.count("<img") == 5 and all(len(text) > 20 for text in alternatives)
+    assert len(alternatives) == page.count("<img") == 7 and all(len(text) > 20 for text in alternatives)
 
 
 @pytest.mark.parametrize("verdict", [v for v in VERDICTS if v != "named"])

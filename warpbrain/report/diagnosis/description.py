@@ -6,8 +6,8 @@ from typing import Any
 
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.options import DiagnosisOptions
-from warpbrain.diagnosis.result import Diagnosis, Ranked, Value
-from warpbrain.diagnosis.sentences import effect_sentence
+from warpbrain.diagnosis.result import Confusion, Diagnosis, Ranked, Value
+from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence
 from warpbrain.diagnosis.words import smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.report.fingerprints import fingerprints
@@ -35,11 +35,12 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
                 "size": one.size,
                 "unit": one.unit,
                 "parameter": one.name,
+                "named_from": one.named,
                 "says": smallest_in_words(kind, one),
             }
             for kind, one in found.smallest.items()
         },
-        "confusion": found.confusion,
+        "confusion": _confusion(found.confusion),
         "fit": _fit(found),
         "map": {
             "threshold": found.map.threshold,
@@ -65,6 +66,19 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
         "equilibria": found.base.states.solves,
         "device": device,
         "versions": machine(),
+    }
+
+
+def _confusion(confusion: Confusion | None) -> dict[str, Any]:
+    if confusion is None:
+        return {}
+    return {
+        "says": list(confusion_sentences(confusion)),
+        "cases": confusion.cases,
+        "rows": confusion.rows,
+        "detectability": list(confusion.sizes),
+        "alarm": confusion.alarm,
+        "named": confusion.named,
     }
 
 

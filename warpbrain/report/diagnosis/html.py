@@ -9,6 +9,7 @@ from warpbrain.atomic import whole_file
 from warpbrain.diagnosis.result import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
 from warpbrain.report.diagnosis.figures.agreement import agreement_figure
 from warpbrain.report.diagnosis.figures.candidates import candidates_figure
+from warpbrain.report.diagnosis.figures.confusion import confusion_figure, visibility_figure
 from warpbrain.report.diagnosis.figures.curves import curves_figure
 from warpbrain.report.diagnosis.figures.held_out import held_out_figure
 from warpbrain.report.diagnosis.figures.map import map_figure
@@ -17,7 +18,6 @@ from warpbrain.report.diagnosis.saved import Saved, read_saved
 from warpbrain.report.diagnosis.tables import (
     aside_table,
     candidates_table,
-    confusion_table,
     fit_table,
     next_table,
     rejected_table,
@@ -77,7 +77,7 @@ def page_of(saved: Saved) -> str:
         _section("What to measure next", _next(said)),
         _section(
             "What these data would have shown",
-            "<p>The smallest effect of each mechanism that would be found, at a middling place.</p>",
+            "<p>The smallest effect that nine of ten times would raise an alarm, at a middling place.</p>",
             smallest_table(said),
         )
         if said["smallest_detectable"]
@@ -188,7 +188,15 @@ def _apart(said: dict[str, Any]) -> str:
         first = f"<p>These data do not tell these apart:</p><ul>{members}</ul>"
     else:
         first = "<p>No few mechanisms share the probability among them.</p>"
-    return _section("What cannot be told apart", first, confusion_table(said), rejected_table(said))
+    return _section("What cannot be told apart", first, _confusion(said), rejected_table(said))
+
+
+def _confusion(said: dict[str, Any]) -> str:
+    confusion = said.get("confusion")
+    if not confusion:
+        return ""
+    sentences = "".join(f"<p>{text(one)}</p>" for one in confusion["says"])
+    return f"<h3>Virtual cases</h3>{sentences}{confusion_figure(confusion)}{visibility_figure(confusion)}"
 
 
 def _next(said: dict[str, Any]) -> str:

@@ -129,8 +129,13 @@ def smallest_table(said: dict[str, Any]) -> str:
     rows = []
     for kind, one in said["smallest_detectable"].items():
         size = "" if one["size"] is None else f"{one['parameter']} {one['size']:.2g} {one['unit']}"
-        rows.append([text(kind), text(one.get("says", size))])
-    return table(("mechanism", "is seen"), rows)
+        named = one.get("named_from")
+        # of what is there or not there is no size
+        of_size = named is not None and one["unit"] != "of being there"
+        rows.append([text(kind), text(one.get("says", size)), text(f"{named:.2g} {one['unit']}") if of_size else ""])
+    if not any(row[2] for row in rows):
+        return table(("mechanism", "is seen"), [row[:2] for row in rows])
+    return table(("mechanism", "is seen", "half are named from"), rows)
 
 
 def aside_table(rows: Rows | None) -> str:
@@ -148,18 +153,3 @@ def aside_table(rows: Rows | None) -> str:
     return table(
         ("recording", "point", "place, RAS [mm]"), found, caption="Set aside: they contradict what surrounds them"
     )
-
-
-def confusion_table(said: dict[str, Any]) -> str:
-    """How often each mechanism would be taken for another with these data; empty if it was not computed."""
-    confusion = said.get("confusion") or {}
-    rows = confusion.get("rows") if isinstance(confusion.get("rows"), dict) else confusion
-    if not rows or not all(isinstance(row, dict) for row in rows.values()):
-        return ""
-    kinds = list(dict.fromkeys(kind for row in rows.values() for kind in row))
-    lines = [[f"<b>{text(true)}</b>", *(_part(row.get(kind)) for kind in kinds)] for true, row in rows.items()]
-    return table(("true, below; said, right", *map(text, kinds)), lines, numbers=range(1, len(kinds) + 1))
-
-
-def _part(value: Any) -> str:
-    return f"{value:.2f}" if isinstance(value, int | float) and value >= 0.005 else ""

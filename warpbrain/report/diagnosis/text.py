@@ -36,6 +36,10 @@ def diagnosis_lines(said: Mapping[str, Any]) -> list[str]:
     if said["next_measurement"]:
         lines += ["", "  what to measure next (expected nats between the two most probable mechanisms):"]
         lines += [f"    {one['expected_nats']:8.1f}  {one['what']}" for one in said["next_measurement"][:5]]
+    if said["confusion"]:
+        lines.append("")
+        for sentence in said["confusion"]["says"]:
+            lines += textwrap.wrap(sentence, _WIDTH, initial_indent="  ", subsequent_indent="    ")
     return lines
 
 

@@ -1,0 +1,50 @@
+"""Small forces at a state: by the compliance, by equilibria, and by a dense solution of the whole."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.mesh import vertex_normals
+
+
+@pytest.fixture(scope="module")
+def at(small_diagnosis) -> Linearisation:
+    return small_diagnosis.base.at
+
+
+def test_few_forces_are_answered_without_the_compliance(at):
+    beside = copy.copy(at)
+    beside.__dict__.pop("compliance", None)
+    forces = np.random.default_rng(0).normal(size=(3, len(at.u), 3))
+    few = beside.answers(forces)
+    assert "compliance" not in beside.__dict__
+    np.testing.assert_allclose(few, np.tensordot(at.compliance, forces.reshape(3, -1), (1, 1)), atol=1e-9 * few.max())
+
+
+def test_what_lets_go_is_what_a_dense_solution_says(at):
+    mesh = at.system.model.mesh
+    held = at.system.model.constrained.all(axis=1)
+    # a corner of what is held, of which the rest stays
+    patch = held & (mesh.points[:, 0] < 0.025)
+    # the block is not loaded: forces that something else holds it with
+    loaded = copy.copy(at)
+    loaded.reactions = np.random.default_rng(1).normal(size=at.u.shape)
+    found = loaded.released(patch, lifts=False)
+    normals = vertex_normals(mesh)[patch]
+    K = at.stiffness.toarray()
+    members = np.flatnonzero(patch)
+    # along the surface only: a frame of two tangents for each node
+    tangents = [np.linalg.svd(n[None])[2][1:] for n in normals]
+    free = np.flatnonzero(~at.system.model.constrained.ravel())
+    frame = np.zeros((len(K), len(free) + 2 * len(members)))
+    frame[free, np.arange(len(free))] = 1.0
+    for k, (node, own) in enumerate(zip(members, tangents, strict=True)):
+        frame[3 * node : 3 * node + 3, len(free) + 2 * k : len(free) + 2 * k + 2] = own.T
+    load = np.zeros(len(K))
+    load.reshape(-1, 3)[members] = -loaded.reactions[members]
+    du = frame @ np.linalg.solve(frame.T @ K @ frame, frame.T @ load)
+    expected = at.sensors.by_displacement @ du
+    # the wall is a stiff spring, not a rigid one
+    assert np.linalg.norm(found - expected) < 0.15 * np.linalg.norm(expected)
