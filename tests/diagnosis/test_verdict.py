@@ -26,7 +26,8 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         "alpha": 0.05,
         "p_value": 0.001,
         "ranking": ranking,
-        "gain": (0.4, 0.2, 0.5),
+        "gain": 12.0,
+        "sure": 5.0,
         "placebo_p": 0.01,
         "adequacy_p": 0.5,
         "size": 1.0,
@@ -43,7 +44,8 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {}, GROUP),
         ({"unknown": 0.8, "gravity": 0.2}, {}, UNKNOWN),
         ({"registration": 0.8, "gravity": 0.2}, {}, NOT_PHYSICS),
-        ({"gravity": 0.97, "pressure": 0.03}, {"gain": (0.1, -0.1, 0.3)}, CANNOT_SAY),
+        ({"gravity": 0.97, "pressure": 0.03}, {"gain": -1.0}, CANNOT_SAY),
+        ({"gravity": 0.97, "pressure": 0.03}, {"sure": -1.0}, CANNOT_SAY),
         ({"gravity": 0.97, "pressure": 0.03}, {"placebo_p": 0.3}, CANNOT_SAY),
         ({"gravity": 0.97, "pressure": 0.03}, {"size": 7.0}, CANNOT_SAY),
     ],
@@ -53,4 +55,4 @@ def test_it_says(chances: Mapping[str, float], known: Mapping[str, object], expe
 
 
 def test_a_name_that_is_kept_back_says_why() -> None:
-    assert "held out" in decide(found({"gravity": 0.99}, gain=(0.0, -0.1, 0.1))).why
+    assert "held out" in decide(found({"gravity": 0.99}, sure=-0.1)).why

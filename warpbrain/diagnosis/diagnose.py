@@ -28,7 +28,7 @@ from warpbrain.diagnosis.result import Diagnosis, Fit, Ranked, Smallest
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening, log_unknown
 from warpbrain.diagnosis.sentences import assumptions_of, sentence_of
 from warpbrain.diagnosis.states import States
-from warpbrain.diagnosis.verdict import Evidence, decide
+from warpbrain.diagnosis.verdict import ERRORS, Evidence, decide
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
 
@@ -38,8 +38,6 @@ Floats = NDArray[np.float64]
 _REFITTED, _BEHIND = 3, 12.0
 #: How many patterns a mechanism that is scanned competes with, and one that is not.
 _TRIES_SCANNED, _TRIES = 12, 2
-#: Width of the interval of the held-out gain that a name needs to be above zero.
-_LIKELY = 0.8
 
 
 class Diagnosing:
@@ -154,36 +152,40 @@ class Diagnosing:
         none = fits.get("none")
         linear, columns = (base.residual, base.nuisances.columns) if none is None else (none.linear, none.columns)
         ways = {kind: scattered if _is_local(fit) else regions for kind, fit in fits.items()}
-        without = {way: way.predict(linear, columns) for way in (regions, scattered)}
-        predicted = {kind: ways[kind].predict(f.linear, f.columns) for kind, f in fits.items() if kind != "none"}
+        loud = kappa if none is None else none.kappa
+        without = {way: way.predict(linear, columns, loud) for way in (regions, scattered)}
+        predicted = {
+            kind: ways[kind].predict(f.linear, f.columns, f.kappa) for kind, f in fits.items() if kind != "none"
+        }
         beside = {kind: without[ways[kind]] for kind in fits}
         ranked = [
-            self._ranked(
-                kind, base, candidates, screen, fits, value, chances[kind], screening.stack, kappa, predicted, beside
-            )
+            self._ranked(kind, base, candidates, screen, fits, value, chances[kind], screening.stack, predicted, beside)
             for kind, value in log_evidence.items()
         ]
         ranking = tuple(sorted(ranked, key=lambda one: -one.probability))
         best = ranking[0].kind if ranking[0].kind in fits else next((r.kind for r in ranking if r.kind in fits), "none")
-        gain = likely = (0.0, 0.0, 0.0)
+        gain, nats, sure = (0.0, 0.0, 0.0), 0.0, 0.0
         placebo_p, adequacy_p, size = 1.0, 1.0, 0.0
         band = None
         way = ways.get(best, regions)
-        ceiling = self._ceiling(base, way, linear, columns)
+        ceiling = self._ceiling(base, way, linear, columns, loud)
         if best != "none" and best in predicted:
             gain = predicted[best].improvement(without[way], rng)
-            likely = predicted[best].improvement(without[way], rng, _LIKELY)
+            own = fits[best]
+            both = [one.predict(own.linear, own.columns, own.kappa).gain(over) for one, over in without.items()]
+            nats = predicted[best].gain(without[way])[0]
+            sure = max(gained - ERRORS * error for gained, error in both)
             scanned = len(candidates.of_kind[best]) > 20
             freedom = fits[best].effects[0].columns.shape[1]
             patterns = placebo(
                 way, linear, columns, base.flexible[-1], freedom,
-                _TRIES_SCANNED if scanned else _TRIES, 4.0 * base.typical_noise, rng,
+                _TRIES_SCANNED if scanned else _TRIES, 4.0 * base.typical_noise, rng, loud,
             )  # fmt: skip
             band = (float(np.quantile(patterns, 0.05)), float(np.quantile(patterns, 0.95)))
             placebo_p = float((1 + np.sum(patterns <= predicted[best].rmse)) / (1 + len(patterns)))
             adequacy_p = self._adequacy(base, fits[best], rng)
             size = float(np.abs(fits[best].coefficients[0]).max())
-        verdict = decide(Evidence(options.alpha, p_value, ranking, likely, placebo_p, adequacy_p, size))
+        verdict = decide(Evidence(options.alpha, p_value, ranking, nats, sure, placebo_p, adequacy_p, size))
         named = tuple(r for r in ranking if r.kind in verdict.kinds) if "named" in verdict.verdict else ()
         explained = self._explained(fits, named)
         fit = self._fit(base, fits, without[way], predicted, named, gain, placebo_p, band, ceiling)
@@ -258,7 +260,6 @@ class Diagnosing:
         log_evidence: float,
         chance: float,
         stack: Stack,
-        kappa: float,
         predicted: dict[str, Predicted],
         without: dict[str, Predicted],
     ) -> Ranked:
@@ -272,8 +273,10 @@ class Diagnosing:
             return Ranked(kind, False, log_evidence, chance, 0.0, None, (), None, None, "", "no physics")
         own = stack.of(number)
         if kind in fits:
-            z, covariance = fits[kind].coefficients[0], fits[kind].covariances[0]
+            z, covariance, kappa = fits[kind].coefficients[0], fits[kind].covariances[0], fits[kind].kappa
         else:
+            # where physics is missing, the noise that the base needs is no noise
+            kappa = 1.0
             inner = Inner(base.explanation, stack, base.whitened[:, None])
             z, covariance = inner.coefficients(kappa, number)
         d = base.explanation.detectability(own[:, 0] + own[:, 1:] @ z, kappa)
@@ -300,9 +303,11 @@ class Diagnosing:
         null = statistic(explanation.draws(self.options.draws, fit.kappa, rng))
         return float((1 + np.sum(null >= own)) / (1 + len(null)))
 
-    def _ceiling(self, base: Base, held_out: HeldOut, linear: Floats, columns: Floats) -> float:
+    def _ceiling(self, base: Base, held_out: HeldOut, linear: Floats, columns: Floats, kappa: float) -> float:
         """Held-out error with any smooth force of the size that suits best."""
-        return min(held_out.predict(linear, np.column_stack([columns, force])).rmse for force in base.smooth_forces)
+        return min(
+            held_out.predict(linear, np.column_stack([columns, force]), kappa).rmse for force in base.smooth_forces
+        )
 
     def _explained(self, fits: dict[str, Refit], named: tuple[Ranked, ...]) -> Case | None:
         if not named:

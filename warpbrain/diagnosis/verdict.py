@@ -34,6 +34,8 @@ Floats = NDArray[np.float64]
 SURE, TOGETHER, ADEQUATE = 0.9, 0.9, 0.01
 #: Largest size [standard deviations of its prior] and placebo probability of a name, and members of a group.
 LARGEST, PLACEBO, MEMBERS = 4.0, 0.05, 4
+#: Standard errors by which a gain must be above zero: nine of ten draws are above it.
+ERRORS = 1.28
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,12 @@ class Evidence:
     alpha, p_value : float
     ranking : tuple of Ranked
         The most probable first.
-    gain : (part, low, high)
-        Of the held-out error by the most probable one, with its 80 % interval.
+    gain : float
+        By how much [nats] the most probable one makes held-out points more probable, of regions where it acts in more
+        than one place.
+    sure : float
+        The same less as many standard errors that nine of ten are above it, of regions or of points here and there:
+        what acts in few places is in few regions, and what a neighbour tells is no gain here and there.
     placebo_p, adequacy_p : float
         Of it.
     size : float
@@ -56,7 +62,8 @@ class Evidence:
     alpha: float
     p_value: float
     ranking: Sequence[Ranked]
-    gain: tuple[float, float, float]
+    gain: float
+    sure: float
     placebo_p: float
     adequacy_p: float
     size: float
@@ -92,7 +99,7 @@ def decide(found: Evidence) -> Verdict:
         return Verdict(NAMED if found.adequacy_p > ADEQUATE else NAMED_AND_REST, (best.kind,))
     label_set = _label_set(found.ranking)
     physics = all(ranked.physics for ranked in found.ranking if ranked.kind in label_set)
-    if 1 < len(label_set) <= MEMBERS and physics and found.gain[0] > 0.0:
+    if 1 < len(label_set) <= MEMBERS and physics and found.gain > 0.0:
         return Verdict(GROUP, label_set, "; ".join(vetoes))
     if best.kind == UNKNOWN_KIND and best.probability >= 0.5:
         return Verdict(UNKNOWN, ())
@@ -101,7 +108,7 @@ def decide(found: Evidence) -> Verdict:
 
 def _vetoes(found: Evidence) -> list[str]:
     vetoes = []
-    if found.gain[1] <= 0.0:
+    if found.gain <= 0.0 or found.sure <= 0.0:
         vetoes.append("points that were held out are not predicted better with it")
     if found.placebo_p > PLACEBO:
         vetoes.append("patterns that mean nothing predict as well")
