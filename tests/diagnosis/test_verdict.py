@@ -14,7 +14,7 @@ from warpbrain.diagnosis.result import (
     UNKNOWN,
     Ranked,
 )
-from warpbrain.diagnosis.verdict import Evidence, decide
+from warpbrain.diagnosis.verdict import Evidence, Verdict, decide, overall
 
 
 def found(chances: Mapping[str, float], **known: object) -> Evidence:
@@ -56,3 +56,30 @@ def test_it_says(chances: Mapping[str, float], known: Mapping[str, object], expe
 
 def test_a_name_that_is_kept_back_says_why() -> None:
     assert "held out" in decide(found({"gravity": 0.99}, sure=-0.1)).why
+
+
+NAMES = [Verdict(NAMED_AND_REST, ("gravity",)), Verdict(NAMED, ("pressure",))]
+NOTHING_MORE = Verdict(NOTHING, ())
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "verdict", "kinds", "rest"),
+    [
+        ([NOTHING_MORE], NOTHING, (), None),
+        ([NAMES[1], NOTHING_MORE], NAMED, ("pressure",), None),
+        ([*NAMES, NOTHING_MORE], NAMED, ("gravity", "pressure"), None),
+        ([NAMES[0], NOTHING_MORE], NAMED_AND_REST, ("gravity",), NOTHING_MORE),
+        (
+            [NAMES[0], Verdict(GROUP, ("falx", "contact"))],
+            NAMED_AND_REST,
+            ("gravity",),
+            Verdict(GROUP, ("falx", "contact")),
+        ),
+        # what names leave is not significant: what might be in it is not said
+        ([NAMES[1], Verdict(GROUP, ("falx", "contact"))], NAMED, ("pressure",), None),
+        ([Verdict(UNKNOWN, ())], UNKNOWN, (), None),
+    ],
+)
+def test_stages_come_to(verdicts: list[Verdict], verdict: str, kinds: tuple[str, ...], rest: Verdict | None) -> None:
+    found = overall(verdicts)
+    assert (found.verdict, found.kinds, found.rest) == (verdict, kinds, rest)

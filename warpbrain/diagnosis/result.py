@@ -27,6 +27,9 @@ NOTHING, NAMED, GROUP, NAMED_AND_REST, UNKNOWN, NOT_PHYSICS, CANNOT_SAY = VERDIC
     "cannot say",
 )
 
+#: Among fits, and among what held-out points are predicted to be: with all that is named.
+EXPLAINED = "explained"
+
 
 @dataclass(frozen=True)
 class Value:
@@ -160,7 +163,7 @@ class Diagnosis:
     p_value : float
         Of nothing missing.
     named : tuple of Ranked
-        What is named, the strongest first.
+        What is named, in the order in which it was found: as it is in the fit with all of it.
     group : tuple of str
         Kinds that cannot be told apart.
     ranking : tuple of Ranked
@@ -169,7 +172,7 @@ class Diagnosis:
     map : ScoreMap
     base : Base
     fits : dict of str to Refit
-        By kind; ``"none"`` without any.
+        By kind; ``"none"`` without any, ``"explained"`` with all that is named.
     held_out : dict of str to Predicted
         What each of these predicts of points that it was not fitted to.
     explained : Case or None

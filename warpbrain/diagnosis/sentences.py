@@ -19,13 +19,14 @@ from warpbrain.diagnosis.result import (
     Ranked,
     Smallest,
 )
-from warpbrain.diagnosis.verdict import Verdict
+from warpbrain.diagnosis.verdict import Conclusion, Verdict
 from warpbrain.diagnosis.words import size_in_words, smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
 
 
 def sentence_of(
-    verdict: Verdict,
+    verdict: Conclusion,
+    named: Sequence[Ranked],
     ranking: Sequence[Ranked],
     p_value: float,
     smallest: Mapping[str, Smallest],
@@ -40,9 +41,10 @@ def sentence_of(
             f"{seen or 'nothing was looked for'}."
         )
     if verdict.verdict in (NAMED, NAMED_AND_REST):
-        best = next(ranked for ranked in ranking if ranked.kind == verdict.kinds[0])
-        rest = " Something else is left, which this does not explain." if verdict.verdict == NAMED_AND_REST else ""
-        return f"{effect_sentence(best, gravity_axis)} {_grounds(best, fit)}{rest}"
+        said = [effect_sentence(one, gravity_axis) for one in named]
+        also = [f"Beside it: {text[0].lower()}{text[1:]}" for text in said[1:]]
+        rest = f" {_rest(verdict.rest)}" if verdict.verdict == NAMED_AND_REST else ""
+        return f"{' '.join([said[0], *also])} {_grounds(named, fit)}{rest}"
     if verdict.verdict == GROUP:
         members = [ranked for ranked in ranking if ranked.kind in verdict.kinds]
         said = "; or ".join(f"{_clause(one)} ({_percent(one.probability)})" for one in members)
@@ -92,15 +94,31 @@ def _where(ranked: Ranked) -> str:
     return f" It lies about ({x:z.0f}, {y:z.0f}, {z:z.0f}) mm{within}."
 
 
-def _grounds(best: Ranked, fit: Fit) -> str:
+def _grounds(named: Sequence[Ranked], fit: Fit) -> str:
     before = 1e3 * fit.refitted[1]
-    probable = f"Its probability is {_percent(best.probability)}"
+    chances = " and ".join(_percent(one.probability) for one in named)
+    probable = f"Its probability is {chances}" if len(named) == 1 else f"Their probabilities are {chances}"
     if fit.explained is None:
         return f"{probable}."
     after = 1e3 * fit.explained[1]
+    these = "it" if len(named) == 1 else "them"
     return (
-        f"{probable}; points that were held out are predicted to {after:.2f} mm with it, to {before:.2f} mm without it."
+        f"{probable}; points that were held out are predicted to {after:.2f} mm with {these}, to {before:.2f} mm "
+        f"without {these}."
     )
+
+
+def _rest(rest: Verdict | None) -> str:
+    """What is said of what names leave."""
+    if rest is not None and rest.verdict == GROUP:
+        known = mechanisms()
+        either = "; or ".join(known[kind].sentence.rstrip(".") for kind in rest.kinds)
+        return f"Something else is left, and these data do not tell which of these it is: {either}."
+    if rest is not None and rest.verdict == NOT_PHYSICS:
+        return f"Something else is left, which is no physics: {SENTENCES[rest.kinds[0]]}"
+    if rest is not None and rest.verdict == UNKNOWN:
+        return "Something else is left, which no known mechanism explains."
+    return "Something else is left, which this does not explain."
 
 
 def _chance(p_value: float) -> str:

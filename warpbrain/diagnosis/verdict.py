@@ -86,6 +86,42 @@ class Verdict:
     kinds: tuple[str, ...]
     why: str = ""
 
+    @property
+    def adds(self) -> bool:
+        """Whether it names a mechanism."""
+        return self.verdict in (NAMED, NAMED_AND_REST)
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What the verdicts of all stages come to: each looks for what acts beside those that were named before it.
+
+    Attributes
+    ----------
+    verdict : str
+    kinds : tuple of str
+        That are named, or of a group, or no physics.
+    rest : Verdict or None
+        Of what is left beside what is named, if that is significant.
+    why : str
+        What kept a name from being spoken.
+    """
+
+    verdict: str
+    kinds: tuple[str, ...]
+    rest: Verdict | None = None
+    why: str = ""
+
+
+def overall(verdicts: Sequence[Verdict]) -> Conclusion:
+    """Of one stage after the other: names are added while the rule gives them, and the last says what is left."""
+    adding = [verdict for verdict in verdicts if verdict.adds]
+    if not adding:
+        return Conclusion(verdicts[0].verdict, verdicts[0].kinds, None, verdicts[0].why)
+    after = verdicts[len(adding) :]
+    rest = after[0] if after and adding[-1].verdict == NAMED_AND_REST else None
+    return Conclusion(adding[-1].verdict, tuple(verdict.kinds[0] for verdict in adding), rest)
+
 
 def decide(found: Evidence) -> Verdict:
     """Apply the rule."""

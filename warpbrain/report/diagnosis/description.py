@@ -24,6 +24,7 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
         "probability": best.probability if best else found.ranking[0].probability,
         "parameters": _values(best.values) if best else {},
         "where": _where(found, best),
+        "mechanisms": [_named(one, found.case.gravity_axis) for one in found.named],
         "when": None,
         "ranking": [_ranked(ranked, found.case.gravity_axis) for ranked in found.ranking]
         + [_rejected(kind, why) for kind, why in found.rejected.items()],
@@ -69,6 +70,17 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
 
 def _values(values: tuple[Value, ...]) -> dict[str, Any]:
     return {one.name: {"value": one.value, "sd": one.sd, "unit": one.unit} for one in values}
+
+
+def _named(one: Ranked, gravity_axis: tuple[float, float, float] | None) -> dict[str, Any]:
+    return {
+        "mechanism": one.kind,
+        "says": effect_sentence(one, gravity_axis),
+        "probability": one.probability,
+        "parameters": _values(one.values),
+        "where": None if one.centre is None else {"centre_m": one.centre, "radius_m": one.radius},
+        "region": one.region,
+    }
 
 
 def _where(found: Diagnosis, best: Ranked | None) -> dict[str, Any] | None:
