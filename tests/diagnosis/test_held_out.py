@@ -49,4 +49,5 @@ def test_patterns_that_mean_nothing_do_not_predict(held_out: HeldOut) -> None:
     truth = rng.normal(size=(N, 1))
     residual = 5.0 * truth[:, 0] + held_out.sigma * rng.normal(size=N)
     patterns = placebo(held_out, residual, np.zeros((N, 0)), rng.normal(size=(N, 8)), 1, 2, 1.0, rng, count=40)
-    assert np.all(patterns > held_out.predict(residual, 5.0 * truth).rmse)
+    true = held_out.predict(residual, 5.0 * truth)
+    assert all(pattern.rmse > true.rmse and pattern.log_density < true.log_density for pattern in patterns)

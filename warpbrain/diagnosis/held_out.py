@@ -68,6 +68,11 @@ class Predicted:
         """Root mean square of the rows [m]."""
         return float(np.sqrt(np.mean(self.errors**2)))
 
+    @property
+    def log_density(self) -> float:
+        """Of all blocks."""
+        return float(self.log_densities.sum())
+
     def improvement(self, over: Predicted, rng: np.random.Generator, sure: float = 0.95) -> tuple[float, float, float]:
         """Part of another's root mean square error that is gone, and its interval (bootstrap over blocks)."""
         names = np.unique(self.blocks)
@@ -148,8 +153,8 @@ def placebo(
     rng: np.random.Generator,
     kappa: float = 1.0,
     count: int = 200,
-) -> Floats:
-    """Root mean square errors (count,) with patterns that mean nothing in the place of a mechanism.
+) -> list[Predicted]:
+    """Predictions with patterns that mean nothing in the place of a mechanism.
 
     Parameters
     ----------
@@ -169,11 +174,11 @@ def placebo(
         Factor on the noise.
     count : int
     """
-    found = np.zeros(count)
+    found = []
     white_columns = columns / held_out.sigma[:, None]
     white = residual / held_out.sigma
     gram = np.eye(columns.shape[1]) + white_columns.T @ white_columns
-    for number in range(count):
+    for _ in range(count):
         many = size * flexible @ rng.normal(size=(flexible.shape[1], tries * freedom))
         scaled = many / held_out.sigma[:, None]
         left = scaled - white_columns @ np.linalg.solve(gram, white_columns.T @ scaled)
@@ -184,5 +189,5 @@ def placebo(
             M = np.eye(freedom) + whole[own, own]
             gains.append(float(b[own] @ np.linalg.solve(M, b[own])) - float(np.linalg.slogdet(M)[1]))
         k = freedom * int(np.argmax(gains))
-        found[number] = held_out.predict(residual, np.column_stack([columns, many[:, k : k + freedom]]), kappa).rmse
+        found.append(held_out.predict(residual, np.column_stack([columns, many[:, k : k + freedom]]), kappa))
     return found

@@ -99,8 +99,11 @@ class Judge:
             gain = predicted[best].gain(without[way])[0]
             sure = max(gained - ERRORS * error for gained, error in both)
             patterns = self._placebo(stage, way, best)
-            band = (float(np.quantile(patterns, 0.05)), float(np.quantile(patterns, 0.95)))
-            placebo_p = float((1 + np.sum(patterns <= predicted[best].rmse)) / (1 + len(patterns)))
+            errors = [one.rmse for one in patterns]
+            band = (float(np.quantile(errors, 0.05)), float(np.quantile(errors, 0.95)))
+            # with the same noise as they have
+            dense = way.predict(own.linear, own.columns, plain[2]).log_density
+            placebo_p = float((1 + sum(one.log_density >= dense for one in patterns)) / (1 + len(patterns)))
             adequacy_p = self._adequacy(own)
             size = float(np.abs(own.coefficients[-1]).max())
         evidence = Evidence(self.options.alpha, stage.p_value, ranking, gain, sure, placebo_p, adequacy_p, size)
@@ -120,7 +123,7 @@ class Judge:
         same = np.array_equal(beside.blocks, self._regions.blocks[beside.rows])
         return (self._regions if same else self._scattered).predict(fit.linear, fit.columns, fit.kappa)
 
-    def _placebo(self, stage: Stage, way: HeldOut, kind: str) -> Floats:
+    def _placebo(self, stage: Stage, way: HeldOut, kind: str) -> list[Predicted]:
         linear, columns, kappa = stage.without
         tries = _TRIES_SCANNED if len(stage.candidates.of_kind[kind]) > _SCANNED else _TRIES
         freedom = stage.fits[kind].effects[-1].columns.shape[1]
