@@ -31,6 +31,7 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         "placebo_p": 0.01,
         "adequacy_p": 0.5,
         "size": 1.0,
+        "unknown_sure": 5.0,
     }
     return Evidence(**(given | known))
 
@@ -43,6 +44,7 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         ({"gravity": 0.97, "pressure": 0.03}, {"adequacy_p": 0.001}, NAMED_AND_REST),
         ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {}, GROUP),
         ({"unknown": 0.8, "gravity": 0.2}, {}, UNKNOWN),
+        ({"unknown": 0.8, "gravity": 0.2}, {"unknown_sure": -1.0}, CANNOT_SAY),
         ({"registration": 0.8, "gravity": 0.2}, {}, NOT_PHYSICS),
         ({"gravity": 0.97, "pressure": 0.03}, {"gain": -1.0}, CANNOT_SAY),
         ({"gravity": 0.97, "pressure": 0.03}, {"sure": -1.0}, CANNOT_SAY),

@@ -14,7 +14,7 @@ from warpbrain.diagnosis.alternatives import alternatives_at
 from warpbrain.diagnosis.base import Base, BaseFinder
 from warpbrain.diagnosis.concluding import named_together
 from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
-from warpbrain.diagnosis.evidence import Stack
+from warpbrain.diagnosis.evidence import Explanation, Stack
 from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.judging import Judge, Judgement
 from warpbrain.diagnosis.locating import ScoreMap, score_map
@@ -23,10 +23,11 @@ from warpbrain.diagnosis.observable import require_observable
 from warpbrain.diagnosis.options import DiagnosisOptions, Listener
 from warpbrain.diagnosis.parameters import SEEN, smallest_of
 from warpbrain.diagnosis.refitting import Refit, Refitting
-from warpbrain.diagnosis.result import EXPLAINED, GROUP, Diagnosis, Fit, Ranked, Smallest
+from warpbrain.diagnosis.result import EXPLAINED, GROUP, UNKNOWN, Diagnosis, Fit, Ranked, Smallest
 from warpbrain.diagnosis.sentences import assumptions_of, sentence_of
 from warpbrain.diagnosis.stage import Stage, candidates_beside, compared, linear_point
 from warpbrain.diagnosis.states import States
+from warpbrain.diagnosis.traits import Traits, traits_of
 from warpbrain.diagnosis.verdict import overall
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
@@ -163,6 +164,9 @@ class Diagnosing:
         conclusion = overall([one.verdict for one in judged])
         held_out = {"none": at_first.without, **at_first.predicted}
         rest = conclusion.rest
+        unknown = None
+        if UNKNOWN in (conclusion.verdict, rest.verdict if rest is not None else ""):
+            unknown = self._traits(stages[len(named)], where)
         group = conclusion.kinds if not named else rest.kinds if rest is not None and rest.verdict == GROUP else ()
         improvement = at_first.improvement
         if named:
@@ -177,7 +181,9 @@ class Diagnosing:
         return Diagnosis(
             self.case,
             conclusion.verdict,
-            sentence_of(conclusion, named, at_first.ranking, first.p_value, smallest, fit, self.case.gravity_axis),
+            sentence_of(
+                conclusion, named, at_first.ranking, first.p_value, smallest, fit, self.case.gravity_axis, unknown
+            ),
             first.p_value,
             named,
             group,
@@ -195,7 +201,15 @@ class Diagnosing:
             assumptions_of(self.case, base, first.kappa),
             base.remarks,
             self.seconds,
+            unknown,
         )
+
+    def _traits(self, stage: Stage, where: ScoreMap) -> Traits:
+        """Of the force without a name that a stage leaves."""
+        base, (linear, columns, kappa) = stage.base, stage.without
+        explanation = Explanation(base.explanation.factor, columns)
+        length = self.dictionary.situation.spacing
+        return traits_of(base.at, explanation, linear, kappa, base.typical_noise, length, where.centre)
 
     def _explained(self, fits: dict[str, Refit], named: tuple[Ranked, ...]) -> Case | None:
         if not named:

@@ -95,9 +95,9 @@ class Judge:
         if best is not None:
             own = fits[best]
             improvement = predicted[best].improvement(without[way], self._rng)
-            both = [one.predict(own.linear, own.columns, own.kappa).gain(over) for one, over in without.items()]
+            both = [(one.predict(own.linear, own.columns, own.kappa), over) for one, over in without.items()]
             gain = predicted[best].gain(without[way])[0]
-            sure = max(gained - ERRORS * error for gained, error in both)
+            sure = max(_sure(with_it, over) for with_it, over in both)
             patterns = self._placebo(stage, way, best)
             errors = [one.rmse for one in patterns]
             band = (float(np.quantile(errors, 0.05)), float(np.quantile(errors, 0.95)))
@@ -106,7 +106,12 @@ class Judge:
             placebo_p = float((1 + sum(one.log_density >= dense for one in patterns)) / (1 + len(patterns)))
             adequacy_p = self._adequacy(own)
             size = float(np.abs(own.coefficients[-1]).max())
-        evidence = Evidence(self.options.alpha, stage.p_value, ranking, gain, sure, placebo_p, adequacy_p, size)
+        forces = [np.column_stack([plain[1], force]) for force in self.base.smooth_forces]
+        loose = {one: [one.predict(plain[0], columns, plain[2]) for columns in forces] for one in without}
+        unknown_sure = max(_sure(predicted, without[one]) for one, each in loose.items() for predicted in each)
+        evidence = Evidence(
+            self.options.alpha, stage.p_value, ranking, gain, sure, placebo_p, adequacy_p, size, unknown_sure
+        )
         return Judgement(
             decide(evidence),
             ranking,
@@ -115,7 +120,7 @@ class Judge:
             improvement,
             placebo_p,
             band,
-            self._ceiling(way, *plain),
+            min(one.rmse for one in loose[way]),
         )
 
     def predicted(self, fit: Refit, beside: Predicted) -> Predicted:
@@ -173,10 +178,11 @@ class Judge:
         null = statistic(explanation.draws(self.options.draws, fit.kappa, self._rng))
         return float((1 + np.sum(null >= own)) / (1 + len(null)))
 
-    def _ceiling(self, way: HeldOut, linear: Floats, columns: Floats, kappa: float) -> float:
-        """Held-out error with any smooth force of the size that suits best."""
-        forces = self.base.smooth_forces
-        return min(way.predict(linear, np.column_stack([columns, force]), kappa).rmse for force in forces)
+
+def _sure(predicted: Predicted, over: Predicted) -> float:
+    """Gain [nats] less so many standard errors that nine of ten draws are above it."""
+    gain, error = predicted.gain(over)
+    return gain - ERRORS * error
 
 
 def _place(stage: Stage, kind: str) -> tuple[Floats | None, float | None]:

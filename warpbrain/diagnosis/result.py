@@ -13,6 +13,7 @@ from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.refitting import Refit
+from warpbrain.diagnosis.traits import Traits
 
 Floats = NDArray[np.float64]
 
@@ -183,6 +184,8 @@ class Diagnosis:
     fit : Fit
     assumptions, remarks : tuple of str
     seconds : dict of str to float
+    unknown : Traits or None
+        Of a force that no mechanism explains: alone, or beside what is named.
     """
 
     case: Case
@@ -205,3 +208,4 @@ class Diagnosis:
     assumptions: tuple[str, ...]
     remarks: tuple[str, ...]
     seconds: dict[str, float] = field(default_factory=dict)
+    unknown: Traits | None = None

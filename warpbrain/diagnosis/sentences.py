@@ -19,9 +19,13 @@ from warpbrain.diagnosis.result import (
     Ranked,
     Smallest,
 )
+from warpbrain.diagnosis.traits import Traits
 from warpbrain.diagnosis.verdict import Conclusion, Verdict
-from warpbrain.diagnosis.words import size_in_words, smallest_in_words
+from warpbrain.diagnosis.words import measured, size_in_words, smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
+
+#: Log Bayes factor from which surface and depth are told apart.
+_TELLING = 3.0
 
 
 def sentence_of(
@@ -32,6 +36,7 @@ def sentence_of(
     smallest: Mapping[str, Smallest],
     fit: Fit,
     gravity_axis: tuple[float, float, float] | None = None,
+    unknown: Traits | None = None,
 ) -> str:
     """The verdict for people: whole sentences, in millimetres, pascals, percent and degrees."""
     if verdict.verdict == NOTHING:
@@ -43,7 +48,7 @@ def sentence_of(
     if verdict.verdict in (NAMED, NAMED_AND_REST):
         said = [effect_sentence(one, gravity_axis) for one in named]
         also = [f"Beside it: {text[0].lower()}{text[1:]}" for text in said[1:]]
-        rest = f" {_rest(verdict.rest)}" if verdict.verdict == NAMED_AND_REST else ""
+        rest = f" {_rest(verdict.rest)}{traits_in_words(unknown)}" if verdict.verdict == NAMED_AND_REST else ""
         return f"{' '.join([said[0], *also])} {_grounds(named, fit)}{rest}"
     if verdict.verdict == GROUP:
         members = [ranked for ranked in ranking if ranked.kind in verdict.kinds]
@@ -52,7 +57,7 @@ def sentence_of(
     if verdict.verdict == UNKNOWN:
         return (
             f"Something is missing ({_chance(p_value)}) that none of the known mechanisms explains: a force without a "
-            "name fits better than all of them."
+            f"name fits better than all of them.{traits_in_words(unknown)}"
         )
     if verdict.verdict == NOT_PHYSICS:
         said = SENTENCES[verdict.kinds[0]]
@@ -129,6 +134,23 @@ def _percent(probability: float) -> str:
     if probability > 0.995:
         return "above 99 %"
     return "below 1 %" if probability < 0.005 else f"{100.0 * probability:.0f} %"
+
+
+def traits_in_words(unknown: Traits | None) -> str:
+    """What is known of a force without a name, to follow a sentence; empty if nothing is."""
+    if unknown is None:
+        return ""
+    x, y, z = 1e3 * unknown.centre
+    size, sd = unknown.size
+    where = f"about ({x:z.0f}, {y:z.0f}, {z:z.0f}) mm"
+    if unknown.outside:
+        said = f"It is a force from outside, {where}, of {measured(size, sd, 'N')} in all"
+    else:
+        said = f"It is strongest {where}, and no net force of it is seen ({measured(size, sd, 'N')}): it may act within"
+    depth = abs(unknown.surface_nats)
+    if depth > _TELLING:
+        said += ", and on the surface" if unknown.surface_nats > 0.0 else ", and below the surface"
+    return f" {said}."
 
 
 def assumptions_of(case: Case, base: Base, kappa: float) -> tuple[str, ...]:

@@ -4,7 +4,8 @@
 2. Named if one mechanism is probable enough, predicts points that it was not fitted to better than without it and than
    patterns that mean nothing, has a plausible size, and leaves nothing significant. Named + rest if something is left.
 3. Not physics if a nuisance far larger than it should be explains the residuals better than any mechanism.
-4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is. Else: cannot say.
+4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is, and predicts points
+   that it was not fitted to better. Else: cannot say.
 """
 
 from __future__ import annotations
@@ -57,6 +58,8 @@ class Evidence:
         Of it.
     size : float
         Its largest coefficient in standard deviations of the prior.
+    unknown_sure : float
+        What `sure` is, of any smooth force.
     """
 
     alpha: float
@@ -67,6 +70,7 @@ class Evidence:
     placebo_p: float
     adequacy_p: float
     size: float
+    unknown_sure: float
 
 
 @dataclass(frozen=True)
@@ -138,7 +142,9 @@ def decide(found: Evidence) -> Verdict:
     if 1 < len(label_set) <= MEMBERS and physics and found.gain > 0.0:
         return Verdict(GROUP, label_set, "; ".join(vetoes))
     if best.kind == UNKNOWN_KIND and best.probability >= 0.5:
-        return Verdict(UNKNOWN, ())
+        if found.unknown_sure > 0.0:
+            return Verdict(UNKNOWN, ())
+        vetoes = ["any smooth force fits better than a mechanism, but does not predict points that were held out"]
     return Verdict(CANNOT_SAY, label_set, "; ".join(vetoes))
 
 

@@ -13,7 +13,7 @@ from warpbrain.report.files import write_summary
 
 KEYS = {
     *("verdict", "sentence", "p_value", "mechanism", "probability", "parameters", "where", "when", "ranking", "group"),
-    "mechanisms",
+    *("mechanisms", "unknown"),
     *("next_measurement", "smallest_detectable", "confusion", "fit", "map", "assumptions", "remarks", "case"),
     *("inputs_sha256", "options", "seconds", "equilibria", "device", "versions"),
 }

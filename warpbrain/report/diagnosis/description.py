@@ -7,6 +7,7 @@ from typing import Any
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis, Ranked, Value
 from warpbrain.diagnosis.sentences import effect_sentence
+from warpbrain.diagnosis.traits import Traits
 from warpbrain.diagnosis.words import smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.report.fingerprints import fingerprints
@@ -25,6 +26,7 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
         "parameters": _values(best.values) if best else {},
         "where": _where(found, best),
         "mechanisms": [_named(one, found.case.gravity_axis) for one in found.named],
+        "unknown": _unknown(found.unknown),
         "when": None,
         "ranking": [_ranked(ranked, found.case.gravity_axis) for ranked in found.ranking]
         + [_rejected(kind, why) for kind, why in found.rejected.items()],
@@ -80,6 +82,21 @@ def _named(one: Ranked, gravity_axis: tuple[float, float, float] | None) -> dict
         "parameters": _values(one.values),
         "where": None if one.centre is None else {"centre_m": one.centre, "radius_m": one.radius},
         "region": one.region,
+    }
+
+
+def _unknown(traits: Traits | None) -> dict[str, Any] | None:
+    if traits is None:
+        return None
+    return {
+        "net_force_n": traits.force,
+        "net_force_sd_n": traits.force_sd,
+        "net_moment_nm": traits.moment,
+        "net_moment_sd_nm": traits.moment_sd,
+        "from_outside": traits.outside,
+        "turning": traits.turning,
+        "surface_over_depth_nats": traits.surface_nats,
+        "centre_m": traits.centre,
     }
 
 
