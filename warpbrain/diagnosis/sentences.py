@@ -46,10 +46,10 @@ def sentence_of(
             f"{seen or 'nothing was looked for'}."
         )
     if verdict.verdict in (NAMED, NAMED_AND_REST):
-        said = [effect_sentence(one, gravity_axis) for one in named]
-        also = [f"Beside it: {text[0].lower()}{text[1:]}" for text in said[1:]]
+        each = [effect_sentence(one, gravity_axis) for one in named]
+        also = [f"Beside it: {text[0].lower()}{text[1:]}" for text in each[1:]]
         rest = f" {_rest(verdict.rest)}{traits_in_words(unknown)}" if verdict.verdict == NAMED_AND_REST else ""
-        return f"{' '.join([said[0], *also])} {_grounds(named, fit)}{rest}"
+        return f"{' '.join([each[0], *also])} {_grounds(named, fit)}{rest}"
     if verdict.verdict == GROUP:
         members = [ranked for ranked in ranking if ranked.kind in verdict.kinds]
         said = "; or ".join(f"{_clause(one)} ({_percent(one.probability)})" for one in members)
