@@ -144,7 +144,8 @@ def _diagnosis(data: dict[str, Any]) -> Diagnosis:
     verdict = " + ".join(part.strip() for part in data["verdict"].lower().replace("_", " ").split("+"))
     if verdict not in VERDICTS:
         raise ValueError(f"verdict '{data['verdict']}'")
-    mechanism = data.get("mechanism") or []
+    # all that are named, the first of which stands alone as well
+    mechanism = [one["mechanism"] for one in data.get("mechanisms") or ()] or data.get("mechanism") or []
     names = [mechanism] if isinstance(mechanism, str) else mechanism
     where = data.get("where") or {}
     centre = where.get("centre_m")

@@ -12,6 +12,7 @@ from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.mesh import TetMesh, write_mesh
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.recordings.location import locate
 from warpbrain.simulation.equilibrium import EquilibriumSolver
@@ -68,8 +69,8 @@ sigma = 0.1
 """
 
 
-def write_sinking(folder: Path) -> Case:
-    """Write the case with recordings of a state that has the weight which the case leaves out."""
+def write_sinking(folder: Path, also: tuple[Mechanism, ...] = ()) -> Case:
+    """Write the case with recordings of a state that has the weight which the case leaves out, and what else acts."""
     mesh = box((5, 5, 5), (_SIDE, _SIDE, _SIDE))
     x, z = mesh.points[:, 0], mesh.points[:, 2]
     one = np.ones(len(mesh.tetrahedra), dtype=np.int32)
@@ -79,7 +80,7 @@ def write_sinking(folder: Path) -> Case:
     (folder / "case.toml").write_text(_CASE, encoding="utf-8")
     # half of the block is out of the fluid
     sinks = Gravity(direction=(0.0, 0.0, -1.0), density=1000.0, csf_level=0.03)
-    model, _ = model_of(replace(find_case(str(folder)), mechanisms=(sinks,)))
+    model, _ = model_of(replace(find_case(str(folder)), mechanisms=(sinks, *also)))
     u = EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u
     (folder / "recordings").mkdir()
     rng = np.random.default_rng(7)
@@ -93,6 +94,6 @@ def write_sinking(folder: Path) -> Case:
     return find_case(str(folder))
 
 
-def diagnose_sinking(folder: Path) -> Diagnosis:
+def diagnose_sinking(folder: Path, also: tuple[Mechanism, ...] = ()) -> Diagnosis:
     """Its diagnosis, in seconds."""
-    return Diagnosing(write_sinking(folder), OPTIONS, "cpu").run()
+    return Diagnosing(write_sinking(folder, also), OPTIONS, "cpu").run()

@@ -85,3 +85,20 @@ def test_p_values_of_draws_are_uniform(example: Example) -> None:
     null, own = np.sort(statistic(2000, 5)), statistic(500, 6)
     p = 1.0 - np.searchsorted(null, own) / len(null)
     assert kstest(p, "uniform").pvalue > 0.01
+
+
+def test_the_evidence_of_a_pair_is_that_of_quadrature() -> None:
+    rng = np.random.default_rng(7)
+    factor = np.linalg.cholesky(np.eye(6) + 0.1 * np.ones((6, 6)))
+    first, second, residual = (rng.normal(size=(6, 1)) for _ in range(3))
+    # the first is a nuisance where the second is looked for
+    explanation = Explanation(factor, first)
+    white = explanation.whitened(residual)
+    stack = explanation.stack([Effect(None, np.zeros(6), second)])
+    kappa = np.array([1.0])
+    pair = explanation.log_none(white, kappa)[0, 0] + explanation.log_factors(stack, white, kappa)[0, 0, 0]
+    z = np.linspace(-8.0, 8.0, 321)
+    a, b = (grid.ravel() for grid in np.meshgrid(z, z))
+    left = np.linalg.solve(factor, residual - first * a - second * b)
+    density = np.exp(-0.5 * (np.sum(left**2, axis=0) + a**2 + b**2)) / np.prod(np.diag(factor)) / (2.0 * np.pi) ** 4
+    assert pair == pytest.approx(np.log(density.sum() * (z[1] - z[0]) ** 2), rel=1e-6)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from warpbrain.diagnosis.alternatives import SENTENCES
 from warpbrain.diagnosis.result import VERDICTS, Fit, Ranked, Smallest, Value
 from warpbrain.diagnosis.sentences import effect_sentence, sentence_of
-from warpbrain.diagnosis.verdict import Verdict
+from warpbrain.diagnosis.verdict import Conclusion, Verdict
 from warpbrain.physics.mechanisms import mechanisms
 
 #: What each verdict says, whatever its numbers.
@@ -24,6 +24,14 @@ SAID = {
     "not physics": "It is not physics that is missing",
     "cannot say": "cannot say what",
 }
+
+#: What the last stage may say of what names leave.
+LEFT = [
+    Verdict("group", ("gravity", "swelling")),
+    Verdict("unknown", ()),
+    Verdict("not physics", ("registration",)),
+    Verdict("cannot say", ("gravity",)),
+]
 
 sizes = st.floats(-1e6, 1e6, allow_subnormal=False)
 spreads = st.one_of(st.floats(1e-9, 1e6), st.just(0.0))
@@ -86,7 +94,10 @@ def test_every_verdict_is_said(verdict, data):
     fit = Fit((0.1, 0.1), (errors[0], errors[0]), explained, None, None, None, None)
     seen = dict(data.draw(st.lists(smallest(), max_size=5)))
     axis = data.draw(st.sampled_from([None, (0.0, 0.0, -1.0), (0.0, -2.0, 0.0)]))
-    text = sentence_of(Verdict(verdict, kinds, "its size would be implausible"), ranking, 0.02, seen, fit, axis)
+    several = data.draw(st.integers(1, 3)) if verdict.startswith("named") else 0
+    left = data.draw(st.sampled_from([None, *LEFT])) if verdict == "named + rest" else None
+    found = Conclusion(verdict, kinds, left, "its size would be implausible")
+    text = sentence_of(found, ranking[:several], ranking, 0.02, seen, fit, axis)
     check(text)
     assert SAID[verdict] in text
     for kind in kinds[:1]:

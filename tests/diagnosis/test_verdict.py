@@ -14,7 +14,7 @@ from warpbrain.diagnosis.result import (
     UNKNOWN,
     Ranked,
 )
-from warpbrain.diagnosis.verdict import Evidence, decide
+from warpbrain.diagnosis.verdict import Evidence, Verdict, decide, overall
 
 
 def found(chances: Mapping[str, float], **known: object) -> Evidence:
@@ -26,10 +26,12 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         "alpha": 0.05,
         "p_value": 0.001,
         "ranking": ranking,
-        "gain": (0.4, 0.2, 0.5),
+        "gain": 12.0,
+        "sure": 5.0,
         "placebo_p": 0.01,
         "adequacy_p": 0.5,
         "size": 1.0,
+        "unknown_sure": 5.0,
     }
     return Evidence(**(given | known))
 
@@ -42,8 +44,10 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         ({"gravity": 0.97, "pressure": 0.03}, {"adequacy_p": 0.001}, NAMED_AND_REST),
         ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {}, GROUP),
         ({"unknown": 0.8, "gravity": 0.2}, {}, UNKNOWN),
+        ({"unknown": 0.8, "gravity": 0.2}, {"unknown_sure": -1.0}, CANNOT_SAY),
         ({"registration": 0.8, "gravity": 0.2}, {}, NOT_PHYSICS),
-        ({"gravity": 0.97, "pressure": 0.03}, {"gain": (0.1, -0.1, 0.3)}, CANNOT_SAY),
+        ({"gravity": 0.97, "pressure": 0.03}, {"gain": -1.0}, CANNOT_SAY),
+        ({"gravity": 0.97, "pressure": 0.03}, {"sure": -1.0}, CANNOT_SAY),
         ({"gravity": 0.97, "pressure": 0.03}, {"placebo_p": 0.3}, CANNOT_SAY),
         ({"gravity": 0.97, "pressure": 0.03}, {"size": 7.0}, CANNOT_SAY),
     ],
@@ -53,4 +57,31 @@ def test_it_says(chances: Mapping[str, float], known: Mapping[str, object], expe
 
 
 def test_a_name_that_is_kept_back_says_why() -> None:
-    assert "held out" in decide(found({"gravity": 0.99}, gain=(0.0, -0.1, 0.1))).why
+    assert "held out" in decide(found({"gravity": 0.99}, sure=-0.1)).why
+
+
+NAMES = [Verdict(NAMED_AND_REST, ("gravity",)), Verdict(NAMED, ("pressure",))]
+NOTHING_MORE = Verdict(NOTHING, ())
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "verdict", "kinds", "rest"),
+    [
+        ([NOTHING_MORE], NOTHING, (), None),
+        ([NAMES[1], NOTHING_MORE], NAMED, ("pressure",), None),
+        ([*NAMES, NOTHING_MORE], NAMED, ("gravity", "pressure"), None),
+        ([NAMES[0], NOTHING_MORE], NAMED_AND_REST, ("gravity",), NOTHING_MORE),
+        (
+            [NAMES[0], Verdict(GROUP, ("falx", "contact"))],
+            NAMED_AND_REST,
+            ("gravity",),
+            Verdict(GROUP, ("falx", "contact")),
+        ),
+        # what names leave is not significant: what might be in it is not said
+        ([NAMES[1], Verdict(GROUP, ("falx", "contact"))], NAMED, ("pressure",), None),
+        ([Verdict(UNKNOWN, ())], UNKNOWN, (), None),
+    ],
+)
+def test_stages_come_to(verdicts: list[Verdict], verdict: str, kinds: tuple[str, ...], rest: Verdict | None) -> None:
+    found = overall(verdicts)
+    assert (found.verdict, found.kinds, found.rest) == (verdict, kinds, rest)

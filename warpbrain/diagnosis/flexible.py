@@ -38,12 +38,15 @@ def flexible_columns(at: Linearisation, length: float) -> Floats:
     """Columns (n, k) of a body force of a length, of 1 m root mean square over the displacements."""
     _, answers = force_patches(at, length)
     columns = answers.reshape(len(answers), -1)
-    squares, left = np.linalg.eigh(columns @ columns.T)
+    rows = at.sensors.is_displacement
+    # modes of displacements: forces that were recorded have another unit, and would be all that counts
+    lengths = columns[rows] if rows.any() else columns
+    squares, left = np.linalg.eigh(lengths @ lengths.T)
     sizes, left = np.sqrt(np.maximum(squares[::-1], 0.0)), left[:, ::-1]
     total = np.cumsum(sizes**2) / np.sum(sizes**2)
     kept = min(int(np.searchsorted(total, 1.0 - _CUT)) + 1, _MOST)
-    found = left[:, :kept] * sizes[:kept]
-    rows = at.sensors.is_displacement
+    found = columns @ (lengths.T @ (left[:, :kept] / sizes[:kept]))
+    rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
     return np.asarray(found / np.sqrt(np.mean(np.sum(found[rows] ** 2, axis=1))))
 
 

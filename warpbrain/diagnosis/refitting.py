@@ -77,16 +77,27 @@ class Refit:
         """The linear model about the best point."""
         return Explanation(factor, self.columns)
 
+    @property
+    def with_own_columns(self) -> tuple[Effect, ...]:
+        """Its effects with the columns that they have at the best point."""
+        found, at = [], len(self.nuisances)
+        for effect in self.effects:
+            size = effect.columns.shape[1]
+            found.append(replace(effect, columns=self.columns[:, at : at + size]))
+            at += size
+        return tuple(found)
+
 
 @dataclass(frozen=True, eq=False)
 class _Share:
-    """What of the mesh's error belongs to a mechanism: `answer (constant + along z)`.
+    """What of the mesh's error belongs to mechanisms: `answer (constant + along z)`.
 
     Attributes
     ----------
     answer : (n,) array
-        At the size with which it was computed.
+        At the sizes with which it was computed.
     along : (k,) array
+        Over the coefficients of all mechanisms.
     constant : float
     """
 
@@ -139,7 +150,12 @@ class Refitting:
         return found
 
     def fit(
-        self, effects: tuple[Effect, ...], begin: Floats, kappa: float = 1.0, between: Floats | None = None
+        self,
+        effects: tuple[Effect, ...],
+        begin: Floats,
+        kappa: float = 1.0,
+        near: SolvedState | None = None,
+        between: Floats | None = None,
     ) -> Refit:
         """Fit one.
 
@@ -150,8 +166,10 @@ class Refitting:
         begin : (q + k,) array
             Coordinates to begin with, as screening has them.
         kappa : float
+        near : SolvedState, optional
+            Nearer to the beginning than the state of screening.
         between : (n, k) array, optional
-            What is not known of the first effect between neighbours of its scan, one standard deviation each.
+            What is not known of the last effect between neighbours of its scan, one standard deviation each.
 
         Raises
         ------
@@ -160,11 +178,11 @@ class Refitting:
         """
         self._share, self._between = None, between
         columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
-        found = self._descend(effects, self._limited(begin), columns, kappa, self.start, 1)
+        found = self._descend(effects, self._limited(begin), columns, kappa, near or self.start, 1)
         if self.difference is None or not effects:
             return self._refit(effects, *found)
         state, z, _, columns, converged = found
-        self._share = self._share_of(effects[0], state, z)
+        self._share = self._share_of(effects, state, z)
         if self._share is None and converged:
             return self._refit(effects, *found)
         if self._share is not None:
@@ -173,26 +191,34 @@ class Refitting:
             columns[:, own] += np.outer(self._share.answer, self._share.along)
         return self._refit(effects, *self._descend(effects, z, columns, kappa, state, -1))
 
-    def _share_of(self, effect: Effect, state: SolvedState, z: Floats) -> _Share | None:
-        """What of the mesh's error belongs to the first mechanism, in proportion to its size; None if not known."""
+    def _share_of(self, effects: tuple[Effect, ...], state: SolvedState, z: Floats) -> _Share | None:
+        """What of the mesh's error belongs to the mechanisms, in proportion to their sizes; None if not known.
+
+        What is there or not has no size: alone it has a constant share, beside others none.
+        """
         assert self.difference is not None
-        q, size = self._U.shape[1], effect.columns.shape[1]
-        away = effect.coefficients(z[q : q + size]) - effect.proposed.without
-        # along what it is: its coefficients, each in standard deviations
-        scaled = away / effect.proposed.sd
+        away, middle, at = [], [], self._U.shape[1]
+        for effect in effects:
+            proposed, size = effect.proposed, effect.columns.shape[1]
+            has_size = not proposed.is_there_or_not
+            # along what it is: its coefficients, each in standard deviations
+            away.append(has_size * (effect.coefficients(z[at : at + size]) - proposed.without) / proposed.sd)
+            middle.append(has_size * (proposed.mean - proposed.without) / proposed.sd)
+            at += size
+        scaled, mean = np.concatenate(away), np.concatenate(middle)
         length = float(scaled @ scaled)
+        switches = all(effect.proposed.is_there_or_not for effect in effects)
         # of what changes in time the finer mesh says nothing: it is computed in the end state alone
-        if length < 1e-6 or effect.proposed.history is not None or effect.about is not None:
+        changing = any(effect.proposed.history is not None or effect.about is not None for effect in effects)
+        if (length < 1e-6 and not switches) or changing:
             return None
         try:
             error = mesh_error(self.states, state.hypothesis, state)
         except SolveError:
             return None
         answer = state.sensors.answer(error.u - self.difference.u, error.reactions - self.difference.reactions)
-        mean = (effect.proposed.mean - effect.proposed.without) / effect.proposed.sd
-        along = scaled / length if not effect.proposed.is_there_or_not else np.zeros(size)
-        constant = float(along @ mean) if not effect.proposed.is_there_or_not else 1.0
-        return _Share(Discretisation().mean * answer, along, constant)
+        along = np.zeros(len(scaled)) if switches else scaled / length
+        return _Share(Discretisation().mean * answer, along, 1.0 if switches else float(along @ mean))
 
     def _descend(
         self,

@@ -14,6 +14,7 @@ from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.refitting import Refit
+from warpbrain.diagnosis.traits import Traits
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +30,9 @@ NOTHING, NAMED, GROUP, NAMED_AND_REST, UNKNOWN, NOT_PHYSICS, CANNOT_SAY = VERDIC
 )
 #: Of a virtual case: a group that holds the cause, and one that does not.
 WITH_IT, WITHOUT_IT = "group with it", "group without it"
+
+#: Among fits, and among what held-out points are predicted to be: with all that is named.
+EXPLAINED = "explained"
 
 
 @dataclass(frozen=True)
@@ -202,7 +206,7 @@ class Diagnosis:
     p_value : float
         Of nothing missing.
     named : tuple of Ranked
-        What is named, the strongest first.
+        What is named, in the order in which it was found: as it is in the fit with all of it.
     group : tuple of str
         Kinds that cannot be told apart.
     ranking : tuple of Ranked
@@ -213,7 +217,7 @@ class Diagnosis:
         When what explains the mismatch best set in; None with one time, or where nothing physical is missing.
     base : Base
     fits : dict of str to Refit
-        By kind; ``"none"`` without any.
+        By kind; ``"none"`` without any, ``"explained"`` with all that is named.
     held_out : dict of str to Predicted
         What each of these predicts of points that it was not fitted to.
     explained : Case or None
@@ -224,6 +228,8 @@ class Diagnosis:
     fit : Fit
     assumptions, remarks : tuple of str
     seconds : dict of str to float
+    unknown : Traits or None
+        Of a force that no mechanism explains: alone, or beside what is named.
     """
 
     case: Case
@@ -247,3 +253,4 @@ class Diagnosis:
     assumptions: tuple[str, ...]
     remarks: tuple[str, ...]
     seconds: dict[str, float] = field(default_factory=dict)
+    unknown: Traits | None = None

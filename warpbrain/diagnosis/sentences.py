@@ -20,21 +20,26 @@ from warpbrain.diagnosis.result import (
     Ranked,
     Smallest,
 )
-from warpbrain.diagnosis.verdict import Verdict
-from warpbrain.diagnosis.words import size_in_words, smallest_in_words
+from warpbrain.diagnosis.traits import Traits
+from warpbrain.diagnosis.verdict import Conclusion, Verdict
+from warpbrain.diagnosis.words import measured, size_in_words, smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
 
 #: A share of virtual cases below the first is hardly ever, below the second as good as none.
 _SELDOM, _RARELY = 0.05, 0.01
+#: Log Bayes factor from which surface and depth are told apart.
+_TELLING = 3.0
 
 
 def sentence_of(
-    verdict: Verdict,
+    verdict: Conclusion,
+    named: Sequence[Ranked],
     ranking: Sequence[Ranked],
     p_value: float,
     smallest: Mapping[str, Smallest],
     fit: Fit,
     gravity_axis: tuple[float, float, float] | None = None,
+    unknown: Traits | None = None,
 ) -> str:
     """The verdict for people: whole sentences, in millimetres, pascals, percent and degrees."""
     if verdict.verdict == NOTHING:
@@ -44,9 +49,10 @@ def sentence_of(
             f"{seen or 'nothing was looked for'}."
         )
     if verdict.verdict in (NAMED, NAMED_AND_REST):
-        best = next(ranked for ranked in ranking if ranked.kind == verdict.kinds[0])
-        rest = " Something else is left, which this does not explain." if verdict.verdict == NAMED_AND_REST else ""
-        return f"{effect_sentence(best, gravity_axis)} {_grounds(best, fit)}{rest}"
+        each = [effect_sentence(one, gravity_axis) for one in named]
+        also = [f"Beside it: {text[0].lower()}{text[1:]}" for text in each[1:]]
+        rest = f" {_rest(verdict.rest)}{traits_in_words(unknown)}" if verdict.verdict == NAMED_AND_REST else ""
+        return f"{' '.join([each[0], *also])} {_grounds(named, fit)}{rest}"
     if verdict.verdict == GROUP:
         members = [ranked for ranked in ranking if ranked.kind in verdict.kinds]
         said = "; or ".join(f"{_clause(one)} ({_percent(one.probability)})" for one in members)
@@ -54,7 +60,7 @@ def sentence_of(
     if verdict.verdict == UNKNOWN:
         return (
             f"Something is missing ({_chance(p_value)}) that none of the known mechanisms explains: a force without a "
-            "name fits better than all of them."
+            f"name fits better than all of them.{traits_in_words(unknown)}"
         )
     if verdict.verdict == NOT_PHYSICS:
         said = SENTENCES[verdict.kinds[0]]
@@ -116,15 +122,31 @@ def _where(ranked: Ranked) -> str:
     return f" It lies about ({x:z.0f}, {y:z.0f}, {z:z.0f}) mm{within}."
 
 
-def _grounds(best: Ranked, fit: Fit) -> str:
+def _grounds(named: Sequence[Ranked], fit: Fit) -> str:
     before = 1e3 * fit.refitted[1]
-    probable = f"Its probability is {_percent(best.probability)}"
+    chances = " and ".join(_percent(one.probability) for one in named)
+    probable = f"Its probability is {chances}" if len(named) == 1 else f"Their probabilities are {chances}"
     if fit.explained is None:
         return f"{probable}."
     after = 1e3 * fit.explained[1]
+    these = "it" if len(named) == 1 else "them"
     return (
-        f"{probable}; points that were held out are predicted to {after:.2f} mm with it, to {before:.2f} mm without it."
+        f"{probable}; points that were held out are predicted to {after:.2f} mm with {these}, to {before:.2f} mm "
+        f"without {these}."
     )
+
+
+def _rest(rest: Verdict | None) -> str:
+    """What is said of what names leave."""
+    if rest is not None and rest.verdict == GROUP:
+        known = mechanisms()
+        either = "; or ".join(known[kind].sentence.rstrip(".") for kind in rest.kinds)
+        return f"Something else is left, and these data do not tell which of these it is: {either}."
+    if rest is not None and rest.verdict == NOT_PHYSICS:
+        return f"Something else is left, which is no physics: {SENTENCES[rest.kinds[0]]}"
+    if rest is not None and rest.verdict == UNKNOWN:
+        return "Something else is left, which no known mechanism explains."
+    return "Something else is left, which this does not explain."
 
 
 def _chance(p_value: float) -> str:
@@ -135,6 +157,23 @@ def _percent(probability: float) -> str:
     if probability > 0.995:
         return "above 99 %"
     return "below 1 %" if probability < 0.005 else f"{100.0 * probability:.0f} %"
+
+
+def traits_in_words(unknown: Traits | None) -> str:
+    """What is known of a force without a name, to follow a sentence; empty if nothing is."""
+    if unknown is None:
+        return ""
+    x, y, z = 1e3 * unknown.centre
+    size, sd = unknown.size
+    where = f"about ({x:z.0f}, {y:z.0f}, {z:z.0f}) mm"
+    if unknown.outside:
+        said = f"It is a force from outside, {where}, of {measured(size, sd, 'N')} in all"
+    else:
+        said = f"It is strongest {where}, and no net force of it is seen ({measured(size, sd, 'N')}): it may act within"
+    depth = abs(unknown.surface_nats)
+    if depth > _TELLING:
+        said += ", and on the surface" if unknown.surface_nats > 0.0 else ", and below the surface"
+    return f" {said}."
 
 
 def assumptions_of(case: Case, base: Base, kappa: float) -> tuple[str, ...]:

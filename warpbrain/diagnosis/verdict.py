@@ -4,7 +4,8 @@
 2. Named if one mechanism is probable enough, predicts points that it was not fitted to better than without it and than
    patterns that mean nothing, has a plausible size, and leaves nothing significant. Named + rest if something is left.
 3. Not physics if a nuisance far larger than it should be explains the residuals better than any mechanism.
-4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is. Else: cannot say.
+4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is, and predicts points
+   that it was not fitted to better. Else: cannot say.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ Floats = NDArray[np.float64]
 SURE, TOGETHER, ADEQUATE = 0.9, 0.9, 0.01
 #: Largest size [standard deviations of its prior] and placebo probability of a name, and members of a group.
 LARGEST, PLACEBO, MEMBERS = 4.0, 0.05, 4
+#: Standard errors by which a gain must be above zero: nine of ten draws are above it.
+ERRORS = 1.28
 
 
 @dataclass(frozen=True)
@@ -45,21 +48,29 @@ class Evidence:
     alpha, p_value : float
     ranking : tuple of Ranked
         The most probable first.
-    gain : (part, low, high)
-        Of the held-out error by the most probable one, with its 80 % interval.
+    gain : float
+        By how much [nats] the most probable one makes held-out points more probable, of regions where it acts in more
+        than one place.
+    sure : float
+        The same less as many standard errors that nine of ten are above it, of regions or of points here and there:
+        what acts in few places is in few regions, and what a neighbour tells is no gain here and there.
     placebo_p, adequacy_p : float
         Of it.
     size : float
         Its largest coefficient in standard deviations of the prior.
+    unknown_sure : float
+        What `sure` is, of any smooth force.
     """
 
     alpha: float
     p_value: float
     ranking: Sequence[Ranked]
-    gain: tuple[float, float, float]
+    gain: float
+    sure: float
     placebo_p: float
     adequacy_p: float
     size: float
+    unknown_sure: float
 
 
 @dataclass(frozen=True)
@@ -79,6 +90,42 @@ class Verdict:
     kinds: tuple[str, ...]
     why: str = ""
 
+    @property
+    def adds(self) -> bool:
+        """Whether it names a mechanism."""
+        return self.verdict in (NAMED, NAMED_AND_REST)
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What the verdicts of all stages come to: each looks for what acts beside those that were named before it.
+
+    Attributes
+    ----------
+    verdict : str
+    kinds : tuple of str
+        That are named, or of a group, or no physics.
+    rest : Verdict or None
+        Of what is left beside what is named, if that is significant.
+    why : str
+        What kept a name from being spoken.
+    """
+
+    verdict: str
+    kinds: tuple[str, ...]
+    rest: Verdict | None = None
+    why: str = ""
+
+
+def overall(verdicts: Sequence[Verdict]) -> Conclusion:
+    """Of one stage after the other: names are added while the rule gives them, and the last says what is left."""
+    adding = [verdict for verdict in verdicts if verdict.adds]
+    if not adding:
+        return Conclusion(verdicts[0].verdict, verdicts[0].kinds, None, verdicts[0].why)
+    after = verdicts[len(adding) :]
+    rest = after[0] if after and adding[-1].verdict == NAMED_AND_REST else None
+    return Conclusion(adding[-1].verdict, tuple(verdict.kinds[0] for verdict in adding), rest)
+
 
 def decide(found: Evidence) -> Verdict:
     """Apply the rule."""
@@ -92,16 +139,18 @@ def decide(found: Evidence) -> Verdict:
         return Verdict(NAMED if found.adequacy_p > ADEQUATE else NAMED_AND_REST, (best.kind,))
     label_set = _label_set(found.ranking)
     physics = all(ranked.physics for ranked in found.ranking if ranked.kind in label_set)
-    if 1 < len(label_set) <= MEMBERS and physics and found.gain[0] > 0.0:
+    if 1 < len(label_set) <= MEMBERS and physics and found.gain > 0.0:
         return Verdict(GROUP, label_set, "; ".join(vetoes))
     if best.kind == UNKNOWN_KIND and best.probability >= 0.5:
-        return Verdict(UNKNOWN, ())
+        if found.unknown_sure > 0.0:
+            return Verdict(UNKNOWN, ())
+        vetoes = ["any smooth force fits better than a mechanism, but does not predict points that were held out"]
     return Verdict(CANNOT_SAY, label_set, "; ".join(vetoes))
 
 
 def _vetoes(found: Evidence) -> list[str]:
     vetoes = []
-    if found.gain[1] <= 0.0:
+    if found.gain <= 0.0 or found.sure <= 0.0:
         vetoes.append("points that were held out are not predicted better with it")
     if found.placebo_p > PLACEBO:
         vetoes.append("patterns that mean nothing predict as well")

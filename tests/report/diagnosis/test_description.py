@@ -13,6 +13,7 @@ from warpbrain.report.files import write_summary
 
 KEYS = {
     *("verdict", "sentence", "p_value", "mechanism", "probability", "parameters", "where", "when", "ranking", "group"),
+    *("mechanisms", "unknown"),
     *("next_measurement", "smallest_detectable", "confusion", "fit", "map", "assumptions", "remarks", "case"),
     *("inputs_sha256", "options", "seconds", "equilibria", "device", "versions"),
 }
@@ -43,6 +44,7 @@ def test_keys_are_complete(small_diagnosis, verdict, tmp_path):
     assert set(read) == KEYS
     assert set(read["fit"]) == FIT
     assert all(set(one) == RANKED for one in read["ranking"])
+    assert [one["mechanism"] for one in read["mechanisms"]] == (["gravity"] if verdict.startswith("named") else [])
     assert (read["mechanism"] == "gravity") == verdict.startswith("named")
 
 

@@ -8,6 +8,7 @@ from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Confusion, Diagnosis, Ranked, Value
 from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence
+from warpbrain.diagnosis.traits import Traits
 from warpbrain.diagnosis.words import smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.report.fingerprints import fingerprints
@@ -25,6 +26,8 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
         "probability": best.probability if best else found.ranking[0].probability,
         "parameters": _values(best.values) if best else {},
         "where": _where(found, best),
+        "mechanisms": [_named(one, found.case.gravity_axis) for one in found.named],
+        "unknown": _unknown(found.unknown),
         "when": _when(found.when),
         "ranking": [_ranked(ranked, found.case.gravity_axis) for ranked in found.ranking]
         + [_rejected(kind, why) for kind, why in found.rejected.items()],
@@ -84,6 +87,32 @@ def _confusion(confusion: Confusion | None) -> dict[str, Any]:
 
 def _values(values: tuple[Value, ...]) -> dict[str, Any]:
     return {one.name: {"value": one.value, "sd": one.sd, "unit": one.unit} for one in values}
+
+
+def _named(one: Ranked, gravity_axis: tuple[float, float, float] | None) -> dict[str, Any]:
+    return {
+        "mechanism": one.kind,
+        "says": effect_sentence(one, gravity_axis),
+        "probability": one.probability,
+        "parameters": _values(one.values),
+        "where": None if one.centre is None else {"centre_m": one.centre, "radius_m": one.radius},
+        "region": one.region,
+    }
+
+
+def _unknown(traits: Traits | None) -> dict[str, Any] | None:
+    if traits is None:
+        return None
+    return {
+        "net_force_n": traits.force,
+        "net_force_sd_n": traits.force_sd,
+        "net_moment_nm": traits.moment,
+        "net_moment_sd_nm": traits.moment_sd,
+        "from_outside": traits.outside,
+        "turning": traits.turning,
+        "surface_over_depth_nats": traits.surface_nats,
+        "centre_m": traits.centre,
+    }
 
 
 def _where(found: Diagnosis, best: Ranked | None) -> dict[str, Any] | None:

@@ -110,8 +110,10 @@ def _section(title: str, *parts: str) -> str:
 def _verdict(said: dict[str, Any]) -> str:
     facts = [("p, nothing missing", f"{said['p_value']:.2g}")]
     if said["mechanism"]:
-        facts.insert(0, ("mechanism", text(said["mechanism"])))
-        facts.append(("probability", f"{said['probability']:.3f}"))
+        # a specimen's says all that it names in another place
+        named = said.get("mechanisms") or [said]
+        facts.insert(0, ("mechanism", text(" and ".join(one["mechanism"] for one in named))))
+        facts.append(("probability", " and ".join(f"{one['probability']:.3f}" for one in named)))
     unit = unit_of(said)
     held = said["fit"][f"heldout_rmse_{unit.suffix}"]
     if held.get("refitted") is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.atomic import whole_file
-from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.diagnosis.result import EXPLAINED, Diagnosis
 from warpbrain.report.files import MILLIMETRES
 
 Floats = NDArray[np.float64]
@@ -34,8 +34,7 @@ def write_points(path: Path, found: Diagnosis) -> None:
     nothing = np.full(len(sensors), np.nan)
     # with the tissue refitted nothing else is missing from the base, should its own refit have failed
     refitted = found.fits["none"].residual if "none" in found.fits else found.base.residual
-    own = found.named[0].kind if found.named else ""
-    explained = found.fits[own].residual if own in found.fits else nothing
+    explained = found.fits[EXPLAINED].residual if EXPLAINED in found.fits else nothing
     factors = np.where(sensors.is_displacement, MILLIMETRES, 1.0)
     numbers = [
         factors * values
@@ -45,7 +44,7 @@ def write_points(path: Path, found: Diagnosis) -> None:
             observed - refitted,
             observed - explained,
             _held_out(found, "none"),
-            _held_out(found, own),
+            _held_out(found, EXPLAINED),
         )
     ]
     times = np.where(np.isfinite(sensors.times), sensors.times, np.nan)

@@ -1,0 +1,173 @@
+"""One question of a diagnosis: what acts beside what is known already, compared at one state.
+
+At first nothing is known and the state is the base; later it is that of the refit with all that was named, whose
+columns are nuisances then, each with the width of its own prior.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.base import Base
+from warpbrain.diagnosis.dictionary import Candidates
+from warpbrain.diagnosis.effects import Effect, Effects
+from warpbrain.diagnosis.evidence import Explanation
+from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.diagnosis.refitting import Refit
+from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening, log_unknown
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """What is compared.
+
+    Attributes
+    ----------
+    base : Base
+    known : tuple of str
+        Kinds that are in all of the hypotheses.
+    candidates : Candidates
+        At the state of this stage.
+    screening : Screening
+        With noise and nuisances of this stage.
+    residual : (n,) array
+        Of the linear model, with all nuisances in the middle of their prior.
+    screen : Screen
+    null : (n, b) array
+        Whitened residuals in which nothing more is missing.
+    p_value : float
+        Of nothing more missing.
+    kappa : float
+        Factor on the noise.
+    fits : dict of str to Refit
+        Without linearising: ``"none"`` with what is known, the others with their kind as the last effect.
+    """
+
+    base: Base
+    known: tuple[str, ...]
+    candidates: Candidates
+    screening: Screening
+    residual: Floats
+    screen: Screen
+    null: Floats
+    p_value: float
+    kappa: float
+    fits: dict[str, Refit]
+
+    @property
+    def explanation(self) -> Explanation:
+        """Noise and nuisances."""
+        return self.screening.explanation
+
+    @property
+    def without(self) -> tuple[Floats, Floats, float]:
+        """The linear model (n,), (n, q) without anything more, and the factor on its noise."""
+        if "none" in self.fits:
+            none = self.fits["none"]
+            return none.linear, none.columns, none.kappa
+        return self.residual, self.explanation.nuisances, self.kappa
+
+    def best_effect(self, kind: str) -> Effect:
+        """The most probable effect of a kind."""
+        return self.candidates.effects[self.screen.best_effect(self.candidates, kind)]
+
+    def log_evidence(self) -> dict[str, float]:
+        """Against nothing more: of refits where there are, else of screening, no better than a refit."""
+        screen, fits = self.screen, self.fits
+        screened = dict(zip(screen.kinds, screen.log_factors[:, 0].tolist(), strict=True))
+        if "none" not in fits:
+            return screened
+        # a search that ended too early must not make everything else look better
+        none = max(fits["none"].log_evidence, float(screen.none[0]))
+        found: dict[str, float] = {}
+        for kind, value in screened.items():
+            if kind in fits:
+                found[kind] = fits[kind].log_evidence + self.over_places(kind) - none
+            elif kind != UNKNOWN:
+                found[kind] = value - (none - float(screen.none[0]))
+        best_screened = max((screened[kind] for kind in fits if kind != "none"), default=0.0)
+        best_fitted = max((found[kind] for kind in fits if kind != "none"), default=0.0)
+        # to first order only: what is not refitted is taken no better beside the best than screening had it
+        for kind in found:
+            if kind not in fits and self.best_effect(kind).proposal is not None:
+                found[kind] = min(found[kind], best_fitted - (best_screened - screened[kind]))
+        found[UNKNOWN] = self._unknown(fits["none"]) - none
+        return found
+
+    def over_places(self, kind: str) -> float:
+        """What the best of the places and levels of a kind loses where all of them are averaged over."""
+        from scipy.special import logsumexp
+
+        own = self.screen.places[self.candidates.of_kind[kind], 0]
+        return float(logsumexp(own)) - float(np.log(len(own))) - float(own.max())
+
+    def _unknown(self, none: Refit) -> float:
+        """Log evidence of any smooth force in the place of a mechanism."""
+        explanation = none.explanation(self.explanation.factor)
+        loose = [explanation.with_more(force) for force in self.base.smooth_forces]
+        return float(log_unknown(loose, explanation.whitened(none.linear)[:, None])[0])
+
+
+def compared(
+    base: Base,
+    known: tuple[str, ...],
+    candidates: Candidates,
+    explanation: Explanation,
+    residual: Floats,
+    kappa: float,
+    draws: int,
+    rng: np.random.Generator,
+) -> Stage:
+    """A stage that has been screened; nothing is refitted yet."""
+    screening = Screening(explanation, candidates, base.smooth_forces)
+    screen = screening.run(explanation.whitened(residual)[:, None])
+    null = explanation.draws(draws, kappa, rng)
+    alarms = screening.run(null).alarm
+    p_value = float((1 + np.sum(alarms >= screen.alarm[0])) / (1 + len(alarms)))
+    return Stage(base, known, candidates, screening, residual, screen, null, p_value, kappa, {})
+
+
+def linear_point(
+    explanation: Explanation, residual: Floats, nuisances: Floats, effect: Effect | None, kappa: float
+) -> Floats:
+    """Coordinates of nuisances, and of an effect beside them, that the linear model has: to begin a refit with."""
+    columns, mean = nuisances, np.zeros(len(residual))
+    if effect is not None:
+        columns, mean = np.column_stack([nuisances, effect.columns]), effect.mean
+    W = explanation.whitened(columns) / kappa
+    w = explanation.whitened(residual - mean) / kappa
+    return np.asarray(np.linalg.solve(np.eye(W.shape[1]) + W.T @ W, W.T @ w))
+
+
+def candidates_beside(fit: Refit, candidates: Candidates) -> Candidates:
+    """The effects of a dictionary at the state of a refit.
+
+    What is solved as a whole or over time keeps the columns that it has at the base, as has what is no physics. A kind of which a case
+    has only one is left out where the refit has it.
+    """
+    state = fit.state
+    effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors))
+    acting = [effect.proposed.make(effect.proposed.mean) for effect in fit.effects]
+    there = {mechanism.kind for mechanism in acting if not mechanism.several}
+    found: list[Effect] = []
+    of_kind: dict[str, NDArray[np.int64]] = {}
+    for kind, numbers in candidates.of_kind.items():
+        if kind in there:
+            continue
+        own = [candidates.effects[k] for k in numbers.tolist()]
+        smooth = [k for k, effect in enumerate(own) if _is_smooth(effect)]
+        for k, effect in zip(smooth, effects.of([own[k].proposed for k in smooth]), strict=True):
+            own[k] = effect
+        of_kind[kind] = np.arange(len(found), len(found) + len(own))
+        found.extend(own)
+    return replace(candidates, kinds=tuple(of_kind), effects=tuple(found), of_kind=of_kind)
+
+
+def _is_smooth(effect: Effect) -> bool:
+    """Whether it is differentiated at a state: neither solved as a whole nor over time, nor no physics."""
+    return effect.proposal is not None and not effect.proposal.is_there_or_not and effect.about is None
