@@ -48,8 +48,8 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
 
 #: Kinds that are refitted without linearising, at first and beside others, and the log Bayes factor behind the best at
-#: which that ends.
-_REFITTED, _REFITTED_BESIDE, _BEHIND = 3, 2, 12.0
+#: which that ends, and against nothing more that one beside others needs.
+_REFITTED, _REFITTED_BESIDE, _BEHIND, _WORTH = 3, 2, 12.0, 2.0
 #: Mechanisms that are named at most.
 _MOST = 3
 
@@ -152,7 +152,8 @@ class Diagnosing:
         kinds = stage.candidates.kinds
         factors = stage.screen.log_factors[: len(kinds), 0]
         order = np.argsort(-factors).tolist()
-        chosen = [kinds[k] for k in order[:most] if factors[order[0]] - factors[k] < _BEHIND]
+        least = factors[order[0]] - _BEHIND if known is None else max(factors[order[0]] - _BEHIND, _WORTH)
+        chosen = [kinds[k] for k in order[:most] if factors[k] > least]
         there = () if known is None else known.with_own_columns
         near = None if known is None else known.state
         fits: dict[str, Refit] = {}
@@ -163,18 +164,18 @@ class Diagnosing:
             self.listener.stage(f"refit without linearising: {' and '.join((*stage.known, kind))}")
             begin = linear_point(stage.explanation, stage.residual, stage.explanation.nuisances, effect, stage.kappa)
             effects = there if effect is None else (*there, effect)
-            number = None if effect is None else stage.screen.best_effect(stage.candidates, kind)
-            size = 0 if effect is None else effect.columns.shape[1]
-            between = (
-                None
-                if number is None
-                else between_neighbours(stage.candidates, kind, number, begin[len(begin) - size :])
-            )
+            between = None if effect is None else self._between(stage, kind, begin)
             try:
                 fits[kind] = refitting.fit(effects, begin, stage.kappa, near, between)
             except (SolveError, InputError):
                 continue
         return fits
+
+    @staticmethod
+    def _between(stage: Stage, kind: str, begin: Floats) -> Floats | None:
+        number = stage.screen.best_effect(stage.candidates, kind)
+        size = stage.candidates.effects[number].columns.shape[1]
+        return between_neighbours(stage.candidates, kind, number, begin[len(begin) - size :])
 
     def _conclude(
         self,

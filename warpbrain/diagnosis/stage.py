@@ -147,8 +147,8 @@ def linear_point(
 def candidates_beside(fit: Refit, candidates: Candidates) -> Candidates:
     """The effects of a dictionary at the state of a refit.
 
-    What is solved as a whole or over time keeps the columns that it has at the base, as has what is no physics. A kind of which a case
-    has only one is left out where the refit has it.
+    What is solved as a whole or over time keeps the columns that it has at the base, as has what is no physics. A kind
+    of which a case has only one is left out where the refit has it.
     """
     state = fit.state
     effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors))
