@@ -17,8 +17,8 @@ from warpbrain.diagnosis.flexible import LENGTHS, flexible_columns, smooth_force
 from warpbrain.diagnosis.fraction import likely_fraction
 from warpbrain.diagnosis.gross_errors import ASIDE, gross_errors
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import mesh_error
-from warpbrain.diagnosis.nuisances import REGISTRATION_SD, Nuisances, nuisances_at
+from warpbrain.diagnosis.mesh_error import MeshErrors, mesh_errors
+from warpbrain.diagnosis.nuisances import REGISTRATION_SD, Nuisances, nuisances_at, other_volume
 from warpbrain.diagnosis.options import Listener
 from warpbrain.diagnosis.sensing import explanation_of, known_sigma
 from warpbrain.diagnosis.sensors import tracked_points
@@ -27,7 +27,6 @@ from warpbrain.diagnosis.switching import Known, Solving
 from warpbrain.diagnosis.time_courses import main_courses
 from warpbrain.diagnosis.tissue_prior import declared, tissue_prior
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.gaussian import Gaussian
 
 Floats = NDArray[np.float64]
@@ -71,8 +70,8 @@ class Base:
     explanation : Explanation
     residual : (n,) array
         Of the linear model with all nuisances in the middle of their prior.
-    difference : Difference or None
-        The error of the mesh.
+    mesh_errors : MeshErrors or None
+        Of the base; None: the mesh is taken for exact.
     remarks : tuple of str
     """
 
@@ -90,7 +89,7 @@ class Base:
     aside: NDArray[np.bool_]
     explanation: Explanation
     residual: Floats
-    difference: Difference | None
+    mesh_errors: MeshErrors | None
     remarks: tuple[str, ...]
 
     @property
@@ -122,7 +121,7 @@ class Base:
         theta = self.state.hypothesis.theta
         own = self.nuisances
         return nuisances_at(
-            at, self.states, theta, self.prior, effects, self.difference, own.anchors, own.fraction
+            at, self.states, theta, self.prior, effects, self.mesh_errors, own.anchors, own.fraction
         ), effects
 
 
@@ -172,7 +171,7 @@ class BaseFinder:
             if np.abs(moved).max() < _NEAR:
                 break
         self._listener.stage("the error of the mesh, and the compliance of the body at the sensors")
-        return self._linearised(first, state, self._difference(state))
+        return self._linearised(first, state, self._errors_of_mesh(state))
 
     def _freed(self, rough: Base) -> Hypothesis:
         """Tissue and field beside any smooth force; recordings are realigned."""
@@ -203,22 +202,23 @@ class BaseFinder:
         field = np.clip(xi[nuisances.part("stiffness field")], -_FARTHEST, _FARTHEST)
         return Hypothesis(self.prior.mean + self.prior.factor @ tissue, field)
 
-    def _difference(self, state: SolvedState) -> Difference | None:
+    def _errors_of_mesh(self, state: SolvedState) -> MeshErrors | None:
         if not self._mesh_error:
             return None
         try:
-            return mesh_error(self.states, state.hypothesis, state)
+            volume = other_volume(self.states)
+            return mesh_errors(self.states, state, volume.make(volume.mean + volume.sd))
         except (SolveError, InputError) as error:
             self._remarks.append(f"the error of the mesh is not known: {error}")
             return None
 
-    def _linearised(self, first: SolvedState, state: SolvedState, difference: Difference | None) -> Base:
+    def _linearised(self, first: SolvedState, state: SolvedState, errors: MeshErrors | None) -> Base:
         sensors = state.sensors
         at = Linearisation(state.system, state.u, state.reactions, sensors)
         known = Known()
         effects = Effects(at, Solving(self.states, state, sensors, known))
         theta = state.hypothesis.theta
-        nuisances = nuisances_at(at, self.states, theta, self.prior, effects, difference)
+        nuisances = nuisances_at(at, self.states, theta, self.prior, effects, errors)
         if self._bare:
             nuisances = nuisances.weakened()
         flexible = tuple(flexible_columns(at, length * self._spacing) for length in LENGTHS)
@@ -242,7 +242,7 @@ class BaseFinder:
             aside = found
         sigma = np.where(aside, ASIDE * noise, noise)
         explanation = explanation_of(sensors, sigma, nuisances.columns)
-        if difference is not None and not self._bare:
+        if errors is not None and not self._bare:
             smooth = smooth_forces(flexible, float(np.median(noise[sensors.is_displacement])))
             nuisances = nuisances.with_fraction(likely_fraction(explanation.factor, nuisances, residual, smooth))
             explanation = Explanation(explanation.factor, nuisances.columns)
@@ -261,7 +261,7 @@ class BaseFinder:
             aside,
             explanation,
             residual,
-            difference,
+            errors,
             tuple(self._remarks),
         )
 

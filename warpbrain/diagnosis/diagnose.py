@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.alternatives import alternatives_at
@@ -46,6 +47,8 @@ from warpbrain.diagnosis.verdict import overall
 from warpbrain.diagnosis.virtual import VirtualCases
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
+
+Floats = NDArray[np.float64]
 
 #: Kinds that are refitted without linearising, at first and beside others, and the log Bayes factor behind the best at
 #: which that ends, and against nothing more that one beside others needs.
@@ -110,9 +113,8 @@ class Diagnosing:
                 base.at, base.explanation, base.whitened, first.null, kappa, 0.7 * spacing, spacing, options.alpha
             )
         with self._timed("refit"):
-            refitting = Refitting(
-                self.states, base.prior, base.nuisances, base.explanation.factor, base.state, base.difference
-            )
+            error = None if base.mesh_errors is None else base.mesh_errors.own
+            refitting = Refitting(self.states, base.prior, base.nuisances, base.explanation.factor, base.state, error)
             first.fits.update(self._refits(refitting, first, None, _REFITTED))
         with self._timed("held out"):
             judge = Judge(base, options, rng)

@@ -2,23 +2,61 @@
 
 Linear tetrahedra answer too little, and to each mechanism in its own measure: a pressure in a cavity moves a coarse
 mesh far less than weight does. So the error is computed with the mechanism that is fitted, not once for all: otherwise
-its size would come out wrong by as much.
+its size would come out wrong by as much. And it grows as tissue is less compressible than was assumed, by more than the
+displacement itself: that belongs to what compressibility may explain.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from warpbrain.diagnosis.states import TOLERANCE, Hypothesis, SolvedState, States
 from warpbrain.estimation.discretisation import Difference
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.finer import FinerCase, restricted
 from warpbrain.simulation.system import System
 
 #: Out-of-balance force of the finer state, relative: far below the error that is looked for.
 _ROUGH = 10.0 * TOLERANCE
+
+
+@dataclass(frozen=True, eq=False)
+class MeshErrors:
+    """The error of the mesh at a state, and how it changes.
+
+    Attributes
+    ----------
+    own : Difference
+    by_volume : Difference
+        What one standard deviation of compressibility adds to it.
+    """
+
+    own: Difference
+    by_volume: Difference
+
+
+def mesh_errors(states: States, state: SolvedState, less_compressible: Mechanism) -> MeshErrors:
+    """The error of a state, and what it is beside that with one standard deviation of compressibility.
+
+    Parameters
+    ----------
+    states : States
+    state : SolvedState
+    less_compressible : Mechanism
+        Tissue that is less compressible by that.
+
+    Raises
+    ------
+    SolveError
+        If there is no equilibrium on the finer mesh.
+    """
+    own = mesh_error(states, state.hypothesis, state)
+    mechanisms = (*state.hypothesis.mechanisms, less_compressible)
+    other = mesh_error(states, replace(state.hypothesis, mechanisms=mechanisms), state)
+    return MeshErrors(own, Difference(other.u - own.u, other.reactions - own.reactions, own.theta))
 
 
 def mesh_error(states: States, hypothesis: Hypothesis, near: SolvedState) -> Difference:

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effects
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.sensors import spread_points
+from warpbrain.diagnosis.mesh_error import MeshErrors
+from warpbrain.diagnosis.sensors import Sensors, spread_points
 from warpbrain.diagnosis.states import States
-from warpbrain.estimation.discretisation import Difference, Discretisation
+from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
@@ -112,7 +113,7 @@ def nuisances_at(
     theta: Floats,
     prior: Gaussian,
     effects: Effects,
-    mesh_error: Difference | None,
+    mesh_errors: MeshErrors | None,
     anchors: Floats | None = None,
     fraction: float = FRACTION,
 ) -> Nuisances:
@@ -128,8 +129,8 @@ def nuisances_at(
         Of `theta`.
     effects : Effects
         At that state.
-    mesh_error : Difference or None
-        The state on a finer mesh less the state.
+    mesh_errors : MeshErrors or None
+        The state on a finer mesh less the state; None: the mesh is taken for exact.
     anchors : (a, 3) array, optional
         Those of other sensors, so that columns mean the same.
     fraction : float
@@ -142,15 +143,17 @@ def nuisances_at(
     families = [
         Family("tissue", tissue_columns(at, states, theta, prior)),
         Family("stiffness field", field_columns(at, states)),
-        Family("compressibility", _law_columns(effects, _other_volume(states))),
+        Family(
+            "compressibility", _law_columns(effects, [other_volume(states)]) + _volume_locking(sensors, mesh_errors)
+        ),
         Family("shape of the law", _law_columns(effects, _other_shape())),
         Family("known loads", _known_loads(at)),
         Family("registration", sensors.rigid * REGISTRATION_SD),
     ]
     mean = np.zeros(len(sensors))
-    if mesh_error is not None:
+    if mesh_errors is not None:
         believed = Discretisation()
-        answer = sensors.answer(mesh_error.u, mesh_error.reactions)
+        answer = sensors.answer(mesh_errors.own.u, mesh_errors.own.reactions)
         mean = believed.mean * answer
         families.append(Family("mesh", believed.deviation * answer[:, None]))
     families.append(Family("mesh, unknown", _fractional(at, anchors, fraction)))
@@ -189,11 +192,18 @@ def _law_columns(effects: Effects, proposals: list[Proposal]) -> Floats:
     return np.concatenate([effect.columns for effect in effects.of(proposals)], axis=1)
 
 
-def _other_volume(states: States) -> list[Proposal]:
+def other_volume(states: States) -> Proposal:
+    """Tissue that is more or less compressible than the case says, as much in all tissues."""
     own = -math.log1p(-2.0 * states.case.poisson)
-    return [
-        Proposal.of_one(lambda c: Compressibility(poisson=-0.5 * math.expm1(-c)), own, _VOLUME, "smooth", own),
-    ]
+    return Proposal.of_one(lambda c: Compressibility(poisson=-0.5 * math.expm1(-c)), own, _VOLUME, "smooth", own)
+
+
+def _volume_locking(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:
+    """What the mesh's error adds (n, 1) to what one standard deviation of compressibility changes."""
+    if mesh_errors is None:
+        return np.zeros((len(sensors), 1))
+    change = mesh_errors.by_volume
+    return Discretisation().mean * sensors.answer(change.u, change.reactions)[:, None]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,7 +24,11 @@ from warpbrain.estimation.gaussian import Gaussian
 
 Floats = NDArray[np.float64]
 
-_ITERATIONS, _HALVINGS = 5, 4
+_ITERATIONS, _HALVINGS = 6, 4
+#: How far [standard deviations] coordinates go until columns are made anew.
+_ANEW = 0.3
+#: Change of the mesh's error [standard deviations of the noise, all sensors together] with which a fit goes on.
+_MATTERS = 0.3
 #: Steps shorter than this in standard deviations of the prior end the search.
 _SHORT = 0.03
 #: How far [standard deviations] coordinates of tissue and field may go.
@@ -137,6 +141,7 @@ class Refitting:
         self.start, self.difference = start, difference
         self._share: _Share | None = None
         self._between: Floats | None = None
+        self._settled: Floats = np.zeros(len(factor))
         self._U = nuisances.columns
         self._tissue, self._field = nuisances.part("tissue"), nuisances.part("stiffness field")
         self._linear = np.ones(self._U.shape[1], dtype=bool)
@@ -178,10 +183,14 @@ class Refitting:
         """
         self._share, self._between = None, between
         columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
-        found = self._descend(effects, self._limited(begin), columns, kappa, near or self.start, 1)
-        if self.difference is None or not effects:
+        found = self._descend(effects, self._limited(begin), columns, kappa, near or self.start, True)
+        if self.difference is None:
             return self._refit(effects, *found)
         state, z, _, columns, converged = found
+        if not effects:
+            if self._settle(state, self.difference):
+                found = self._descend(effects, z, columns, kappa, state, False)
+            return self._refit(effects, *found)
         self._share = self._share_of(effects, state, z)
         if self._share is None and converged:
             return self._refit(effects, *found)
@@ -189,7 +198,23 @@ class Refitting:
             columns = columns.copy()
             own = slice(self._U.shape[1], self._U.shape[1] + len(self._share.along))
             columns[:, own] += np.outer(self._share.answer, self._share.along)
-        return self._refit(effects, *self._descend(effects, z, columns, kappa, state, -1))
+        return self._refit(effects, *self._descend(effects, z, columns, kappa, state, False))
+
+    def _settle(self, state: SolvedState, before: Difference) -> bool:
+        """Take the error of the mesh from a fit of nothing, for all fits to come; whether that matters.
+
+        It depends on the stiffness of the tissue, and would be taken for a mechanism's share otherwise.
+        """
+        from scipy.linalg import solve_triangular
+
+        try:
+            error = mesh_error(self.states, state.hypothesis, state)
+        except SolveError:
+            return False
+        change = Discretisation().mean * state.sensors.answer(error.u - before.u, error.reactions - before.reactions)
+        self.difference = error
+        self._settled = self._settled + change
+        return float(np.linalg.norm(solve_triangular(self.factor, change, lower=True))) > _MATTERS
 
     def _share_of(self, effects: tuple[Effect, ...], state: SolvedState, z: Floats) -> _Share | None:
         """What of the mesh's error belongs to the mechanisms, in proportion to their sizes; None if not known.
@@ -227,9 +252,9 @@ class Refitting:
         columns: Floats,
         kappa: float,
         near: SolvedState,
-        anew: int,
+        anew: bool,
     ) -> tuple[SolvedState, Floats, Floats, Floats, bool]:
-        """State, coordinates, residual, columns and whether it converged; `anew`: when columns are made anew."""
+        """State, coordinates, residual, columns and whether it converged; `anew`: whether columns are made anew."""
         from scipy.linalg import solve_triangular
 
         q = self._U.shape[1]
@@ -237,17 +262,18 @@ class Refitting:
         best = self._objective(residual, z, kappa)
         # far from the base the linear model may have gone too far
         base = self._at_base(z)
-        for part in (0.5, 0.0) if anew >= 0 else ():
+        for part in (0.5, 0.0) if anew else ():
             between = base + part * (z - base)
             beside, left = self._try(effects, between, near)
             value = self._objective(left, between, kappa)
             if value >= best:
                 break
             state, residual, z, best = beside, left, between, value
-        converged = False
+        converged, made_at = False, np.full(len(z), np.inf)
+        moving = ~np.concatenate([self._linear, np.zeros(len(z) - q, dtype=bool)])
         for iteration in range(_ITERATIONS):
-            if iteration == anew:
-                columns = self._columns_at(state, effects, z[q:], columns)
+            if anew and iteration > 0 and np.abs(z - made_at)[moving].max(initial=0.0) > _ANEW:
+                columns, made_at = self._columns_at(state, effects, z[q:], columns), z
             white = solve_triangular(self.factor, np.column_stack([residual, columns]), lower=True) / kappa
             gradient = white[:, 1:].T @ white[:, 0] - z
             step = np.linalg.solve(np.eye(len(z)) + white[:, 1:].T @ white[:, 1:], gradient)
@@ -315,7 +341,7 @@ class Refitting:
             state = self.states.solve(hypothesis)
         at = self._U.shape[1]
         linear = self._U[:, self._linear] @ z[:at][self._linear]
-        residual = state.sensors.residual - self.nuisances.mean - linear
+        residual = state.sensors.residual - self.nuisances.mean - self._settled - linear
         if self._share is not None:
             own = z[at : at + len(self._share.along)]
             residual = residual - self._share.answer * (self._share.constant + float(self._share.along @ own))

@@ -35,6 +35,8 @@ Floats = NDArray[np.float64]
 SURE, TOGETHER, ADEQUATE = 0.9, 0.9, 0.01
 #: Largest size [standard deviations of its prior] and placebo probability of a name, and members of a group.
 LARGEST, PLACEBO, MEMBERS = 4.0, 0.05, 4
+#: Least detectability of a name: what would hardly be seen is not what was seen.
+VISIBLE = 2.5
 #: Standard errors by which a gain must be above zero: nine of ten draws are above it.
 ERRORS = 1.28
 
@@ -154,6 +156,8 @@ def _vetoes(found: Evidence) -> list[str]:
         vetoes.append("points that were held out are not predicted better with it")
     if found.placebo_p > PLACEBO:
         vetoes.append("patterns that mean nothing predict as well")
+    if found.ranking[0].detectability < VISIBLE:
+        vetoes.append("an effect of that size would hardly be seen")
     if found.size > LARGEST:
         vetoes.append("its size would be implausible")
     return vetoes

@@ -18,6 +18,7 @@ from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import rigid_columns
+from warpbrain.mesh.feature_normals import feature_normals
 from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.comparison import faces_of_set
 from warpbrain.recordings.location import locate
@@ -224,9 +225,8 @@ def _surface(case: Case, recording: SurfaceRecording, time: float | None) -> Obs
         moved = mesh.points + u
         closest = closest_points(points, moved, faces)
         nodes, weights = faces[closest.face], closest.weights
-        corners = moved[nodes]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        # by a face's normal the side would depend on which of the faces at an edge is found, and that on rounding
+        normals = feature_normals(moved, faces)[0][closest.face, closest.features]
         offset = points - closest.position
         side = np.where(np.einsum("ni,ni->n", offset, normals) < 0.0, -1.0, 1.0)
         apart = closest.distance > 1e-12 * size

@@ -13,6 +13,9 @@ from warpbrain.recordings.spheres import Spheres
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
+#: Barycentric coordinates up to this are none.
+_ON = 1e-12
+
 
 @dataclass(frozen=True, eq=False)
 class ClosestPoints:
@@ -34,6 +37,13 @@ class ClosestPoints:
     face: Ints
     weights: Floats
     distance: Floats
+
+    @property
+    def features(self) -> NDArray[np.int64]:
+        """On which feature (n,) of its triangle each lies, as `warpbrain.mesh.feature_normals` numbers them."""
+        zero = self.weights <= _ON
+        edges = np.select([zero[:, 2], zero[:, 0], zero[:, 1]], [1, 2, 3], 0)
+        return np.asarray(np.where(zero.sum(axis=1) == 2, 4 + np.argmax(self.weights, axis=1), edges))
 
 
 def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> ClosestPoints:
