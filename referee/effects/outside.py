@@ -30,6 +30,8 @@ class Tether(Effect):
     unit: ClassVar[str] = "N"
     limits: ClassVar[tuple[float, float]] = (0.005, 2.0)
     forces: ClassVar[bool] = True
+    #: A force on a patch of the surface is what it is; that it points to one place shows at one load nowhere.
+    also: ClassVar[tuple[str, ...]] = ("traction",)
 
     centre: Place
     radius: float
