@@ -50,6 +50,8 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         ({"gravity": 0.97, "pressure": 0.03}, {"sure": -1.0}, CANNOT_SAY),
         ({"gravity": 0.97, "pressure": 0.03}, {"placebo_p": 0.3}, CANNOT_SAY),
         ({"gravity": 0.97, "pressure": 0.03}, {"size": 7.0}, CANNOT_SAY),
+        ({"gravity": 0.97, "pressure": 0.03}, {"p_value": 0.03}, CANNOT_SAY),
+        ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {"p_value": 0.03}, CANNOT_SAY),
     ],
 )
 def test_it_says(chances: Mapping[str, float], known: Mapping[str, object], expected: str) -> None:

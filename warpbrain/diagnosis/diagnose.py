@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -43,7 +44,7 @@ from warpbrain.diagnosis.sentences import assumptions_of, sentence_of
 from warpbrain.diagnosis.stage import Stage, candidates_beside, compared, linear_point
 from warpbrain.diagnosis.states import States
 from warpbrain.diagnosis.traits import Traits, traits_of
-from warpbrain.diagnosis.verdict import overall
+from warpbrain.diagnosis.verdict import CLAIM, overall
 from warpbrain.diagnosis.virtual import VirtualCases
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
@@ -87,6 +88,8 @@ class Diagnosing:
         self.states = States(case, device)
         self.dictionary = dictionary_of(case, self.options.candidates, len(self.states.times))
         self.seconds: dict[str, float] = {}
+        # enough that an alarm can be strong
+        self._draws = max(self.options.draws, math.ceil(2.0 / (CLAIM * self.options.alpha)))
 
     def run(self) -> Diagnosis:
         """Every stage.
@@ -107,7 +110,7 @@ class Diagnosing:
         self.listener.stage("screening")
         with self._timed("screening"):
             kappa = base.explanation.best_kappa(base.whitened)
-            first = compared(base, (), candidates, base.explanation, base.residual, kappa, options.draws, rng)
+            first = compared(base, (), candidates, base.explanation, base.residual, kappa, self._draws, rng)
         with self._timed("significance"):
             where = score_map(
                 base.at, base.explanation, base.whitened, first.null, kappa, 0.7 * spacing, spacing, options.alpha
@@ -115,7 +118,9 @@ class Diagnosing:
         with self._timed("refit"):
             error = None if base.mesh_errors is None else base.mesh_errors.own
             refitting = Refitting(self.states, base.prior, base.nuisances, base.explanation.factor, base.state, error)
-            first.fits.update(self._refits(refitting, first, None, _REFITTED))
+            # where nothing is missing, nothing is to be fitted that would be
+            alarmed = first.p_value <= options.alpha
+            first.fits.update(self._refits(refitting, first, None, _REFITTED if alarmed else 0))
         with self._timed("held out"):
             judge = Judge(base, options, rng)
             stages, judged = [first], [judge.judge(first)]
@@ -143,7 +148,7 @@ class Diagnosing:
         self.listener.stage(f"what acts beside {' and '.join(known)}")
         candidates = candidates_beside(fit, before.candidates)
         explanation = fit.explanation(before.base.explanation.factor)
-        stage = compared(before.base, known, candidates, explanation, fit.linear, fit.kappa, self.options.draws, rng)
+        stage = compared(before.base, known, candidates, explanation, fit.linear, fit.kappa, self._draws, rng)
         stage.fits["none"] = fit
         if stage.p_value <= self.options.alpha:
             stage.fits.update(self._refits(refitting, stage, fit, _REFITTED_BESIDE))

@@ -156,7 +156,8 @@ class Judge:
             z, covariance = Inner(explanation, stage.screening.stack, whitened).coefficients(kappa, number)
         d = explanation.detectability(own[:, 0] + own[:, 1:] @ z, kappa)
         centre, radius = _place(stage, kind)
-        why = "" if fit is not None else "less probable than what was refitted"
+        why = "less probable than what was refitted" if stage.p_value <= self.options.alpha else "nothing is missing"
+        why = "" if fit is not None else why
         own_places = candidates.of_kind[kind]
         scanned = [candidates.effects[k] for k in own_places.tolist()]
         weights = softmax(screen.places[own_places, 0])

@@ -5,7 +5,7 @@
    patterns that mean nothing, has a plausible size, and leaves nothing significant. Named + rest if something is left.
 3. Not physics if a nuisance far larger than it should be explains the residuals better than any mechanism.
 4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is, and predicts points
-   that it was not fitted to better. Else: cannot say.
+   that it was not fitted to better. Else: cannot say. A weak alarm is never more than that.
 """
 
 from __future__ import annotations
@@ -37,6 +37,9 @@ SURE, TOGETHER, ADEQUATE = 0.9, 0.9, 0.01
 LARGEST, PLACEBO, MEMBERS = 4.0, 0.05, 4
 #: Least detectability of a name: what would hardly be seen is not what was seen.
 VISIBLE = 2.5
+#: Part of the probability of a false alarm at which more is claimed than that something is missing: in calibration cases
+#: without an effect, and in traps, alarms that are wrong are weak ones.
+CLAIM = 0.2
 #: Standard errors by which a gain must be above zero: nine of ten draws are above it.
 ERRORS = 1.28
 
@@ -141,9 +144,10 @@ def decide(found: Evidence) -> Verdict:
         return Verdict(NAMED if found.adequacy_p > ADEQUATE else NAMED_AND_REST, (best.kind,))
     label_set = _label_set(found.ranking)
     physics = all(ranked.physics for ranked in found.ranking if ranked.kind in label_set)
-    if 1 < len(label_set) <= MEMBERS and physics and found.gain > 0.0:
+    claims = found.p_value <= CLAIM * found.alpha
+    if claims and 1 < len(label_set) <= MEMBERS and physics and found.gain > 0.0:
         return Verdict(GROUP, label_set, "; ".join(vetoes))
-    if best.kind == UNKNOWN_KIND and best.probability >= 0.5:
+    if claims and best.kind == UNKNOWN_KIND and best.probability >= 0.5:
         if found.unknown_sure > 0.0:
             return Verdict(UNKNOWN, ())
         vetoes = ["any smooth force fits better than a mechanism, but does not predict points that were held out"]
@@ -152,6 +156,8 @@ def decide(found: Evidence) -> Verdict:
 
 def _vetoes(found: Evidence) -> list[str]:
     vetoes = []
+    if found.p_value > CLAIM * found.alpha:
+        vetoes.append("the alarm is too weak to claim more")
     if found.gain <= 0.0 or found.sure <= 0.0:
         vetoes.append("points that were held out are not predicted better with it")
     if found.placebo_p > PLACEBO:
