@@ -17,7 +17,7 @@ from warpbrain.diagnosis.flexible import LENGTHS, flexible_columns, smooth_force
 from warpbrain.diagnosis.fraction import likely_fraction
 from warpbrain.diagnosis.gross_errors import ASIDE, gross_errors
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import MeshErrors, mesh_errors
+from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors
 from warpbrain.diagnosis.nuisances import REGISTRATION_SD, Nuisances, nuisances_at, other_volume
 from warpbrain.diagnosis.options import Listener
 from warpbrain.diagnosis.sensing import explanation_of, known_sigma
@@ -207,7 +207,7 @@ class BaseFinder:
             return None
         try:
             volume = other_volume(self.states)
-            return mesh_errors(self.states, state, volume.make(volume.mean + volume.sd))
+            return FinerStates(self.states).errors(state, volume.make(volume.mean + volume.sd))
         except (SolveError, InputError) as error:
             self._remarks.append(f"the error of the mesh is not known: {error}")
             return None

@@ -116,8 +116,8 @@ class Diagnosing:
                 base.at, base.explanation, base.whitened, first.null, kappa, 0.7 * spacing, spacing, options.alpha
             )
         with self._timed("refit"):
-            error = None if base.mesh_errors is None else base.mesh_errors.own
-            refitting = Refitting(self.states, base.prior, base.nuisances, base.explanation.factor, base.state, error)
+            factor = base.explanation.factor
+            refitting = Refitting(self.states, base.prior, base.nuisances, factor, base.state, base.mesh_errors)
             # where nothing is missing, nothing is to be fitted that would be
             alarmed = first.p_value <= options.alpha
             first.fits.update(self._refits(refitting, first, None, _REFITTED if alarmed else 0))

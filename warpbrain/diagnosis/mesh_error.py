@@ -11,13 +11,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpbrain.diagnosis.states import TOLERANCE, Hypothesis, SolvedState, States
+from warpbrain.errors import SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.finer import FinerCase, restricted
 from warpbrain.simulation.system import System
+
+Floats = NDArray[np.float64]
 
 #: Out-of-balance force of the finer state, relative: far below the error that is looked for.
 _ROUGH = 10.0 * TOLERANCE
@@ -32,56 +36,71 @@ class MeshErrors:
     own : Difference
     by_volume : Difference
         What one standard deviation of compressibility adds to it.
+    finer : FinerStates
+        Which finds it at other states.
     """
 
     own: Difference
     by_volume: Difference
+    finer: FinerStates
 
 
-def mesh_errors(states: States, state: SolvedState, less_compressible: Mechanism) -> MeshErrors:
-    """The error of a state, and what it is beside that with one standard deviation of compressibility.
-
-    Parameters
-    ----------
-    states : States
-    state : SolvedState
-    less_compressible : Mechanism
-        Tissue that is less compressible by that.
-
-    Raises
-    ------
-    SolveError
-        If there is no equilibrium on the finer mesh.
-    """
-    own = mesh_error(states, state.hypothesis, state)
-    mechanisms = (*state.hypothesis.mechanisms, less_compressible)
-    other = mesh_error(states, replace(state.hypothesis, mechanisms=mechanisms), state)
-    return MeshErrors(own, Difference(other.u - own.u, other.reactions - own.reactions, own.theta))
-
-
-def mesh_error(states: States, hypothesis: Hypothesis, near: SolvedState) -> Difference:
-    """The error of a hypothesis without its stiffness field, which it hardly depends on.
+class FinerStates:
+    """Solves hypotheses on elements of half the size, each from what the last was beyond its mesh.
 
     Parameters
     ----------
     states : States
-    hypothesis : Hypothesis
-    near : SolvedState
-        A state near to it.
-
-    Raises
-    ------
-    SolveError
-        If there is no equilibrium on the finer mesh.
     """
-    even = replace(hypothesis, field=np.zeros_like(hypothesis.field))
-    coarse = states.solve(even, near.u)
-    finer = FinerCase(states.case_of(even))
-    model = finer.model(coarse.system.model)
-    external = model.external_forces()
-    system = System(model, states.device)
-    found = EquilibriumSolver(system, EquilibriumOptions(tolerance=_ROUGH)).solve(
-        external, finer.prolongation @ coarse.u
-    )
-    u, reactions = restricted(finer.prolongation, found.u, model.reactions(found.internal, external))
-    return Difference(u - coarse.u, reactions - coarse.reactions, hypothesis.theta)
+
+    def __init__(self, states: States) -> None:
+        self.states = states
+        self._beyond: Floats | float = 0.0
+
+    def errors(self, state: SolvedState, less_compressible: Mechanism) -> MeshErrors:
+        """The error of a state, and what it is beside that with one standard deviation of compressibility.
+
+        Parameters
+        ----------
+        state : SolvedState
+        less_compressible : Mechanism
+            Tissue that is less compressible by that.
+
+        Raises
+        ------
+        SolveError
+            If there is no equilibrium on the finer mesh.
+        """
+        own = self.error(state.hypothesis, state)
+        mechanisms = (*state.hypothesis.mechanisms, less_compressible)
+        other = self.error(replace(state.hypothesis, mechanisms=mechanisms), state)
+        return MeshErrors(own, Difference(other.u - own.u, other.reactions - own.reactions, own.theta), self)
+
+    def error(self, hypothesis: Hypothesis, near: SolvedState) -> Difference:
+        """The error of a hypothesis without its stiffness field, which it hardly depends on.
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis
+        near : SolvedState
+            A state near to it.
+
+        Raises
+        ------
+        SolveError
+            If there is no equilibrium on the finer mesh.
+        """
+        even = replace(hypothesis, field=np.zeros_like(hypothesis.field))
+        coarse = self.states.solve(even, near.u)
+        finer = FinerCase(self.states.case_of(even))
+        model = finer.model(coarse.system.model)
+        external = model.external_forces()
+        solver = EquilibriumSolver(System(model, self.states.device), EquilibriumOptions(tolerance=_ROUGH))
+        flat = finer.prolongation @ coarse.u
+        try:
+            found = solver.solve(external, flat + self._beyond)
+        except SolveError:
+            found = solver.solve(external, flat)
+        self._beyond = found.u - flat
+        u, reactions = restricted(finer.prolongation, found.u, model.reactions(found.internal, external))
+        return Difference(u - coarse.u, reactions - coarse.reactions, hypothesis.theta)

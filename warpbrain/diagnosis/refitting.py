@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import mesh_error
+from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors
 from warpbrain.diagnosis.nuisances import Nuisances, field_columns, tissue_columns
 from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
@@ -124,8 +124,8 @@ class Refitting:
         Of the noise.
     start : SolvedState
         Near to the others.
-    difference : Difference or None
-        The error of the mesh there; None: meshes are taken for exact.
+    mesh_errors : MeshErrors or None
+        There; None: meshes are taken for exact.
     """
 
     def __init__(
@@ -135,10 +135,12 @@ class Refitting:
         nuisances: Nuisances,
         factor: Floats,
         start: SolvedState,
-        difference: Difference | None,
+        mesh_errors: MeshErrors | None,
     ) -> None:
         self.states, self.prior, self.nuisances, self.factor = states, prior, nuisances, factor
-        self.start, self.difference = start, difference
+        self.start = start
+        self.difference = None if mesh_errors is None else mesh_errors.own
+        self._finer = FinerStates(states) if mesh_errors is None else mesh_errors.finer
         self._share: _Share | None = None
         self._between: Floats | None = None
         self._settled: Floats = np.zeros(len(factor))
@@ -208,7 +210,7 @@ class Refitting:
         from scipy.linalg import solve_triangular
 
         try:
-            error = mesh_error(self.states, state.hypothesis, state)
+            error = self._finer.error(state.hypothesis, state)
         except SolveError:
             return False
         change = Discretisation().mean * state.sensors.answer(error.u - before.u, error.reactions - before.reactions)
@@ -238,7 +240,7 @@ class Refitting:
         if (length < 1e-6 and not switches) or changing:
             return None
         try:
-            error = mesh_error(self.states, state.hypothesis, state)
+            error = self._finer.error(state.hypothesis, state)
         except SolveError:
             return None
         answer = state.sensors.answer(error.u - self.difference.u, error.reactions - self.difference.reactions)

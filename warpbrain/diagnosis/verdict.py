@@ -37,8 +37,8 @@ SURE, TOGETHER, ADEQUATE = 0.9, 0.9, 0.01
 LARGEST, PLACEBO, MEMBERS = 4.0, 0.05, 4
 #: Least detectability of a name: what would hardly be seen is not what was seen.
 VISIBLE = 2.5
-#: Part of the probability of a false alarm at which more is claimed than that something is missing: in calibration cases
-#: without an effect, and in traps, alarms that are wrong are weak ones.
+#: Part of the probability of a false alarm up to which more is claimed than that something is missing: wrong alarms,
+#: in calibration cases without an effect and in traps, are weak ones.
 CLAIM = 0.2
 #: Standard errors by which a gain must be above zero: nine of ten draws are above it.
 ERRORS = 1.28
