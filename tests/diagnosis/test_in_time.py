@@ -12,7 +12,7 @@ from warpbrain.diagnosis.onset import OF_ITS_OWN, Onset, onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.diagnosis.screening import UNKNOWN
-from warpbrain.diagnosis.states import Hypothesis, States
+from warpbrain.diagnosis.states import Hypothesis, States, steps_to
 from warpbrain.diagnosis.switching import Known, Solving
 from warpbrain.diagnosis.time_courses import AT_ONCE, EVENLY, time_courses
 from warpbrain.diagnosis.tissue_prior import declared
@@ -98,3 +98,10 @@ def test_when_in_words() -> None:
     assert when_in_words(said) == "it set in between 5 and 20 s (probability 0.97), all at once"
     assert when_in_words({**said, "seconds": [0.0, 5.0], "course": ""}) == "it set in by 5 s (probability 0.97)"
     assert when_in_words({"seconds": [0.0, 5.0]}) == "0 to 5 s"
+
+
+@pytest.mark.parametrize("times", [(0.81, 4.04, 20.22), (5.51, 27.55), (1.056, 5.28, 26.4), (0.722, 3.61, 18.05)])
+def test_every_recorded_time_is_a_step(times: tuple[float, ...]) -> None:
+    steps = steps_to(times)
+    assert set(times) <= set(steps)
+    assert steps == sorted(steps) and steps[-1] == times[-1]

