@@ -15,7 +15,7 @@ from referee.outcomes import Outcome, read_outcomes
 from referee.reliability import reliability
 from referee.scores import ALPHA
 from referee.temperature import Ballots, Scale, conformal, fit, held_out, intervals
-from warpbrain.diagnosis.calibration import ALTERNATIVE_OFFSET, TEMPERATURE, UNKNOWN_OFFSET
+from warpbrain.diagnosis.calibration import BODIES
 from warpbrain.errors import InputError
 
 #: Fewest cases that a temperature is fitted to.
@@ -53,7 +53,7 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path) -> 
         )
     ballots = ballots_of(useful)
     found, (low, high) = fit(ballots), intervals(ballots)
-    now = Scale(TEMPERATURE, UNKNOWN_OFFSET, ALTERNATIVE_OFFSET)
+    now = Scale(BODIES.temperature, BODIES.unknown, BODIES.alternative)
     kinds = ", ".join(f"{sum(o.kind == kind for o in useful)} {kind}" for kind in ("effect", "two", "outside", "trap"))
     lines = [
         f"{len(outcomes)} cases, {len(missing)} without a diagnosis; fitted to {len(useful)} with an alarm: {kinds}.",
@@ -61,13 +61,9 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path) -> 
         "",
         f"{'':22}{'now':>8}{'fitted':>9}   95 % interval",
     ]
-    for name, key in (
-        ("TEMPERATURE", "temperature"),
-        ("UNKNOWN_OFFSET", "unknown"),
-        ("ALTERNATIVE_OFFSET", "alternative"),
-    ):
-        ends = f"{getattr(low, key):.2f} to {getattr(high, key):.2f}"
-        lines.append(f"{name:22}{getattr(now, key):8.2f}{getattr(found, key):9.2f}   {ends}")
+    for name in ("temperature", "unknown", "alternative"):
+        ends = f"{getattr(low, name):.2f} to {getattr(high, name):.2f}"
+        lines.append(f"{name:22}{getattr(now, name):8.2f}{getattr(found, name):9.2f}   {ends}")
     lines += ["", *_before_and_after(ballots, now), "", *_alarm(outcomes)]
     return "\n".join(lines)
 

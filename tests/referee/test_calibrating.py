@@ -77,7 +77,7 @@ def test_the_command_prints_what_it_found(tmp_path, capsys):
     assert main([*map(str, words)]) == 0
     told = capsys.readouterr().out
     assert "fitted to 14 with an alarm: 5 effect, 0 two, 5 outside, 4 trap" in told
-    assert "TEMPERATURE" in told and "p < 0.0400" in told
+    assert "temperature" in told and "p < 0.0400" in told
     (tmp_path / "c3" / "diagnosis.json").unlink()
     for k in range(5, 14):
         (tmp_path / f"c{k}" / "diagnosis.json").unlink()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.calibration import probabilities
+from warpbrain.diagnosis.calibration import SPECIMENS, probabilities
 from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.specimen.acting import Assumption
 from warpbrain.diagnosis.specimen.fitting import Fitting, SpecimenFit
@@ -189,7 +189,7 @@ class Staging:
         alternatives = frozenset(kind for kind, own in physics.items() if not own and kind != UNKNOWN)
         # Smooth changes of single tests carry over to no other test: beside them half a cause fits as well as a whole
         # one. They say whether there is a name at all; which it is, is said without them, and by held-out tests.
-        with_rest, alone_only = (probabilities(each, alternatives) for each in (log_evidence, log_alone))
+        with_rest, alone_only = (probabilities(each, alternatives, SPECIMENS) for each in (log_evidence, log_alone))
         known = 1.0 - with_rest[UNKNOWN]
         chances = {UNKNOWN: with_rest[UNKNOWN]} | {kind: known * own for kind, own in alone_only.items()}
         at_most = {kind: max(own, with_rest[kind]) for kind, own in chances.items()}
