@@ -33,8 +33,8 @@ class Calibration:
 
 
 #: Of bodies. Offsets: what `python -m referee calibrate` found of 61 calibration cases, rounded; the alternatives' may
-#: be anything from -2 to 9. Temperature: they gave 3.5 (95 % 1.3 to 4.5). With 1.5, 2 of 34 names were wrong in the scored
-#: run 2; by the same evidence 2 leaves 1 of 30, 2.5 none of 23 (docs/proof.md).
+#: be anything from -2 to 9. Temperature: they gave 3.5 (95 % 1.3 to 4.5). With 1.5, 2 of 34 names were wrong in the
+#: scored run 2; by the same evidence 2 leaves 1 of 30, and 2.5 none of 23 (docs/proof.md).
 BODIES = Calibration(2.0, -2.0, 0.0)
 #: Of specimens, set by hand on rods with a known answer.
 SPECIMENS = Calibration(1.5, -1.0, -1.0)
