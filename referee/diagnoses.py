@@ -19,7 +19,11 @@ NAMING = ("named", "group", "named + rest")
 TOGETHER = 0.9
 #: A force without a name.
 UNKNOWN = "unknown"
-_UNITS = {"": 1.0, "1": 1.0, "%": 0.01, "mm": 1e-3, "m": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N": 1.0, "s": 1.0}
+_UNITS = {"": 1.0, "1": 1.0, "%": 0.01, "mm": 1e-3, "m": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N": 1.0, "s": 1.0} | {
+    "1/Pa": 1.0,
+    "1/(Pa s)": 1.0,
+    "m4/(N s)": 1.0,
+}
 
 
 @dataclass(frozen=True)
