@@ -17,7 +17,7 @@ from warpbrain.diagnosis.flexible import LENGTHS, flexible_columns, smooth_force
 from warpbrain.diagnosis.fraction import likely_fraction
 from warpbrain.diagnosis.gross_errors import ASIDE, gross_errors
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors
+from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.diagnosis.nuisances import REGISTRATION_SD, Nuisances, nuisances_at, other_volume
 from warpbrain.diagnosis.options import Listener
 from warpbrain.diagnosis.sensing import explanation_of, known_sigma
@@ -171,7 +171,10 @@ class BaseFinder:
             if np.abs(moved).max() < _NEAR:
                 break
         self._listener.stage("the error of the mesh, and the compliance of the body at the sensors")
-        return self._linearised(first, state, self._errors_of_mesh(state))
+        errors = self._errors_of_mesh(state)
+        if errors is not None:
+            state = self.states.corrected(state, expected(errors.own))
+        return self._linearised(first, state, errors)
 
     def _freed(self, rough: Base) -> Hypothesis:
         """Tissue and field beside any smooth force; recordings are realigned."""
@@ -207,7 +210,7 @@ class BaseFinder:
             return None
         try:
             volume = other_volume(self.states)
-            return FinerStates(self.states).errors(state, volume.make(volume.mean + volume.sd))
+            return FinerStates(self.states).errors(state, volume.make(volume.mean + volume.sd), self.prior)
         except (SolveError, InputError) as error:
             self._remarks.append(f"the error of the mesh is not known: {error}")
             return None
@@ -227,7 +230,7 @@ class BaseFinder:
         z[nuisances.part("tissue")] = np.linalg.solve(self.prior.factor, theta - self.prior.mean)
         z[nuisances.part("stiffness field")] = state.hypothesis.field
         z[nuisances.part("registration")] = self.states.motion / REGISTRATION_SD
-        residual = sensors.residual - nuisances.mean + nuisances.columns @ z
+        residual = sensors.residual + nuisances.columns @ z
         anything = _any_force(flexible, residual, at)
         loose = np.column_stack([nuisances.columns, anything])
         aside = np.zeros(len(sensors), dtype=bool)

@@ -170,10 +170,14 @@ class Diagnosing:
                 continue
             self.listener.stage(f"refit without linearising: {' and '.join((*stage.known, kind))}")
             begin = linear_point(stage.explanation, stage.residual, stage.explanation.nuisances, effect, stage.kappa)
+            begins = [begin]
+            if known is None and "none" in fits:
+                none = fits["none"]
+                begins.append(linear_point(stage.explanation, none.linear, none.columns, effect, none.kappa))
             effects = there if effect is None else (*there, effect)
             between = None if effect is None else self._between(stage, kind, begin)
             try:
-                fits[kind] = refitting.fit(effects, begin, stage.kappa, near, between)
+                fits[kind] = refitting.fit(effects, begins, stage.kappa, near, between)
             except (SolveError, InputError):
                 continue
         return fits

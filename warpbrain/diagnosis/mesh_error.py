@@ -2,8 +2,9 @@
 
 Linear tetrahedra answer too little, and to each mechanism in its own measure: a pressure in a cavity moves a coarse
 mesh far less than weight does. So the error is computed with the mechanism that is fitted, not once for all: otherwise
-its size would come out wrong by as much. And it grows as tissue is less compressible than was assumed, by more than the
-displacement itself: that belongs to what compressibility may explain.
+its size would come out wrong by as much. And it changes with the tissue: with its stiffness as the displacement does,
+but not alike everywhere, and as it is less compressible by more than the displacement itself. What stiffness and
+compressibility may explain has these changes, or a tenth more stiffness would be taken for something that is missing.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.states import TOLERANCE, Hypothesis, SolvedState, States
 from warpbrain.errors import SolveError
-from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.discretisation import Difference, Discretisation
+from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.finer import FinerCase, restricted
@@ -25,6 +27,8 @@ Floats = NDArray[np.float64]
 
 #: Out-of-balance force of the finer state, relative: far below the error that is looked for.
 _ROUGH = 10.0 * TOLERANCE
+#: Change of the tissue [standard deviations] whose error is compared: far more than rounding, little beside the error.
+_STEP = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +40,28 @@ class MeshErrors:
     own : Difference
     by_volume : Difference
         What one standard deviation of compressibility adds to it.
+    by_tissue : tuple of Difference
+        What one standard deviation of each coordinate of the tissues' prior adds to it.
     finer : FinerStates
         Which finds it at other states.
     """
 
     own: Difference
     by_volume: Difference
+    by_tissue: tuple[Difference, ...]
     finer: FinerStates
+
+    def with_tissue(self, theta: Floats, prior: Gaussian) -> Difference:
+        """The error with other tissue (p,), without what belongs to a mechanism beside."""
+        found = self.own
+        for z, change in zip(np.linalg.solve(prior.factor, theta - found.theta), self.by_tissue, strict=True):
+            found = found.plus(change.times(float(z)))
+        return found
+
+
+def expected(known: Difference) -> Difference:
+    """The whole error of a mesh, of which elements of half the size show a part."""
+    return known.times(Discretisation().mean)
 
 
 class FinerStates:
@@ -57,24 +76,29 @@ class FinerStates:
         self.states = states
         self._beyond: Floats | float = 0.0
 
-    def errors(self, state: SolvedState, less_compressible: Mechanism) -> MeshErrors:
-        """The error of a state, and what it is beside that with one standard deviation of compressibility.
+    def errors(self, state: SolvedState, less_compressible: Mechanism, prior: Gaussian) -> MeshErrors:
+        """The error of a state, and what it is beside that with other tissue.
 
         Parameters
         ----------
         state : SolvedState
         less_compressible : Mechanism
-            Tissue that is less compressible by that.
+            Tissue that is one standard deviation less compressible.
+        prior : Gaussian
+            Of the tissues' parameters.
 
         Raises
         ------
         SolveError
             If there is no equilibrium on the finer mesh.
         """
-        own = self.error(state.hypothesis, state)
-        mechanisms = (*state.hypothesis.mechanisms, less_compressible)
-        other = self.error(replace(state.hypothesis, mechanisms=mechanisms), state)
-        return MeshErrors(own, Difference(other.u - own.u, other.reactions - own.reactions, own.theta), self)
+        own, here = self.error(state.hypothesis, state), state.hypothesis
+        other = self.error(replace(here, mechanisms=(*here.mechanisms, less_compressible)), state)
+        by_tissue = []
+        for axis in prior.factor.T:
+            beside = self.error(replace(here, theta=here.theta + _STEP * axis), state)
+            by_tissue.append(beside.less(own).times(1.0 / _STEP))
+        return MeshErrors(own, other.less(own), tuple(by_tissue), self)
 
     def error(self, hypothesis: Hypothesis, near: SolvedState) -> Difference:
         """The error of a hypothesis without its stiffness field, which it hardly depends on.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effects
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import MeshErrors
+from warpbrain.diagnosis.mesh_error import MeshErrors, expected
 from warpbrain.diagnosis.sensors import Sensors, spread_points
 from warpbrain.diagnosis.states import States
 from warpbrain.estimation.discretisation import Discretisation
@@ -68,8 +68,6 @@ class Nuisances:
     ----------
     families : tuple of Family
         The first is the tissue's parameters, the second the stiffness field.
-    mean : (n,) array
-        What they are expected to change of what is recorded beforehand: the error of the mesh.
     anchors : (a, 3) array
         Points [m] about which the unknown part of the mesh's error is alike.
     fraction : float
@@ -77,7 +75,6 @@ class Nuisances:
     """
 
     families: tuple[Family, ...]
-    mean: Floats
     anchors: Floats
     fraction: float = FRACTION
 
@@ -141,7 +138,7 @@ def nuisances_at(
         where = sensors.positions[sensors.is_displacement]
         anchors = where[spread_points(where, _ALIKE, 60)]
     families = [
-        Family("tissue", tissue_columns(at, states, theta, prior)),
+        Family("tissue", tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors)),
         Family("stiffness field", field_columns(at, states)),
         Family(
             "compressibility", _law_columns(effects, [other_volume(states)]) + _volume_locking(sensors, mesh_errors)
@@ -150,14 +147,11 @@ def nuisances_at(
         Family("known loads", _known_loads(at)),
         Family("registration", sensors.rigid * REGISTRATION_SD),
     ]
-    mean = np.zeros(len(sensors))
     if mesh_errors is not None:
-        believed = Discretisation()
-        answer = sensors.answer(mesh_errors.own.u, mesh_errors.own.reactions)
-        mean = believed.mean * answer
-        families.append(Family("mesh", believed.deviation * answer[:, None]))
+        own = mesh_errors.own
+        families.append(Family("mesh", Discretisation().deviation * sensors.answer(own.u, own.reactions)[:, None]))
     families.append(Family("mesh, unknown", _fractional(at, anchors, fraction)))
-    return Nuisances(tuple(families), mean, anchors, fraction)
+    return Nuisances(tuple(families), anchors, fraction)
 
 
 def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
@@ -202,8 +196,16 @@ def _volume_locking(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:
     """What the mesh's error adds (n, 1) to what one standard deviation of compressibility changes."""
     if mesh_errors is None:
         return np.zeros((len(sensors), 1))
-    change = mesh_errors.by_volume
-    return Discretisation().mean * sensors.answer(change.u, change.reactions)[:, None]
+    change = expected(mesh_errors.by_volume)
+    return sensors.answer(change.u, change.reactions)[:, None]
+
+
+def mesh_by_tissue(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:
+    """What the mesh's error adds (n, p) to `tissue_columns`; 0 where the mesh is taken for exact."""
+    if mesh_errors is None:
+        return np.zeros((len(sensors), 1))
+    changes = [expected(change) for change in mesh_errors.by_tissue]
+    return np.column_stack([sensors.answer(change.u, change.reactions) for change in changes])
 
 
 @dataclass(frozen=True, kw_only=True)

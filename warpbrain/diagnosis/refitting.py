@@ -7,6 +7,7 @@ of the linear model about the best point, averaged over the factor on the noise 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,11 +16,11 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors
-from warpbrain.diagnosis.nuisances import Nuisances, field_columns, tissue_columns
+from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected
+from warpbrain.diagnosis.nuisances import Nuisances, field_columns, mesh_by_tissue, tissue_columns
 from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.discretisation import Difference, Discretisation
+from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.gaussian import Gaussian
 
 Floats = NDArray[np.float64]
@@ -139,11 +140,10 @@ class Refitting:
     ) -> None:
         self.states, self.prior, self.nuisances, self.factor = states, prior, nuisances, factor
         self.start = start
-        self.difference = None if mesh_errors is None else mesh_errors.own
+        self._mesh = mesh_errors
         self._finer = FinerStates(states) if mesh_errors is None else mesh_errors.finer
         self._share: _Share | None = None
         self._between: Floats | None = None
-        self._settled: Floats = np.zeros(len(factor))
         self._U = nuisances.columns
         self._tissue, self._field = nuisances.part("tissue"), nuisances.part("stiffness field")
         self._linear = np.ones(self._U.shape[1], dtype=bool)
@@ -159,7 +159,7 @@ class Refitting:
     def fit(
         self,
         effects: tuple[Effect, ...],
-        begin: Floats,
+        begins: Sequence[Floats],
         kappa: float = 1.0,
         near: SolvedState | None = None,
         between: Floats | None = None,
@@ -170,8 +170,10 @@ class Refitting:
         ----------
         effects : tuple of Effect
             Columns at the state of screening.
-        begin : (q + k,) array
-            Coordinates to begin with, as screening has them.
+        begins : sequence of (q + k,) arrays
+            Coordinates that may be near: as screening has them, and as they are about the fit of nothing. Where points
+            of a surface may belong to one side or the other there are several best points, and a fit with a mechanism
+            must not be kept from the one that the fit without it has found.
         kappa : float
         near : SolvedState, optional
             Nearer to the beginning than the state of screening.
@@ -185,12 +187,13 @@ class Refitting:
         """
         self._share, self._between = None, between
         columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
-        found = self._descend(effects, self._limited(begin), columns, kappa, near or self.start, True)
-        if self.difference is None:
+        begin = self._best_of(effects, begins, kappa, near or self.start)
+        found = self._descend(effects, begin, columns, kappa, near or self.start, True)
+        if self._mesh is None:
             return self._refit(effects, *found)
         state, z, _, columns, converged = found
         if not effects:
-            if self._settle(state, self.difference):
+            if self._settle(state, self._mesh):
                 found = self._descend(effects, z, columns, kappa, state, False)
             return self._refit(effects, *found)
         self._share = self._share_of(effects, state, z)
@@ -202,10 +205,25 @@ class Refitting:
             columns[:, own] += np.outer(self._share.answer, self._share.along)
         return self._refit(effects, *self._descend(effects, z, columns, kappa, state, False))
 
-    def _settle(self, state: SolvedState, before: Difference) -> bool:
+    def _best_of(
+        self, effects: tuple[Effect, ...], begins: Sequence[Floats], kappa: float, near: SolvedState
+    ) -> Floats:
+        """The best of some coordinates, within limits."""
+        limited = [self._limited(begin) for begin in begins]
+        if len(limited) == 1:
+            return limited[0]
+        values = []
+        for begin in limited:
+            try:
+                values.append(self._objective(self._try(effects, begin, near)[1], begin, kappa))
+            except (SolveError, InputError):
+                values.append(np.inf)
+        return limited[int(np.argmin(values))]
+
+    def _settle(self, state: SolvedState, before: MeshErrors) -> bool:
         """Take the error of the mesh from a fit of nothing, for all fits to come; whether that matters.
 
-        It depends on the stiffness of the tissue, and would be taken for a mechanism's share otherwise.
+        It depends on the tissue, not only in proportion, and would be taken for a mechanism's share otherwise.
         """
         from scipy.linalg import solve_triangular
 
@@ -213,17 +231,21 @@ class Refitting:
             error = self._finer.error(state.hypothesis, state)
         except SolveError:
             return False
-        change = Discretisation().mean * state.sensors.answer(error.u - before.u, error.reactions - before.reactions)
-        self.difference = error
-        self._settled = self._settled + change
+        change = self._beyond(before, error, state)
+        self._mesh = replace(before, own=error)
         return float(np.linalg.norm(solve_triangular(self.factor, change, lower=True))) > _MATTERS
+
+    def _beyond(self, known: MeshErrors, error: Difference, state: SolvedState) -> Floats:
+        """What an error of the mesh is beyond that which its tissue alone is known to have, in what is recorded."""
+        change = expected(error.less(known.with_tissue(state.hypothesis.theta, self.prior)))
+        return state.sensors.answer(change.u, change.reactions)
 
     def _share_of(self, effects: tuple[Effect, ...], state: SolvedState, z: Floats) -> _Share | None:
         """What of the mesh's error belongs to the mechanisms, in proportion to their sizes; None if not known.
 
         What is there or not has no size: alone it has a constant share, beside others none.
         """
-        assert self.difference is not None
+        assert self._mesh is not None
         away, middle, at = [], [], self._U.shape[1]
         for effect in effects:
             proposed, size = effect.proposed, effect.columns.shape[1]
@@ -243,9 +265,9 @@ class Refitting:
             error = self._finer.error(state.hypothesis, state)
         except SolveError:
             return None
-        answer = state.sensors.answer(error.u - self.difference.u, error.reactions - self.difference.reactions)
+        answer = self._beyond(self._mesh, error, state)
         along = np.zeros(len(scaled)) if switches else scaled / length
-        return _Share(Discretisation().mean * answer, along, 1.0 if switches else float(along @ mean))
+        return _Share(answer, along, 1.0 if switches else float(along @ mean))
 
     def _descend(
         self,
@@ -337,13 +359,14 @@ class Refitting:
     ) -> tuple[SolvedState, Floats]:
         hypothesis = self._hypothesis(effects, z)
         begin = self.start if near is None else near
+        error = None if self._mesh is None else expected(self._mesh.with_tissue(hypothesis.theta, self.prior))
         try:
-            state = self.states.solve(hypothesis, begin.u)
+            state = self.states.solve(hypothesis, begin.u, error)
         except SolveError:
-            state = self.states.solve(hypothesis)
+            state = self.states.solve(hypothesis, None, error)
         at = self._U.shape[1]
         linear = self._U[:, self._linear] @ z[:at][self._linear]
-        residual = state.sensors.residual - self.nuisances.mean - self._settled - linear
+        residual = state.sensors.residual - linear
         if self._share is not None:
             own = z[at : at + len(self._share.along)]
             residual = residual - self._share.answer * (self._share.constant + float(self._share.along @ own))
@@ -367,7 +390,8 @@ class Refitting:
                 at = Linearisation(state.system, state.u, state.reactions, state.sensors)
             except SolveError:
                 return columns
-            columns[:, self._tissue] = tissue_columns(at, self.states, state.hypothesis.theta, self.prior)
+            tissue = tissue_columns(at, self.states, state.hypothesis.theta, self.prior)
+            columns[:, self._tissue] = tissue + mesh_by_tissue(state.sensors, self._mesh)
             columns[:, self._field] = field_columns(at, self.states)
         place = 0
         for effect in effects:

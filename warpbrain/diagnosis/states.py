@@ -14,6 +14,7 @@ from warpbrain.cases.case import Case
 from warpbrain.diagnosis.realigned import realigned
 from warpbrain.diagnosis.sensors import Sensors, sensors_at
 from warpbrain.diagnosis.stiffness_field import StiffnessField, stiffness_modes
+from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.mesh import TetMesh
@@ -66,7 +67,8 @@ class SolvedState:
     system : System
     u, reactions : (N, 3) array
     sensors : Sensors
-        There.
+        There, the expected error of the mesh put right: with walls where they are, not where elements that are too
+        stiff leave them, or a point in a narrow ventricle is taken for one of the other wall.
     """
 
     hypothesis: Hypothesis
@@ -119,8 +121,18 @@ class States:
         )
         return replace(applied, mesh=mesh, boundaries=boundaries, mechanisms=(*kept, *hypothesis.mechanisms))
 
-    def solve(self, hypothesis: Hypothesis, start: Floats | None = None) -> SolvedState:
-        """The equilibrium under a hypothesis, from a displacement (N, 3) [m] that is near to it.
+    def solve(
+        self, hypothesis: Hypothesis, start: Floats | None = None, expected: Difference | None = None
+    ) -> SolvedState:
+        """The equilibrium under a hypothesis.
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis
+        start : (N, 3) array, optional
+            A displacement [m] that is near to it.
+        expected : Difference, optional
+            What it lacks of the state without the error of the mesh; sensors are there.
 
         Raises
         ------
@@ -142,9 +154,18 @@ class States:
             states = [EquilibriumSolver(system, options).solve(model.external_forces(), start)] * len(self.times)
         external = model.external_forces()
         reactions = [model.reactions(state.internal, external) for state in states]
-        parts = zip(self.times, self.observations, states, reactions, strict=True)
-        instants = [(time, observations, state.u, R) for time, observations, state, R in parts]
-        return SolvedState(hypothesis, system, states[-1].u, reactions[-1], sensors_at(instants, self.centre))
+        sensors = self._sensors([(state.u, R) for state, R in zip(states, reactions, strict=True)], expected)
+        return SolvedState(hypothesis, system, states[-1].u, reactions[-1], sensors)
+
+    def corrected(self, state: SolvedState, expected: Difference) -> SolvedState:
+        """A state that does not change in time, with sensors where it is without the error of the mesh."""
+        return replace(state, sensors=self._sensors([(state.u, state.reactions)] * len(self.times), expected))
+
+    def _sensors(self, moments: Sequence[tuple[Floats, Floats]], expected: Difference | None) -> Sensors:
+        if expected is not None:
+            moments = [(u + expected.u, reactions + expected.reactions) for u, reactions in moments]
+        parts = zip(self.times, self.observations, moments, strict=True)
+        return sensors_at([(time, observations, *moment) for time, observations, moment in parts], self.centre)
 
     def course(self, hypothesis: Hypothesis, times: Sequence[float], start: Floats) -> list[tuple[Floats, Floats]]:
         """Displacement and reactions (N, 3) under a hypothesis at increasing times [s] after all loads came at once.

@@ -71,6 +71,18 @@ class Difference:
         """Root mean square over the nodes [m]."""
         return float(np.sqrt(np.mean(np.sum(self.u**2, axis=1))))
 
+    def less(self, other: Difference) -> Difference:
+        """By how much it is more than another."""
+        return Difference(self.u - other.u, self.reactions - other.reactions, self.theta)
+
+    def plus(self, other: Difference) -> Difference:
+        """Both together."""
+        return Difference(self.u + other.u, self.reactions + other.reactions, self.theta)
+
+    def times(self, factor: float) -> Difference:
+        """So many times as large."""
+        return Difference(factor * self.u, factor * self.reactions, self.theta)
+
 
 class FinerMesh:
     """A case on elements of half the size.
