@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.course import Course
 from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
 from warpbrain.physics.proposal import Proposal
@@ -173,8 +174,8 @@ class Effects:
         large = 1.0 + present.growth(mesh, 1.0) if isinstance(present, Growing) else 1.0
         count = len(mechanisms)
         forces = np.zeros((count, system.size, 3))
-        stiffer = np.zeros((system.elements, count))
-        larger = np.zeros((system.elements, count))
+        stiffer = np.zeros((count, system.elements))
+        larger = np.zeros((count, system.elements))
         for number, mechanism in enumerate(mechanisms):
             factor = mechanism.factor()
             if isinstance(mechanism, Load):
@@ -184,17 +185,17 @@ class Effects:
             if isinstance(mechanism, Substituting):
                 forces[number] -= self._substituting(mechanism)
             if isinstance(mechanism, Weakening):
-                stiffer[:, number] = mechanism.stiffness_factor(mesh, factor) / stiff - 1.0
+                stiffer[number] = mechanism.stiffness_factor(mesh, factor) / stiff - 1.0
             if isinstance(mechanism, Growing):
-                larger[:, number] = (1.0 + mechanism.growth(mesh, factor)) / large - 1.0
+                larger[number] = (1.0 + mechanism.growth(mesh, factor)) / large - 1.0
         total = np.zeros((len(at.sensors), count))
         pushed = forces.any(axis=(1, 2))
         if pushed.any():
             total[:, pushed] += at.answers(forces[pushed])
         for weights, own in ((stiffer, "element_forces"), (larger, "growth_forces")):
-            altered = weights.any(axis=0)
+            altered = weights.any(axis=1)
             if altered.any():
-                total[:, altered] += at.answers_of_elements(getattr(at, own), weights[:, altered])
+                total[:, altered] += at.answers_of_elements(getattr(at, own), weights[altered].T)
         return total
 
     def _following(self, mechanism: Following) -> Floats:
@@ -218,13 +219,21 @@ class Effects:
 
     def _substituting(self, mechanism: Substituting) -> Floats:
         """What other laws add to the internal forces (N, 3)."""
+        at, system = self.at, self.at.system
         if self._internal is None:
-            self._internal = self.at.internal_forces()
-        model = self.at.system.model
-        system = self.at.system
-        other = replace(model, materials=substituted(model.materials, mechanism))
-        beside = System(other, str(system.device), system.precision.name)
-        return self.at.internal_forces(beside) - self._internal
+            self._internal = at.internal_forces()
+        own = system.model.materials
+        other = substituted(own, mechanism)
+        try:
+            system.set_materials(other)
+        except InputError:
+            # a law that is launched in another way
+            beside = System(replace(system.model, materials=other), str(system.device), system.precision.name)
+            beside.remember_as(system)
+            return at.internal_forces(beside) - self._internal
+        found = at.internal_forces() - self._internal
+        system.set_materials(own)
+        return found
 
 
 def _effect_of_course(proposal: Proposal, course: Course) -> Effect:

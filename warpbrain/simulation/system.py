@@ -623,6 +623,11 @@ class System:
         for term, own in zip(self.terms, remembered, strict=True):
             term.recall(own)
 
+    def remember_as(self, other: System) -> None:
+        """Let terms remember what those of another system of the same mechanisms do, in the same step."""
+        self.set_time_step(other._time_step)
+        self.recall(other.remembered())
+
     def forces_without_potential(self) -> Floats:
         """Sum of the forces [N], shape (n, 3), at `u` of the terms that have no potential."""
         total = np.zeros((self.size, 3))
