@@ -118,28 +118,58 @@ class HeldOut:
         kappa : float
             Factor on the noise.
         """
+        return self.predict_each(residual, columns, np.zeros((1, len(residual), 0)), kappa)[0]
+
+    def predict_each(self, residual: Floats, columns: Floats, more: Floats, kappa: float = 1.0) -> list[Predicted]:
+        """The same with each of some sets of columns (c, n, f) beside those (n, k) that all of them have.
+
+        What all have is factorised once a block. With `A = I + W^T W` over the other blocks, `p` the more columns there
+        and `q = p_b - W_b A^-1 W^T p` what the block has of them beside that, the precision of their coefficients is
+        `H = I + p^T p - (W^T p)^T A^-1 W^T p` and the block's covariance grows by `q H^-1 q^T` (Woodbury's identity).
+        """
         from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
         sigma = kappa * self.sigma
-        W = columns / sigma[:, None]
+        W, P = columns / sigma[:, None], more / sigma[:, None]
         w = residual / sigma
         whole, right = np.eye(W.shape[1]) + W.T @ W, W.T @ w
-        errors = np.zeros(len(residual))
+        WP, PP, Pw = W.T @ P, P.transpose(0, 2, 1) @ P, w @ P
+        count, freedom = len(more), more.shape[2]
+        errors = np.zeros((count, len(residual)))
         densities = []
         for block in np.unique(self.blocks):
             own = self.blocks == block
-            factor = cho_factor(whole - W[own].T @ W[own], lower=True, check_finite=False)
-            z = cho_solve(factor, right - W[own].T @ w[own])
-            errors[own] = residual[own] - columns[own] @ z
-            counted = own & self._counted
+            Wb, wb, Pb = W[own], w[own], P[:, own]
+            factor = cho_factor(whole - Wb.T @ Wb, lower=True, check_finite=False)
+            z = cho_solve(factor, right - Wb.T @ wb)
+            others = WP - Wb.T @ Pb
+            flat = others.transpose(1, 0, 2).reshape(len(z), count * freedom)
+            inner = cho_solve(factor, flat).reshape(len(z), count, freedom).transpose(1, 0, 2)
+            H = np.eye(freedom) + PP - Pb.transpose(0, 2, 1) @ Pb - others.transpose(0, 2, 1) @ inner
+            toward = Pw - wb @ Pb - z @ others
+            left, q = wb - Wb @ z, Pb - Wb @ inner
+            size = np.linalg.solve(H, toward[:, :, None])
+            errors[:, own] = sigma[own] * (left - (q @ size)[:, :, 0])
+            counted = self._counted[own]
             if counted.any():
-                spread = solve_triangular(factor[0], W[counted].T, lower=True, check_finite=False)
+                spread = solve_triangular(factor[0], Wb[counted].T, lower=True, check_finite=False)
                 L = np.linalg.cholesky(np.eye(spread.shape[1]) + spread.T @ spread)
-                left = np.linalg.solve(L, errors[counted] / sigma[counted])
-                log_size = float(np.log(np.diag(L) * sigma[counted] * np.sqrt(2.0 * np.pi)).sum())
-                densities.append(-0.5 * float(left @ left) - log_size)
+                flat = np.column_stack(
+                    [left[counted], q[:, counted].transpose(1, 0, 2).reshape(len(L), count * freedom)]
+                )
+                white = solve_triangular(L, flat, lower=True, check_finite=False)
+                t = white[:, 1:].reshape(len(L), count, freedom).transpose(1, 0, 2)
+                e = white[:, :1] - t @ size
+                te, wider = t.transpose(0, 2, 1) @ e, H + t.transpose(0, 2, 1) @ t
+                quadratic = np.sum(e**2, axis=(1, 2)) - np.sum(te * np.linalg.solve(wider, te), axis=(1, 2))
+                log_size = np.log(np.diag(L) * sigma[own][counted] * np.sqrt(2.0 * np.pi)).sum()
+                log_size = log_size + 0.5 * (np.linalg.slogdet(wider)[1] - np.linalg.slogdet(H)[1])
+                densities.append(-0.5 * quadratic - log_size)
         rows = np.flatnonzero(self._counted)
-        return Predicted(errors[rows], self.blocks[rows], rows, np.array(densities))
+        log_densities = np.array(densities).reshape(-1, count).T
+        return [
+            Predicted(own[rows], self.blocks[rows], rows, each) for own, each in zip(errors, log_densities, strict=True)
+        ]
 
 
 def placebo(
@@ -174,20 +204,14 @@ def placebo(
         Factor on the noise.
     count : int
     """
-    found = []
-    white_columns = columns / held_out.sigma[:, None]
-    white = residual / held_out.sigma
-    gram = np.eye(columns.shape[1]) + white_columns.T @ white_columns
-    for _ in range(count):
-        many = size * flexible @ rng.normal(size=(flexible.shape[1], tries * freedom))
-        scaled = many / held_out.sigma[:, None]
-        left = scaled - white_columns @ np.linalg.solve(gram, white_columns.T @ scaled)
-        b, whole = left.T @ white, scaled.T @ left
-        gains = []
-        for k in range(0, tries * freedom, freedom):
-            own = slice(k, k + freedom)
-            M = np.eye(freedom) + whole[own, own]
-            gains.append(float(b[own] @ np.linalg.solve(M, b[own])) - float(np.linalg.slogdet(M)[1]))
-        k = freedom * int(np.argmax(gains))
-        found.append(held_out.predict(residual, np.column_stack([columns, many[:, k : k + freedom]]), kappa))
-    return found
+    W = columns / held_out.sigma[:, None]
+    modes = size * flexible / held_out.sigma[:, None]
+    left = modes - W @ np.linalg.solve(np.eye(W.shape[1]) + W.T @ W, W.T @ modes)
+    # a pattern is a mixture of modes: how well it fits follows from how they do
+    toward, among = left.T @ (residual / held_out.sigma), modes.T @ left
+    mixtures = rng.normal(size=(count, flexible.shape[1], tries, freedom)).transpose(0, 2, 1, 3)
+    b = np.einsum("m,ctmf->ctf", toward, mixtures)
+    M = np.eye(freedom) + mixtures.transpose(0, 1, 3, 2) @ among @ mixtures
+    gains = np.sum(b * np.linalg.solve(M, b[..., None])[..., 0], axis=2) - np.linalg.slogdet(M)[1]
+    best = mixtures[np.arange(count), np.argmax(gains, axis=1)]
+    return held_out.predict_each(residual, columns, size * flexible @ best, kappa)

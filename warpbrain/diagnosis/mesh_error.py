@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.states import TOLERANCE, Hypothesis, SolvedState, States
-from warpbrain.errors import SolveError
+from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference, Discretisation
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.finer import FinerCase, restricted
+from warpbrain.simulation.model import Model
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
@@ -75,6 +76,7 @@ class FinerStates:
     def __init__(self, states: States) -> None:
         self.states = states
         self._beyond: Floats | float = 0.0
+        self._system: System | None = None
 
     def errors(self, state: SolvedState, less_compressible: Mechanism, prior: Gaussian) -> MeshErrors:
         """The error of a state, and what it is beside that with other tissue.
@@ -119,7 +121,7 @@ class FinerStates:
         finer = FinerCase(self.states.case_of(even))
         model = finer.model(coarse.system.model)
         external = model.external_forces()
-        solver = EquilibriumSolver(System(model, self.states.device), EquilibriumOptions(tolerance=_ROUGH))
+        solver = EquilibriumSolver(self._system_of(model), EquilibriumOptions(tolerance=_ROUGH))
         flat = finer.prolongation @ coarse.u
         try:
             found = solver.solve(external, flat + self._beyond)
@@ -128,3 +130,14 @@ class FinerStates:
         self._beyond = found.u - flat
         u, reactions = restricted(finer.prolongation, found.u, model.reactions(found.internal, external))
         return Difference(u - coarse.u, reactions - coarse.reactions, hypothesis.theta)
+
+    def _system_of(self, model: Model) -> System:
+        """The system of the last state with other numbers, or another one where numbers are not all that changed."""
+        if self._system is not None:
+            try:
+                self._system.set_model(model)
+                return self._system
+            except InputError:
+                pass
+        self._system = System(model, self.states.device)
+        return self._system

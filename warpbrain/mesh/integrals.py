@@ -86,9 +86,8 @@ def _summed(
     field: Field,
 ) -> Floats:
     """Sum over elements with nodes (k, s), corners (k, c, 3) and sizes (k,), at points of shape values (q, s)."""
-    total = np.zeros(mesh.points.shape)
-    for point, weight, values in zip(bary, weights, shapes, strict=True):
-        force = (weight * sizes)[:, None] * field(np.einsum("c,kci->ki", point, corners))
-        for node, value in zip(nodes.T, values, strict=True):
-            np.add.at(total, node, value * force)
-    return total
+    at = np.einsum("qc,kci->qki", bary, corners, optimize=True)
+    force = (weights[:, None] * sizes)[:, :, None] * field(at.reshape(-1, 3)).reshape(at.shape)
+    by_node = np.einsum("qs,qki->iks", shapes, force, optimize=True).reshape(3, -1)
+    count = len(mesh.points)
+    return np.column_stack([np.bincount(nodes.ravel(), weights=along, minlength=count) for along in by_node])

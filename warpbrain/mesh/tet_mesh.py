@@ -161,7 +161,7 @@ class TetMesh:
         named = (dict(self.node_sets), dict(self.element_sets), dict(self.element_vectors))
         return (TetMesh, (self.points, self.tetrahedra, self.tissue, *named))
 
-    @property
+    @cached_property
     def volumes(self) -> Floats:
         """Volume of each tetrahedron [m3], shape (m,)."""
         return signed_volumes(self.points, self.tetrahedra)
@@ -178,12 +178,22 @@ class TetMesh:
 
         return boundary_faces(self.tetrahedra)
 
+    @cached_property
+    def finer(self) -> tuple[TetMesh, Ints]:
+        """The mesh with every tetrahedron cut into eight, and between which nodes its own lie; made once.
+
+        See `warpbrain.mesh.refinement.refined`.
+        """
+        from warpbrain.mesh.refinement import refined
+
+        return refined(self)
+
     @property
     def volume(self) -> float:
         """Volume of the body [m3]."""
         return float(self.volumes.sum())
 
-    @property
+    @cached_property
     def node_volumes(self) -> Floats:
         """Volume lumped to each node [m3], a quarter of each of its tetrahedra, shape (n,)."""
         return self.lumped(self.volumes)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, nodes_of
-from warpbrain.mesh.refinement import refined
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Removing
@@ -54,7 +53,7 @@ class FinerCase:
 
     def __init__(self, case: Case) -> None:
         self._coarse, _ = case.remaining
-        mesh, ends = refined(self._coarse)
+        mesh, ends = self._coarse.finer
         self.prolongation = prolongation(ends, len(self._coarse.points))
         mechanisms = tuple(m for m in case.mechanisms if not isinstance(m, Removing))
         boundaries = tuple(b for b in case.boundaries if not isinstance(b, Forced))
