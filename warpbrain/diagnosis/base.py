@@ -21,7 +21,7 @@ from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.diagnosis.nuisances import REGISTRATION_SD, Nuisances, nuisances_at, other_volume
 from warpbrain.diagnosis.options import Listener
 from warpbrain.diagnosis.sensing import explanation_of, known_sigma
-from warpbrain.diagnosis.sensors import tracked_points
+from warpbrain.diagnosis.sensors import Sensors, tracked_points
 from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
 from warpbrain.diagnosis.switching import Known, Solving
 from warpbrain.diagnosis.time_courses import main_courses
@@ -100,7 +100,7 @@ class Base:
     @property
     def typical_noise(self) -> float:
         """Median of the noise of displacements [m]."""
-        return float(np.median(self.noise[self.at.sensors.is_displacement]))
+        return _typical(self.noise, self.at.sensors)
 
     @property
     def constant_forces(self) -> list[Floats]:
@@ -160,15 +160,16 @@ class BaseFinder:
         self._listener.stage("tissue beside any smooth force")
         state = first
         for _ in range(_ROUNDS):
-            hypothesis = self._freed(self._linearised(first, state, None))
-            moved = self._coordinates(hypothesis) - self._coordinates(state.hypothesis)
+            rough = self._linearised(first, state, None)
+            hypothesis = self._freed(rough)
+            before, after = (rough.nuisances.coordinates(self.prior, one) for one in (state.hypothesis, hypothesis))
             try:
                 state = self.states.solve(hypothesis, state.u)
             except (SolveError, InputError):
                 # with recordings where they are taken to be now
                 state = self.states.solve(state.hypothesis, state.u)
                 break
-            if np.abs(moved).max() < _NEAR:
+            if np.abs(after - before).max() < _NEAR:
                 break
         self._listener.stage("the error of the mesh, and the compliance of the body at the sensors")
         errors = self._errors_of_mesh(state)
@@ -186,11 +187,6 @@ class BaseFinder:
         xi = explanation.nuisances_given(rough.whitened, kappa)
         self.states.realign((xi[registration] + _ROUGHLY * xi[-6:]) * REGISTRATION_SD)
         return self._moved(rough.nuisances, xi)
-
-    def _coordinates(self, hypothesis: Hypothesis) -> Floats:
-        """Of tissue and field, in standard deviations."""
-        tissue = np.linalg.solve(self.prior.factor, hypothesis.theta - self.prior.mean)
-        return np.concatenate([tissue, hypothesis.field])
 
     def _declared(self) -> Hypothesis:
         field = np.zeros(self.states.modes.shape[1])
@@ -220,15 +216,12 @@ class BaseFinder:
         at = Linearisation(state.system, state.u, state.reactions, sensors)
         known = Known()
         effects = Effects(at, Solving(self.states, state, sensors, known))
-        theta = state.hypothesis.theta
-        nuisances = nuisances_at(at, self.states, theta, self.prior, effects, errors)
+        nuisances = nuisances_at(at, self.states, state.hypothesis.theta, self.prior, effects, errors)
         if self._bare:
             nuisances = nuisances.weakened()
         flexible = tuple(flexible_columns(at, length * self._spacing) for length in LENGTHS)
         # what the state has of tissue and field is given back, so that their middle is that of their prior
-        z = np.zeros(nuisances.columns.shape[1])
-        z[nuisances.part("tissue")] = np.linalg.solve(self.prior.factor, theta - self.prior.mean)
-        z[nuisances.part("stiffness field")] = state.hypothesis.field
+        z = nuisances.coordinates(self.prior, state.hypothesis)
         z[nuisances.part("registration")] = self.states.motion / REGISTRATION_SD
         residual = sensors.residual + nuisances.columns @ z
         anything = _any_force(flexible, residual, at)
@@ -246,7 +239,7 @@ class BaseFinder:
         sigma = np.where(aside, ASIDE * noise, noise)
         explanation = explanation_of(sensors, sigma, nuisances.columns)
         if errors is not None and not self._bare:
-            smooth = smooth_forces(flexible, float(np.median(noise[sensors.is_displacement])))
+            smooth = smooth_forces(flexible, _typical(noise, sensors))
             nuisances = nuisances.with_fraction(likely_fraction(explanation.factor, nuisances, residual, smooth))
             explanation = Explanation(explanation.factor, nuisances.columns)
         return Base(
@@ -267,6 +260,11 @@ class BaseFinder:
             errors,
             tuple(self._remarks),
         )
+
+
+def _typical(noise: Floats, sensors: Sensors) -> float:
+    """Median of the noise of displacements [m]."""
+    return float(np.median(noise[sensors.is_displacement]))
 
 
 def _any_force(flexible: tuple[Floats, ...], residual: Floats, at: Linearisation) -> Floats:

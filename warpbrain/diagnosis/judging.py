@@ -95,9 +95,10 @@ class Judge:
         if best is not None:
             own = fits[best]
             improvement = predicted[best].improvement(without[way], self._rng)
-            both = [(one.predict(own.linear, own.columns, own.kappa), over) for one, over in without.items()]
+            [other] = [one for one in without if one is not way]
+            elsewise = other.predict(own.linear, own.columns, own.kappa)
             gain = predicted[best].gain(without[way])[0]
-            sure = max(_sure(with_it, over) for with_it, over in both)
+            sure = max(_sure(predicted[best], without[way]), _sure(elsewise, without[other]))
             patterns = self._placebo(stage, way, best)
             errors = [one.rmse for one in patterns]
             band = (float(np.quantile(errors, 0.05)), float(np.quantile(errors, 0.95)))

@@ -18,7 +18,7 @@ from warpbrain.diagnosis.effects import Effects
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.mesh_error import MeshErrors, expected
 from warpbrain.diagnosis.sensors import Sensors, spread_points
-from warpbrain.diagnosis.states import States
+from warpbrain.diagnosis.states import Hypothesis, States
 from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.physics.laws import Law
@@ -92,6 +92,13 @@ class Nuisances:
         *others, last = self.families
         scaled = Family(last.name, last.columns * (fraction / self.fraction))
         return replace(self, families=(*others, scaled), fraction=fraction)
+
+    def coordinates(self, prior: Gaussian, hypothesis: Hypothesis) -> Floats:
+        """Coordinates (q,) of the tissue, by its prior, and of the field of a hypothesis; the others are zero."""
+        found = np.zeros(self.columns.shape[1])
+        found[self.part("tissue")] = np.linalg.solve(prior.factor, hypothesis.theta - prior.mean)
+        found[self.part("stiffness field")] = hypothesis.field
+        return found
 
     def part(self, name: str) -> slice:
         """Where the columns of a family are."""

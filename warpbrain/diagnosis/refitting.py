@@ -149,13 +149,6 @@ class Refitting:
         self._linear = np.ones(self._U.shape[1], dtype=bool)
         self._linear[self._tissue] = self._linear[self._field] = False
 
-    def coordinates_of(self, hypothesis: Hypothesis) -> Floats:
-        """Coordinates (q,) of the tissue and field of a hypothesis; the linear ones are zero."""
-        found = np.zeros(self._U.shape[1])
-        found[self._tissue] = np.linalg.solve(self.prior.factor, hypothesis.theta - self.prior.mean)
-        found[self._field] = hypothesis.field
-        return found
-
     def fit(
         self,
         effects: tuple[Effect, ...],
@@ -326,7 +319,7 @@ class Refitting:
     def _at_base(self, z: Floats) -> Floats:
         """The same coordinates, but with tissue and field of the base."""
         found = z.copy()
-        known = self.coordinates_of(self.start.hypothesis)
+        known = self.nuisances.coordinates(self.prior, self.start.hypothesis)
         for part in (self._tissue, self._field):
             found[part] = known[part]
         return found

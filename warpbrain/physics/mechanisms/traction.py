@@ -83,7 +83,11 @@ class Traction(Load, Mechanism):
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
         def traction(points: NDArray[np.float64]) -> NDArray[np.float64]:
-            r = np.minimum(np.linalg.norm(points - np.asarray(self.centre), axis=1) / self.radius, 1.0)
-            return np.outer(0.5 * (1.0 + np.cos(np.pi * r)), self.value)
+            away = points - np.asarray(self.centre)
+            square = np.einsum("ki,ki->k", away, away)
+            near = np.flatnonzero(square < self.radius**2)
+            found = np.zeros(points.shape)
+            found[near] = np.outer(0.5 * (1.0 + np.cos(np.pi * np.sqrt(square[near]) / self.radius)), self.value)
+            return found
 
         return surface_forces(mesh, traction)
