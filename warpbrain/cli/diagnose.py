@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from warpbrain.terminal.progress import Progress
 
@@ -60,41 +60,35 @@ def _run(options: argparse.Namespace) -> None:
 
     from warpbrain.atomic import output_folder, safe_name
     from warpbrain.cases.shipped import find_case
-    from warpbrain.diagnosis.diagnose import Diagnosing
-    from warpbrain.report.diagnosis.description import describe_diagnosis
-    from warpbrain.report.diagnosis.files import write_explained, write_map
+    from warpbrain.report.diagnosis.files import write_explained
     from warpbrain.report.diagnosis.html import write_page
-    from warpbrain.report.diagnosis.points import write_points
-    from warpbrain.report.diagnosis.text import diagnosis_lines
     from warpbrain.report.files import write_summary
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.quiet import start_warp_quietly
 
     start_warp_quietly()
-    device = find_device(options.device)
+    device = find_device(options.device).alias
     case = find_case(options.case, options.tissue)
-    if case.specimen is not None:
-        from warpbrain.cli import diagnose_specimen
-
-        diagnose_specimen.run(options, case, asked, device.alias, say)
-        return
-    out = output_folder(options.out or Path(f"warpbrain-diagnose-{safe_name(case.name)}"))
-    say(case.title)
+    way = _of_a_body() if case.specimen is None else _of_a_specimen()
     progress = Progress("diagnosis", options.quiet)
 
     def on_stage(text: str) -> None:
         progress.clear()
         say(f"  {text}")
 
+    # nothing is written of a case of which nothing can be concluded
+    diagnosing = way.diagnosing(case, asked, device, Listener(on_stage, progress.show))
+    out = output_folder(options.out or Path(f"warpbrain-diagnose-{safe_name(case.name)}"))
+    say(case.title)
     try:
-        found = Diagnosing(case, asked, device.alias, Listener(on_stage, progress.show)).run()
+        found = diagnosing.run()
     finally:
         progress.clear()
-    said = describe_diagnosis(found, asked, device.alias)
-    say("", *diagnosis_lines(said), sep="\n")
-    write_map(out / "map.vtu", found)
-    write_points(out / "points.csv", found)
-    written = ["map.vtu", "points.csv"]
+    said = way.describe(found, asked, device)
+    say("", *way.lines(said), sep="\n")
+    for name, write in way.tables.items():
+        write(out / name, found)
+    written = [*way.tables]
     if found.explained is not None:
         write_explained(out / "explained", found.explained)
         written.append("explained")
@@ -102,6 +96,33 @@ def _run(options: argparse.Namespace) -> None:
     write_summary(out / "diagnosis.json", said)
     write_page(out)
     say("", f"written to {out}: report.html, diagnosis.json, {', '.join(written)}", sep="\n")
+
+
+class _Way(NamedTuple):
+    """How cases of one kind are diagnosed, and what is written of it beside what all have."""
+
+    diagnosing: Callable[..., Any]
+    describe: Callable[..., dict[str, Any]]
+    lines: Callable[[dict[str, Any]], list[str]]
+    tables: dict[str, Callable[[Path, Any], None]]
+
+
+def _of_a_body() -> _Way:
+    from warpbrain.diagnosis.diagnose import Diagnosing
+    from warpbrain.report.diagnosis.description import describe_diagnosis
+    from warpbrain.report.diagnosis.files import write_map
+    from warpbrain.report.diagnosis.points import write_points
+    from warpbrain.report.diagnosis.text import diagnosis_lines
+
+    return _Way(Diagnosing, describe_diagnosis, diagnosis_lines, {"map.vtu": write_map, "points.csv": write_points})
+
+
+def _of_a_specimen() -> _Way:
+    from warpbrain.diagnosis.specimen.diagnose import DiagnosingSpecimen
+    from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines
+    from warpbrain.report.diagnosis.specimen_curves import write_curves
+
+    return _Way(DiagnosingSpecimen, describe_specimen_diagnosis, specimen_diagnosis_lines, {"curves.csv": write_curves})
 
 
 def _silent(*_values: object, **_options: object) -> None:
