@@ -79,8 +79,9 @@ def test_a_specimen_has_curves_in_the_place_of_an_anatomy(folder):
         "check_rmse_pa": {"declared": {"pull": 80.0}, "refitted": {"pull": 70.0}, "explained": {"pull": 20.0}},
         "held_out": "each test in turn",
         "improvement": {"part": 0.8, "interval_95": [0.7, 0.9]},
-        "placebo_p": 0.01,
-    }
+        "confirmations": [{"mechanism": "fibres", "log_evidence": 9.0, "heldout_gain": {"part": 0.8,
+                           "interval_95": [0.7, 0.9]}, "placebo_p": 0.01, "why_not": ""}],
+    }  # fmt: skip
     where = {"test": "press", "mode": "compression", "segment": "loading", "strain": [0.8, 0.9]}
     said = change(folder, fit=fit, where=where, when={"seconds": [1.0, 2.0]}, smallest_detectable={})
     said["stages"] = [{"with": [], "p_value": 0.001, "candidates": [{"mechanism": "fibres", "probability": 0.97}],
@@ -98,6 +99,7 @@ def test_a_specimen_has_curves_in_the_place_of_an_anatomy(folder):
     page = page_of(read_saved(folder))
     assert "450 → 70 Pa" in page and "It shows most in press (compression), loading" in page
     assert "nothing added" in page and "fibres (0.97)" in page
+    assert "fibres: a pattern that means nothing does as well with p = 0.01" in page
     assert "pull 80" in page and "Recorded and computed stress of 2 tests" in page
 
 

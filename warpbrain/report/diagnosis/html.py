@@ -142,9 +142,12 @@ def _before_and_after(saved: Saved) -> str:
         parts.append(curves_figure(saved.curves))
     parts.append(held_out_figure(said))
     parts.append(fit_table(said))
-    placebo = said["fit"]["placebo_p"]
-    if placebo is not None:
-        parts.append(f"<p>A pattern that means nothing does as well with p = {placebo:.2g}.</p>")
+    fit = said["fit"]
+    placebos = [("A", fit.get("placebo_p"))]
+    # of a specimen each addition has its own
+    placebos += [(f"{text(one['mechanism'])}: a", one["placebo_p"]) for one in fit.get("confirmations", ())]
+    known = [(whose, p) for whose, p in placebos if p is not None]
+    parts += [f"<p>{whose} pattern that means nothing does as well with p = {p:.2g}.</p>" for whose, p in known]
     if saved.rows is not None and saved.rows.lengths.any():
         parts.append(agreement_figure(said, saved.rows))
     return _section("Before and after", *parts)
