@@ -4,14 +4,22 @@ import base64
 import json
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from testing_machine import case_of, recorded
 
+from warpbrain.cases.specimen import Specimen
+from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import VERDICTS
+from warpbrain.diagnosis.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.errors import InputError
 from warpbrain.report.diagnosis.html import page_of, write_page
 from warpbrain.report.diagnosis.saved import read_saved
+from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis
+from warpbrain.report.diagnosis.specimen_curves import write_curves
+from warpbrain.report.files import write_summary
 
 
 @pytest.fixture
@@ -101,6 +109,22 @@ def test_a_specimen_has_curves_in_the_place_of_an_anatomy(folder):
     assert "nothing added" in page and "fibres (0.97)" in page
     assert "fibres: a pattern that means nothing does as well with p = 0.01" in page
     assert "pull 80" in page and "Recorded and computed stress of 2 tests" in page
+
+
+def test_a_diagnosis_of_a_specimen_has_what_its_page_asks_for(tmp_path):
+    stretch = np.linspace(0.88, 1.12, 40)
+    stress = 2.0 * 700.0 / -15.0 * (stretch**-16.0 - stretch**6.5)
+    noise = 5.0 * np.random.default_rng(1).normal(size=40)
+    recording = replace(recorded("stretch", stretch), response=stress + noise, name="rod")
+    case = replace(case_of(Specimen("cylinder", (8e-3, 8e-3, 5e-3), "lubricated")), recordings=(recording,))
+    options = DiagnosisOptions(candidates=("asymmetry",))
+    found = DiagnosingSpecimen(case, options, "cpu").run()
+    assert found.confirmations
+    write_curves(tmp_path / "curves.csv", found)
+    write_summary(tmp_path / "diagnosis.json", describe_specimen_diagnosis(found, options, "cpu"))
+    write_page(tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "asymmetry: a pattern that means nothing does as well with p = " in page
 
 
 def test_words_of_a_case_are_no_markup(folder):
