@@ -37,9 +37,13 @@ class Contact(Effect):
         body = problem.body
         within = np.linalg.norm(body.points - np.asarray(self.centre), axis=1) < self.size
         loose = body.nodes("side") & within & ~body.nodes("fixed")
-        outward = body.outer.spread(body.outer.vectors(body.points))
-        areas = np.linalg.norm(outward, axis=1)
-        normals = outward / np.where(areas > 0.0, areas, 1.0)[:, None]
+        vectors = body.outer.vectors(body.points)
+        areas = np.linalg.norm(body.outer.spread(vectors), axis=1)
+        # the mean of the faces about a node: of their areas a corner gets nothing, and nothing has no direction
+        outward = np.zeros_like(body.points)
+        np.add.at(outward, body.outer.nodes, vectors.sum(axis=1)[:, None])
+        lengths = np.linalg.norm(outward, axis=1)
+        normals = outward / np.where(lengths > 0.0, lengths, 1.0)[:, None]
         # corners of quadratic triangles have no area of their own, but have neighbours that do
         stiffness = SKULL * np.where(loose, np.maximum(areas, areas[loose].mean()), 0.0) if loose.any() else areas * 0.0
         stiff = stiffness[:, None, None] * normals[:, :, None] * normals[:, None, :]

@@ -7,6 +7,7 @@ from shapes import cube
 
 from referee.body import Body
 from referee.creep import creep
+from referee.effects.contact import Contact
 from referee.equilibrium import balance, linearised
 from referee.law import Demiray, Ogden, respond
 from referee.problem import Problem
@@ -105,6 +106,22 @@ def test_several_right_sides_are_solved_as_each_alone():
     np.testing.assert_allclose(together[free], exact, atol=1e-3 * np.abs(exact).max())
     assert not together[held.ravel()].any() and not together[:, 2].any()
     np.testing.assert_allclose(linear.solve(right[:, 0], 1e-5), together[:, 0], atol=1e-3 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("lifts", [False, True])
+def test_what_lets_go_is_stopped_along_the_wall_s_normal_alone(small_body, lifts):
+    held = small_body.nodes("side")[:, None].repeat(3, axis=1)
+    problem = problem_of(small_body, LAWS[0], held, np.zeros(held.shape))
+    found = Contact(centre=(0.13, 0.065, 0.1), size=0.02, lifts=lifts).act(problem)
+    loose = held[:, 0] & ~found.held[:, 0]
+    # corners of quadratic triangles too, whose part of an area is rounding
+    assert loose[: len(small_body.mesh.points)].any() and loose[len(small_body.mesh.points) :].any()
+    outward = np.zeros(held.shape)
+    outward[:, 0] = 1e-3
+    wall = found.springs(outward)[loose]
+    assert (wall[:, 0, 0] > 0.0).all()
+    np.testing.assert_allclose(wall, wall * np.array([[1.0, 0.0, 0.0], [0.0] * 3, [0.0] * 3]), atol=1e-6 * wall.max())
+    assert found.springs(-outward)[loose].any() == (not lifts)
 
 
 def test_creep_goes_from_the_stiff_answer_to_the_soft_one():
