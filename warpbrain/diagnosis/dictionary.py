@@ -21,8 +21,8 @@ Floats = NDArray[np.float64]
 
 #: About how many sites there are in the tissue, and on its surface.
 _VOLUME_SITES, _SURFACE_SITES = 350, 160
-#: Radius [m] of parts of a held set that may let go, and how many of them.
-_PATCH, _PATCHES = 0.035, 6
+#: Radii [m] of parts of a held set that may let go, and the distance [m] between their centres.
+RADII, BETWEEN = (0.010, 0.015, 0.023, 0.035, 0.053), 0.014
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,20 +82,22 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
 
 
 def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
-    """A held node set, and round parts of it."""
+    """A held node set, and round parts of it: each centre with each radius, however many nodes that is."""
     on_surface = nodes_of(mesh.boundary, len(mesh.points))
-    members = mesh.node_sets[nodes] & on_surface
-    where = mesh.points[members]
+    held = mesh.node_sets[nodes] & on_surface
+    where = mesh.points[held]
     size = float(np.linalg.norm(np.ptp(where, axis=0))) / 2.0
-    found = [Patch(nodes, members, where.mean(axis=0), size)]
-    if size > 1.3 * _PATCH:
-        for number in spread_points(where, 0.9 * _PATCH, _PATCHES):
-            near = members & (np.linalg.norm(mesh.points - where[number], axis=1) <= _PATCH)
-            x, y, z = 1000.0 * where[number]
-            # parts that hold no face have no wall
-            if near[mesh.boundary].all(axis=1).any() and not near[members].all():
-                found.append(Patch(f"{nodes}-near-{x:.0f}-{y:.0f}-{z:.0f}", near, where[number], _PATCH))
-    return found
+    parts = [patch_of(mesh, nodes, held, centre, r) for centre in where[spread_points(where, BETWEEN)] for r in RADII]
+    return [Patch(nodes, held, held, where.mean(axis=0), size), *(part for part in parts if part is not None)]
+
+
+def patch_of(mesh: TetMesh, nodes: str, held: NDArray[np.bool_], centre: Floats, radius: float) -> Patch | None:
+    """What of a held set is within a radius [m] of a point; None without a face, since that has no wall."""
+    members = held & (np.linalg.norm(mesh.points - centre, axis=1) <= radius)
+    if not members[mesh.boundary].all(axis=1).any():
+        return None
+    x, y, z = 1000.0 * centre
+    return Patch(f"{nodes}-{1000.0 * radius:.0f}-near-{x:.0f}-{y:.0f}-{z:.0f}", members, held, centre, radius)
 
 
 def dictionary_of(case: Case, kinds: Sequence[str] | None = None, instants: int = 1) -> Dictionary:

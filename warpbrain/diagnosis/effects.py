@@ -145,8 +145,9 @@ class Effects:
     def _effect(self, proposal: Proposal, answers: Floats) -> Effect:
         if proposal.is_there_or_not:
             if proposal.follows == "release":
-                assert proposal.patch is not None
-                answer = self.at.released(proposal.patch.members, _lifts(proposal.make(proposal.mean)))
+                patch = proposal.patch
+                assert patch is not None
+                answer = self.at.released(patch.members, patch.held, _lifts(proposal.make(proposal.mean)))
             else:
                 answer = self._solved.there(proposal.make(proposal.mean))
             return Effect(proposal, proposal.mean[0] * answer, proposal.sd[0] * answer[:, None])

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.diagnosis.releasing import HeldSurface
 from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.errors import SolveError
 from warpbrain.mesh import vertex_normals
@@ -28,10 +29,6 @@ Floats = NDArray[np.float64]
 
 #: Growth by which the derivative of the forces of growing tissue is taken.
 _GROWTH = 1e-4
-#: Stiffness of a wall relative to the stiffest node.
-_WALL = 10.0
-#: Relative residual of what lets go.
-_RELEASE = 1e-4
 
 
 class Linearisation:
@@ -51,6 +48,9 @@ class Linearisation:
         self.u = u
         self.reactions = reactions
         self.sensors = sensors
+        # held surfaces of the state, and what its sensors record of each
+        self._surfaces: dict[bytes, HeldSurface] = {}
+        self._of_surfaces: dict[bytes, Floats] = {}
         self._factorise()
 
     def _factorise(self) -> None:
@@ -75,6 +75,7 @@ class Linearisation:
         """The same state with other sensors; nothing is factorised again."""
         other = copy.copy(self)
         other.sensors = sensors
+        other._of_surfaces = {}
         other.__dict__.pop("compliance", None)
         return other
 
@@ -97,50 +98,35 @@ class Linearisation:
         A[:, ~free] = -np.asarray(by_R.todense())
         return A
 
-    def released(self, patch: NDArray[np.bool_], lifts: bool) -> Floats:
+    def released(self, patch: NDArray[np.bool_], held: NDArray[np.bool_], lifts: bool) -> Floats:
         """What is recorded where held nodes let go, to first order: (n,).
 
-        They slide along the surface; where the skull pulled at them they also leave it, if they can.
+        They slide along the surface; where the skull pulls at them they also leave it, if they can.
 
         Parameters
         ----------
         patch : (N,) bool array
-            Nodes, all of whose components are held.
+        held : (N,) bool array
+            The surface that the patch is a part of, all of whose components are held.
         lifts : bool
+
+        Raises
+        ------
+        SolveError
+            If the state is not stable without the patch.
         """
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.linalg import LinearOperator, cg, splu
-
-        members = np.flatnonzero(patch)
-        normals = vertex_normals(self.system.model.mesh)
-        pull = np.einsum("ni,ni->n", self.reactions[members], normals[members])
-        kept = members[(pull <= 0.0) | (not lifts)]
-        along = normals[kept]
-        # the wall as a very stiff spring along its normal
-        stiff = _WALL * float(self.stiffness.diagonal().max())
-        rows = (3 * kept[:, None, None] + np.arange(3)[:, None] + np.zeros((1, 1, 3), dtype=int)).ravel()
-        columns = (3 * kept[:, None, None] + np.arange(3)[None] + np.zeros((1, 3, 1), dtype=int)).ravel()
-        values = (stiff * along[:, :, None] * along[:, None, :]).ravel()
-        wall = coo_matrix((values, (rows, columns)), self.stiffness.shape).tocsr()
-        let_go = np.zeros(len(self._free), dtype=bool)
-        let_go.reshape(-1, 3)[members] = True
-        own = (self.stiffness + wall)[let_go][:, let_go].tocsc()
-        towards = self.stiffness[self._free][:, let_go].tocsr()
-
-        def inner(du_let_go: Floats) -> Floats:
-            return np.asarray(-self._factors.solve(np.asarray(towards @ du_let_go)))
-
-        # what was free before is eliminated with the factors that there are; few iterations do for the rest
-        shape = own.shape
-        eliminated = LinearOperator(shape, lambda x: own @ x + towards.T @ inner(x))
-        approximate = LinearOperator(shape, splu(own).solve)
-        found, info = cg(eliminated, -self.reactions[members].ravel(), rtol=_RELEASE, maxiter=300, M=approximate)
-        if info:
-            raise SolveError(f"letting go of {len(members)} nodes: conjugate gradients did not converge")
-        du = np.zeros(len(self._free))
-        du[let_go], du[self._free] = found, inner(found)
-        dR = np.where(self._free | let_go, 0.0, self.stiffness @ du)
-        return self.sensors.answer(du, dR)
+        key = held.tobytes()
+        if key not in self._surfaces:
+            normals = vertex_normals(self.system.model.mesh)
+            made = HeldSurface(self.stiffness, self._free, self._factors, held, normals, self.reactions)
+            self._surfaces[key] = made
+        surface = self._surfaces[key]
+        if key not in self._of_surfaces:
+            sensors = self.sensors
+            self._of_surfaces[key] = surface.answers(
+                self.stiffness, self._free, self.compliance, sensors.by_displacement, sensors.by_reactions
+            )
+        return np.asarray(self._of_surfaces[key] @ surface.moved(patch, lifts))
 
     def answers(self, forces: Floats) -> Floats:
         """What nodal forces (..., N, 3) [N] change of what is recorded: (n, ...)."""

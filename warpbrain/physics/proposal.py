@@ -40,7 +40,8 @@ class Patch:
     ----------
     name : str
         Of the node set that they become.
-    members : (n,) bool array
+    members, held : (n,) bool array
+        They, and all nodes of the surface that they are a part of.
     centre : (3,) array
         [m]
     radius : float
@@ -49,6 +50,7 @@ class Patch:
 
     name: str
     members: NDArray[np.bool_]
+    held: NDArray[np.bool_]
     centre: Floats
     radius: float
 
@@ -118,6 +120,10 @@ class Proposal:
         Where it does nothing, `start` if not said.
     patch : Patch or None
         What the case's own boundaries no longer hold.
+    of_patch : callable, or None
+        Of what lets go: from another patch to the same there.
+    place : callable, or None
+        Of what lets go: from coefficients to the centre (3,) [m] and radius [m] of what they stand for.
     history : callable, or None
         From the time since the load came [s] to the part of its effect that is there; None: all of it, always.
     pace : callable, or None
@@ -135,6 +141,8 @@ class Proposal:
     start: Floats = field(default_factory=lambda: np.zeros(0))
     nothing: Floats = field(default_factory=lambda: np.zeros(0))
     patch: Patch | None = None
+    of_patch: Callable[[Patch], Proposal] | None = None
+    place: Callable[[Floats], tuple[Floats, float]] | None = None
     history: Callable[[float], float] | None = None
     pace: Callable[[Floats], float] | None = None
     centre: Floats | None = None

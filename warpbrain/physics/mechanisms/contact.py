@@ -19,7 +19,7 @@ there those of the last augmentation, or of the last time step: so the friction 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -34,7 +34,7 @@ from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
-from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
+from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.physics.term import Body, Term
 
 STATES = ("fixed", "sliding", "lifting")
@@ -110,23 +110,24 @@ class Contact(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """What is held slides instead, or lifts off."""
-        found = [
-            Proposal.of_one(
-                lambda _share, name=patch.name, state=state: cls(nodes=name, state=state),
-                1.0,
-                0.5,
-                "release",
-                patch=patch,
-                centre=patch.centre,
-                radius=patch.radius,
-                region=patch.name,
-            )
-            for patch in situation.held
-            for state in STATES[1:]
-        ]
+        found = [cls._let_go(state, patch) for patch in situation.held for state in STATES[1:]]
         if not found:
             raise NotTestableError("nothing is held")
         return found
+
+    @classmethod
+    def _let_go(cls, state: str, patch: Patch) -> Proposal:
+        return Proposal.of_one(
+            lambda _share: cls(nodes=patch.name, state=state),
+            1.0,
+            0.5,
+            "release",
+            patch=patch,
+            of_patch=partial(cls._let_go, state),
+            centre=patch.centre,
+            radius=patch.radius,
+            region=patch.name,
+        )
 
     def skull(self, mesh: TetMesh) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Points [m] and outward triangles of the surface it touches."""
