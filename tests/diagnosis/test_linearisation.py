@@ -31,7 +31,7 @@ def test_what_lets_go_is_what_a_dense_solution_says(at):
     # the block is not loaded: forces that something else holds it with
     loaded = copy.copy(at)
     loaded._surfaces, loaded._of_surfaces = {}, {}
-    loaded.reactions = np.random.default_rng(1).normal(size=at.u.shape)
+    loaded.reactions = 1e-4 * np.random.default_rng(1).normal(size=at.u.shape)
     found = loaded.released(patch, held, lifts=False)
     normals = vertex_normals(mesh)[patch]
     K = at.stiffness.toarray()

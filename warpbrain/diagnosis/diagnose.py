@@ -26,6 +26,7 @@ from warpbrain.diagnosis.observable import require_observable
 from warpbrain.diagnosis.onset import onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions, Listener
 from warpbrain.diagnosis.parameters import SEEN, smallest_of
+from warpbrain.diagnosis.refining import refined
 from warpbrain.diagnosis.refitting import Refit, Refitting
 from warpbrain.diagnosis.result import (
     EXPLAINED,
@@ -169,13 +170,18 @@ class Diagnosing:
             if effect is not None and effect.proposal is None:
                 continue
             self.listener.stage(f"refit without linearising: {' and '.join((*stage.known, kind))}")
+            between = None
+            if effect is not None and effect.proposed.of_patch is not None:
+                found = refined(stage, stage.screen.best_effect(stage.candidates, kind))
+                effect, between = found.effect, found.unresolved
             begin = linear_point(stage.explanation, stage.residual, stage.explanation.nuisances, effect, stage.kappa)
             begins = [begin]
             if known is None and "none" in fits:
                 none = fits["none"]
                 begins.append(linear_point(stage.explanation, none.linear, none.columns, effect, none.kappa))
             effects = there if effect is None else (*there, effect)
-            between = None if effect is None else self._between(stage, kind, begin)
+            if effect is not None and between is None:
+                between = self._between(stage, kind, begin)
             try:
                 fits[kind] = refitting.fit(effects, begins, stage.kappa, near, between)
             except (SolveError, InputError):

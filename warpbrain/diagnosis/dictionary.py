@@ -88,7 +88,7 @@ def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
     where = mesh.points[held]
     size = float(np.linalg.norm(np.ptp(where, axis=0))) / 2.0
     parts = [patch_of(mesh, nodes, held, centre, r) for centre in where[spread_points(where, BETWEEN)] for r in RADII]
-    return [Patch(nodes, held, held, where.mean(axis=0), size), *(part for part in parts if part is not None)]
+    return [Patch(nodes, nodes, held, held, where.mean(axis=0), size), *(part for part in parts if part is not None)]
 
 
 def patch_of(mesh: TetMesh, nodes: str, held: NDArray[np.bool_], centre: Floats, radius: float) -> Patch | None:
@@ -97,7 +97,7 @@ def patch_of(mesh: TetMesh, nodes: str, held: NDArray[np.bool_], centre: Floats,
     if not members[mesh.boundary].all(axis=1).any():
         return None
     x, y, z = 1000.0 * centre
-    return Patch(f"{nodes}-{1000.0 * radius:.0f}-near-{x:.0f}-{y:.0f}-{z:.0f}", members, held, centre, radius)
+    return Patch(f"{nodes}-{1000.0 * radius:.0f}-near-{x:.0f}-{y:.0f}-{z:.0f}", nodes, members, held, centre, radius)
 
 
 def dictionary_of(case: Case, kinds: Sequence[str] | None = None, instants: int = 1) -> Dictionary:

@@ -155,8 +155,10 @@ class Judge:
             kappa = 1.0
             whitened = explanation.whitened(stage.residual)[:, None]
             z, covariance = Inner(explanation, stage.screening.stack, whitened).coefficients(kappa, number)
+        if effect.proposed.is_there_or_not and fit is not None:
+            own = explanation.stack(fit.effects[-1:]).of(0)
         d = explanation.detectability(own[:, 0] + own[:, 1:] @ z, kappa)
-        centre, radius = _place(stage, kind)
+        centre, radius = _place(stage, kind) if fit is None else _place_of(fit) or _place(stage, kind)
         why = "less probable than what was refitted" if stage.p_value <= self.options.alpha else "nothing is missing"
         why = "" if fit is not None else why
         own_places = candidates.of_kind[kind]
@@ -199,6 +201,13 @@ def _place(stage: Stage, kind: str) -> tuple[Floats | None, float | None]:
     sites = np.array([effects[k].proposed.centre for k in located])
     centre, radius = ball_of(sites, softmax(stage.screen.places[located, 0]))
     return centre, max(radius, float(best.radius or 0.0))
+
+
+def _place_of(fit: Refit) -> tuple[Floats, float] | None:
+    """Centre and radius of what was added last, where the fit has them."""
+    effect = fit.effects[-1]
+    place = effect.proposed.place
+    return None if place is None else place(effect.coefficients(fit.coefficients[-1]))
 
 
 def _is_local(fit: Refit) -> bool:

@@ -113,13 +113,20 @@ class Linearisation:
         Raises
         ------
         SolveError
-            If the state is not stable without the patch.
+            If too little holds the body without the patch.
         """
         key = held.tobytes()
         if key not in self._surfaces:
-            normals = vertex_normals(self.system.model.mesh)
-            made = HeldSurface(self.stiffness, self._free, self._factors, held, normals, self.reactions)
-            self._surfaces[key] = made
+            mesh = self.system.model.mesh
+            self._surfaces[key] = HeldSurface(
+                self.stiffness,
+                self._free,
+                self._factors,
+                held,
+                vertex_normals(mesh),
+                self.reactions,
+                float(np.linalg.norm(np.ptp(mesh.points, axis=0))),
+            )
         surface = self._surfaces[key]
         if key not in self._of_surfaces:
             sensors = self.sensors

@@ -42,7 +42,9 @@ def next_measurements(
     if len(kinds) < 2:
         return ()
     first, second = (candidates.effects[screen.best_effect(candidates, kind)] for kind in kinds[:2])
-    z = fits[kinds[0]].coefficients[0] if kinds[0] in fits else np.ones(first.columns.shape[1])
+    width = first.columns.shape[1]
+    # of what lets go the share alone: it is compared in its place of the scan
+    z = fits[kinds[0]].coefficients[0][:width] if kinds[0] in fits else np.ones(width)
     noise = base.typical_noise
     columns = base.nuisances.columns
     found = [Measurement("nothing more", _apart(base, first, second, z, columns, kappa, None, noise))]

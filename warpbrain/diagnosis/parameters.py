@@ -45,7 +45,7 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
 
     The length of a vector follows its components, as `value, size`.
     """
-    if effect.proposed.is_there_or_not:
+    if effect.proposed.is_there_or_not and effect.proposed.place is None:
         return ()
     here = numbers_of(effect, z)
     # a covariance that rounding has left not quite positive is no reason to fail
@@ -62,7 +62,13 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
 
 
 def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
-    """Numbers of the mechanism at coordinates (k,), by name, with units."""
+    """Numbers of the mechanism at coordinates (k,), by name, with units; of what lets go its place."""
+    if effect.proposed.place is not None:
+        centre, radius = effect.proposed.place(effect.coefficients(z))
+        return {
+            **{f"centre_{axis}": (x, "m") for axis, x in zip("xyz", centre.tolist(), strict=True)},
+            "radius": (1e3 * radius, "mm"),
+        }
     mechanism: Mechanism = effect.proposed.make(effect.coefficients(z))
     found: dict[str, tuple[float, str]] = {}
     if mechanism.ramp:

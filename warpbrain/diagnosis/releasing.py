@@ -23,6 +23,8 @@ Bools = NDArray[np.bool_]
 
 #: Right-hand sides that are solved together, and changes of what is lifted off at most.
 _TOGETHER, _CHANGES = 256, 20
+#: Part of the size of the body farther than which nothing goes to first order: then little holds it any more.
+_FARTHEST = 0.2
 
 
 class HeldSurface:
@@ -40,12 +42,22 @@ class HeldSurface:
         Nodes, all of whose components are held.
     normals, reactions : (N, 3) array
         Outward, and what the nodes are held with [N].
+    size : float
+        Of the body [m].
     """
 
     def __init__(
-        self, stiffness: Any, free: Bools, factors: Any, members: Bools, normals: Floats, reactions: Floats
+        self,
+        stiffness: Any,
+        free: Bools,
+        factors: Any,
+        members: Bools,
+        normals: Floats,
+        reactions: Floats,
+        size: float,
     ) -> None:
         self.members = np.flatnonzero(members)
+        self._farthest = _FARTHEST * size
         count = len(self.members)
         own = np.repeat(members, 3)
         towards = stiffness[free][:, own].tocsc()
@@ -62,7 +74,9 @@ class HeldSurface:
         self._R = np.einsum("aki,ai->ak", self._frames, reactions[self.members])
         self._known: dict[tuple[bytes, bool], Floats] = {}
 
-    def answers(self, stiffness: Any, free: Bools, compliance: Floats, by_displacement: Any, by_reactions: Any) -> Floats:
+    def answers(
+        self, stiffness: Any, free: Bools, compliance: Floats, by_displacement: Any, by_reactions: Any
+    ) -> Floats:
         """What sensors (n,) record where each component of `moved` is 1 m: (n, 3 m).
 
         Parameters
@@ -91,7 +105,7 @@ class HeldSurface:
         Raises
         ------
         SolveError
-            If the state is not stable without the patch.
+            If too little holds the body without the patch.
         """
         own = patch[self.members]
         key = own.tobytes(), lifts
@@ -120,7 +134,9 @@ class HeldSurface:
         found = np.zeros(loose.size)
         try:
             factor = cho_factor(self._S[np.ix_(at, at)], check_finite=False)
+            found[at] = cho_solve(factor, -self._R.ravel()[at], check_finite=False)
         except np.linalg.LinAlgError:
-            raise SolveError(f"letting go of {int(loose[:, 0].sum())} nodes: no equilibrium is near") from None
-        found[at] = cho_solve(factor, -self._R.ravel()[at], check_finite=False)
+            found[at] = np.inf
+        if not np.abs(found).max() < self._farthest:
+            raise SolveError(f"letting go of {int(loose[:, 0].sum())} nodes: no equilibrium is near")
         return found

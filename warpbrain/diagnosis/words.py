@@ -140,6 +140,12 @@ def _radius(values: Values) -> list[str]:
     return [f"its radius is {measured(values['radius'].value, values['radius'].sd, 'mm')}"]
 
 
+def _contact(values: Values) -> list[str]:
+    if "radius" not in values:
+        return []
+    return [f"what lets go has a radius of {measured(values['radius'].value, values['radius'].sd, 'mm')}"]
+
+
 def _viscoelasticity(values: Values) -> list[str]:
     found = []
     if "moduli" in values:
@@ -187,6 +193,7 @@ def _fibres(values: Values) -> list[str]:
 _PHRASES: dict[str, Callable[[Values], list[str]]] = {
     "swelling": lambda values: _swelling(values) + _radius(values),
     "inclusion": _inclusion,
+    "contact": _contact,
     "fibres": _fibres,
     "viscoelasticity": _viscoelasticity,
     "pressure": _pressure,

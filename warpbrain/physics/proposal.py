@@ -38,10 +38,10 @@ class Patch:
 
     Attributes
     ----------
-    name : str
-        Of the node set that they become.
+    name, surface : str
+        Of the node set that they become, and of the one that they are a part of.
     members, held : (n,) bool array
-        They, and all nodes of the surface that they are a part of.
+        They, and all nodes of that surface.
     centre : (3,) array
         [m]
     radius : float
@@ -49,6 +49,7 @@ class Patch:
     """
 
     name: str
+    surface: str
     members: NDArray[np.bool_]
     held: NDArray[np.bool_]
     centre: Floats

@@ -1,0 +1,60 @@
+"""A patch that lets go between the places of a scan: found, with its centre and radius."""
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpbrain.diagnosis.dictionary import BETWEEN, RADII, candidates_at, dictionary_of, patch_of
+from warpbrain.diagnosis.effects import Effects
+from warpbrain.diagnosis.parameters import values_of
+from warpbrain.diagnosis.refining import refined
+from warpbrain.diagnosis.screening import log_places
+from warpbrain.diagnosis.stage import Stage, compared, linear_point
+
+CENTRE, RADIUS = np.array([0.036, 0.024, 0.0]), 0.027
+
+
+@pytest.fixture(scope="module")
+def stage(small_diagnosis) -> Stage:
+    """A block that something holds at its bottom, which lets go on a patch that no scan has the place of."""
+    base = small_diagnosis.base
+    mesh = base.at.system.model.mesh
+    held = mesh.node_sets["bottom"]
+    at = copy.copy(base.at)
+    at._surfaces, at._of_surfaces = {}, {}
+    at.reactions = np.where(held[:, None], np.array([0.04, 0.02, -0.05]), 0.0)
+    base = replace(base, at=at, effects=Effects(at))
+    candidates = candidates_at(dictionary_of(small_diagnosis.case, ["contact"]), base.effects, {})
+    patch = patch_of(mesh, "bottom", held, CENTRE, RADIUS)
+    lifting = next(e for e in candidates.effects if e.proposed.make(e.proposed.mean).state == "lifting")
+    truth = base.effects.of([lifting.proposed.of_patch(patch)])[0].mean
+    residual = truth + base.explanation.factor @ np.random.default_rng(2).normal(size=len(truth))
+    return compared(base, (), candidates, base.explanation, residual, 1.0, 40, np.random.default_rng(3))
+
+
+def test_a_patch_is_found_between_places(stage):
+    assert RADIUS not in RADII
+    number = stage.screen.best_effect(stage.candidates, "contact")
+    found = refined(stage, number)
+    effect = found.effect
+    assert effect.columns.shape[1] == 4 and found.unresolved.shape == (len(stage.residual), 3)
+    begin = linear_point(stage.explanation, stage.residual, stage.explanation.nuisances, effect, 1.0)
+    centre, radius = effect.proposed.place(effect.coefficients(begin[-4:]))
+    # of a mesh with edges of 12 mm
+    assert np.linalg.norm(centre - CENTRE) < 0.006
+    assert radius == pytest.approx(RADIUS, rel=0.25)
+    scanned = stage.screen.places[number, 0] + stage.screen.none[0]
+    white = stage.explanation.whitened(stage.residual)[:, None]
+    assert log_places(stage.explanation, stage.explanation.stack([effect]), white)[0, 0] > scanned - 1.0
+
+
+def test_what_is_said_of_it_are_its_centre_and_radius(stage):
+    effect = refined(stage, stage.screen.best_effect(stage.candidates, "contact")).effect
+    values = {value.name: value for value in values_of(effect, np.zeros(4), np.eye(4))}
+    assert values["radius"].unit == "mm"
+    assert 0.0 < values["radius"].sd < values["radius"].value
+    # along the surface only
+    assert "centre_z" not in values or values["centre_z"].sd < 1e-6
+    assert 0.0 < values["centre_x"].sd <= 3.0 * BETWEEN

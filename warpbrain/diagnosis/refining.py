@@ -1,0 +1,161 @@
+"""A patch that lets go, where it is and how large: from the best one of a scan to one between its places.
+
+About the best patch the neighbours with other centres and radii are compared to first order, and the best of them is
+gone on from. A patch on a mesh is a set of nodes: its answer jumps from one to the next. So the change of the answer
+over centre and radius is that of a plane through all neighbours; with it the fit has the centre along the surface and
+the radius as coefficients, beside the share. Their prior is the step of the scan, and what the scan leaves open: so the
+evidence of the fit is the average over them, not the best.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.dictionary import BETWEEN, RADII, patch_of
+from warpbrain.diagnosis.effects import Effect
+from warpbrain.diagnosis.screening import log_places
+from warpbrain.diagnosis.stage import Stage
+from warpbrain.errors import SolveError
+from warpbrain.mesh import TetMesh, face_vectors
+from warpbrain.physics.proposal import Patch, Proposal
+
+Floats = NDArray[np.float64]
+
+#: Step of the scan from one radius to the next, as a factor; how fine it is gone through, and moves at most.
+_STEP = float(np.exp(np.mean(np.diff(np.log(RADII)))))
+_PARTS, _MOVES = 3, 6
+#: Standard deviation of a centre [m] and of the logarithm of a radius, uniform in a step of the scan; and how many
+#: times that is the most that neighbours tell of.
+_CELL, _WIDEST = np.array([BETWEEN, BETWEEN, np.log(_STEP)]) / np.sqrt(12.0), 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A patch between the places of a scan.
+
+    Attributes
+    ----------
+    effect : Effect
+        With columns (n, 4): of its share, of its centre along both tangents, of the logarithm of its radius.
+    unresolved : (n, 3) array
+        What the mesh leaves open of centre and radius, one standard deviation each.
+    """
+
+    effect: Effect
+    unresolved: Floats
+
+
+def refined(stage: Stage, number: int) -> Refined:
+    """The patch that an effect of a stage's scan comes to.
+
+    Parameters
+    ----------
+    stage : Stage
+    number : int
+        Of the effect, which is a release.
+    """
+    best = stage.candidates.effects[number]
+    mesh = stage.base.at.system.model.mesh
+    residual = stage.explanation.whitened(stage.residual)[:, None]
+    for _ in range(_MOVES):
+        beside = _neighbours(stage, mesh, best.proposed)
+        effects = [best, *beside]
+        places = log_places(stage.explanation, stage.explanation.stack(effects), residual)[:, 0]
+        chosen = int(np.argmax(places))
+        if chosen == 0 or _same(effects[chosen], best):
+            break
+        best = effects[chosen]
+    tangents = _tangents(mesh, _patch(best.proposed))
+    coordinates = np.array([_coordinates(one.proposed, best.proposed, tangents) for one in effects])
+    slopes = _slopes(coordinates, np.array([one.mean for one in effects]))
+    sd = _spread(stage, number, best.proposed, tangents)
+    return Refined(_effect(best, tangents, slopes, sd), slopes * _unresolved(mesh, _patch(best.proposed)))
+
+
+def _patch(proposal: Proposal) -> Patch:
+    assert proposal.patch is not None
+    return proposal.patch
+
+
+def _same(first: Effect, second: Effect) -> bool:
+    return np.array_equal(_patch(first.proposed).members, _patch(second.proposed).members)
+
+
+def _neighbours(stage: Stage, mesh: TetMesh, proposal: Proposal) -> list[Effect]:
+    """Of patches with a centre within a step of the scan, and a radius."""
+    patch, make = _patch(proposal), proposal.of_patch
+    assert make is not None
+    nodes = np.flatnonzero(patch.held & (np.linalg.norm(mesh.points - patch.centre, axis=1) <= BETWEEN))
+    centres = [patch.centre, *mesh.points[nodes]]
+    radii = [patch.radius * _STEP ** (k / _PARTS) for k in range(-_PARTS, _PARTS + 1)]
+    found = []
+    for centre in centres:
+        for radius in radii:
+            part = patch_of(mesh, patch.surface, patch.held, centre, radius)
+            if part is None:
+                continue
+            try:
+                found.extend(stage.base.effects.of([make(part)]))
+            except SolveError:
+                continue
+    return found
+
+
+def _tangents(mesh: TetMesh, patch: Patch) -> Floats:
+    """Two directions (2, 3) along the surface of a patch."""
+    faces = mesh.boundary[patch.members[mesh.boundary].all(axis=1)]
+    outward = face_vectors(mesh.points, faces).sum(axis=0)
+    return np.asarray(np.linalg.svd(outward[None])[2][1:])
+
+
+def _coordinates(proposal: Proposal, origin: Proposal, tangents: Floats) -> Floats:
+    """Of a patch about another: along both tangents [m], and the logarithm of its radius."""
+    one, other = _patch(proposal), _patch(origin)
+    return np.array([*(tangents @ (one.centre - other.centre)), np.log(one.radius / other.radius)])
+
+
+def _slopes(coordinates: Floats, answers: Floats) -> Floats:
+    """Change (n, 3) of the answer over the coordinates: a plane through all answers (v, n)."""
+    design = np.column_stack([np.ones(len(coordinates)), coordinates / _CELL])
+    return np.asarray(np.linalg.lstsq(design, answers, rcond=1e-6)[0][1:].T) / _CELL
+
+
+def _spread(stage: Stage, number: int, best: Proposal, tangents: Floats) -> Floats:
+    """Standard deviation (3,) of the coordinates beforehand: a step of the scan, and what the scan leaves open."""
+    from scipy.special import softmax
+
+    effects = stage.candidates.effects
+    region = _patch(effects[number].proposed).held
+    own = next(own for own in stage.candidates.of_kind.values() if number in own)
+    alike = [k for k in own.tolist() if np.array_equal(_patch(effects[k].proposed).held, region)]
+    at = np.array([_coordinates(effects[k].proposed, best, tangents) for k in alike])
+    weights = softmax(stage.screen.places[alike, 0])
+    open_ = weights @ (at - weights @ at) ** 2
+    return np.minimum(np.sqrt(_CELL**2 + open_), _WIDEST * _CELL)
+
+
+def _unresolved(mesh: TetMesh, patch: Patch) -> Floats:
+    """Standard deviation (3,) of the coordinates that nodes so far apart can tell: uniform in an edge."""
+    faces = mesh.boundary[patch.held[mesh.boundary].all(axis=1)]
+    edges = mesh.points[faces] - mesh.points[np.roll(faces, 1, axis=1)]
+    edge = float(np.median(np.linalg.norm(edges, axis=2)))
+    return np.array([edge, edge, edge / patch.radius]) / np.sqrt(12.0)
+
+
+def _effect(best: Effect, tangents: Floats, slopes: Floats, sd: Floats) -> Effect:
+    proposal, patch = best.proposed, _patch(best.proposed)
+
+    def place(c: Floats) -> tuple[Floats, float]:
+        return patch.centre + c[1:3] @ tangents, patch.radius * float(np.exp(c[3]))
+
+    wider = replace(
+        proposal,
+        mean=np.concatenate([proposal.mean, np.zeros(3)]),
+        sd=np.concatenate([proposal.sd, sd]),
+        start=np.zeros(4),
+        place=place,
+    )
+    return Effect(wider, best.mean, np.column_stack([best.columns, slopes * sd]))
