@@ -2,6 +2,7 @@
 
 A scan has a few values of such a number, and an amount that is fitted at one of them is sure for that value only.
 Between two neighbours the number may be anywhere: uniform in one step, of a standard deviation of the step / sqrt(12).
+A number that coefficients set is fitted, and nothing is left open about it.
 """
 
 from __future__ import annotations
@@ -32,8 +33,12 @@ def between_neighbours(candidates: Candidates, kind: str, number: int, z: Floats
     alike = [k for k in candidates.of_kind[kind].tolist() if _same_place(effects[k].proposed.centre, one.centre)]
     alike = [k for k in alike if effects[k].proposed.region == one.region and effects[k].columns.shape[1] == len(z)]
     numbers = {k: {name: value for name, (value, _) in numbers_of(effects[k], 0.0 * z).items()} for k in alike}
+    beside = [numbers_of(effects[number], 0.1 * axis) for axis in np.eye(len(z))]
+    fitted = set().union(*(_differ({name: value for name, (value, _) in one.items()}, numbers[number]) for one in beside))
     found = []
     for name, value in numbers[number].items():
+        if name in fitted:
+            continue
         # all other numbers alike
         own = [k for k in alike if name in numbers[k] and _differ(numbers[k], numbers[number]) <= {name}]
         own = sorted({numbers[k][name]: k for k in own}.items())

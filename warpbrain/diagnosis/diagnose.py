@@ -162,6 +162,10 @@ class Diagnosing:
         order = np.argsort(-factors).tolist()
         least = factors[order[0]] - _BEHIND if known is None else max(factors[order[0]] - _BEHIND, _WORTH)
         chosen = [kinds[k] for k in order[:most] if factors[k] > least]
+        # to first order fluid and relaxing stress are too much alike: where one is refitted the other is
+        in_time = [kinds[k] for k in order if factors[k] > least and stage.candidates.changes_in_time(kinds[k])]
+        if not set(in_time).isdisjoint(chosen):
+            chosen += [kind for kind in in_time if kind not in chosen]
         there = () if known is None else known.with_own_columns
         near = None if known is None else known.state
         fits: dict[str, Refit] = {}

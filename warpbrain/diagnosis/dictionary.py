@@ -145,6 +145,11 @@ class Candidates:
     alternatives: frozenset[str]
     rejected: dict[str, str]
 
+    def changes_in_time(self, kind: str) -> bool:
+        """Whether what a kind does changes while loads do not."""
+        proposal = self.effects[self.of_kind[kind][0]].proposal
+        return proposal is not None and proposal.changes_in_time
+
 
 def candidates_at(
     dictionary: Dictionary,

@@ -20,7 +20,7 @@ from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
 
-#: Part of a standard deviation by which a smooth proposal is differentiated.
+#: Part of a standard deviation by which a smooth or a fading proposal is differentiated.
 _STEP = 1e-3
 #: The same of a course.
 _STEP_OF_COURSE = 0.05
@@ -50,12 +50,16 @@ class Effect:
         Of one standard deviation of each.
     about : callable, or None
         Of a course: from its coefficients (k,) to the columns (n, k) there.
+    lasting : (n, 1) array, or None
+        Of what changes in time: the same as it is at first, if it were for ever. That is fluid that has nowhere to go,
+        or tissue that is stiffer: as much as this explains says nothing for a change in time.
     """
 
     proposal: Proposal | None
     mean: Floats
     columns: Floats
     about: Callable[[Floats], Floats] | None = None
+    lasting: Floats | None = None
 
     @property
     def proposed(self) -> Proposal:
@@ -102,18 +106,19 @@ class Effects:
             What of them acts at the state already.
         """
         courses = self._courses([proposal for proposal in proposals if proposal.pace is not None])
+        fading = self._at_once([proposal for proposal in proposals if proposal.history is not None], present)
         points = [self._points(proposal) for proposal in proposals]
         answers = self._answers([mechanism for own in points for mechanism in own], present)
         found, next_one = [], 0
         for proposal, own in zip(proposals, points, strict=True):
             columns = answers[:, next_one : next_one + len(own)]
-            course = courses.get(repr(proposal.make(proposal.start))) if proposal.pace is not None else None
-            found.append(
-                self._effect(proposal, self._over_time(proposal, columns))
-                if course is None
-                else _effect_of_course(proposal, course)
-            )
             next_one += len(own)
+            if proposal.pace is not None:
+                found.append(_effect_of_course(proposal, courses[repr(proposal.make(proposal.start))]))
+            elif proposal.history is not None:
+                found.append(self._fading(proposal, fading[repr(proposal.make(proposal.start))]))
+            else:
+                found.append(self._effect(proposal, columns))
         return found
 
     def _courses(self, proposals: Sequence[Proposal]) -> dict[str, Course]:
@@ -125,16 +130,29 @@ class Effects:
             paces[repr(proposal.make(proposal.start))].append(proposal.pace(proposal.mean))
         return {key: self._solved.course(made, paces[key]) for key, made in makes.items()}
 
-    def _over_time(self, proposal: Proposal, answers: Floats) -> Floats:
-        if proposal.history is None:
-            return answers
-        parts = [0.0 if np.isinf(time) else proposal.history(time) for time in self.at.sensors.times.tolist()]
-        return answers * np.array(parts)[:, None]
+    def _at_once(self, proposals: Sequence[Proposal], present: Mechanism | None) -> dict[str, Floats]:
+        """What fading proposals change (n,) at once at their starts, by what is there."""
+        makes = {repr(made): made for made in (proposal.make(proposal.start) for proposal in proposals)}
+        answers = self._answers(list(makes.values()), present)
+        return dict(zip(makes, answers.T, strict=True))
+
+    def _fading(self, proposal: Proposal, at_once: Floats) -> Effect:
+        history = proposal.history
+        assert history is not None
+        times, rows = np.unique(self.at.sensors.times, return_inverse=True)
+
+        def left(c: Floats) -> Floats:
+            parts = [history(c, time) if np.isfinite(time) else 0.0 for time in times.tolist()]
+            return at_once * np.array(parts)[rows]
+
+        axes = _STEP * np.diag(proposal.sd)
+        columns = [(left(proposal.mean + axis) - left(proposal.mean - axis)) / (2.0 * _STEP) for axis in axes]
+        return Effect(proposal, left(proposal.mean), np.column_stack(columns), lasting=at_once[:, None])
 
     @staticmethod
     def _points(proposal: Proposal) -> list[Mechanism]:
         """Mechanisms whose answers make the columns."""
-        if proposal.is_there_or_not or proposal.pace is not None:
+        if proposal.is_there_or_not or proposal.changes_in_time:
             return []
         axes = np.diag(proposal.sd)
         if proposal.follows == "proportional":
@@ -210,7 +228,7 @@ class Effects:
         blocks = wp.zeros((count, nodes * (nodes + 1) // 2), dtype=p.mat33, device=device)
         term.place(wp.zeros((count, nodes), dtype=p.vec3, device=device), blocks)
         term.set_scale(term.factor(np.inf))
-        # what remembers answers as if the state had come at once: its history says how much of that is left
+        # what remembers answers as if the state had come at once: what is left of that, its history says
         term.set_time_step(0.0 if term.forgets_in is not None else np.inf)
         system.u.assign(self.at.u)
         term.evaluate_forces(system.u)
@@ -247,7 +265,7 @@ def _effect_of_course(proposal: Proposal, course: Course) -> Effect:
         ends = [(course.at(pace(c + step)) - course.at(pace(c - step))) / (2.0 * _STEP_OF_COURSE) for step in steps]
         return np.column_stack(ends)
 
-    return Effect(proposal, course.at(pace(proposal.mean)), about(proposal.mean), about)
+    return Effect(proposal, course.at(pace(proposal.mean)), about(proposal.mean), about, course.at(0.0)[:, None])
 
 
 def _lifts(mechanism: Mechanism) -> bool:

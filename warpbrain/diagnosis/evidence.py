@@ -59,6 +59,11 @@ class Stack:
         """Columns of one effect, its mean first."""
         return self.columns[:, self.first[number] : self.first[number + 1]]
 
+    def some(self, numbers: NDArray[np.int64]) -> Stack:
+        """Some of the effects, in that order."""
+        each = [self.of(number) for number in numbers.tolist()]
+        return Stack(np.concatenate(each, axis=1), np.cumsum([0, *(columns.shape[1] for columns in each)]))
+
 
 class Explanation:
     """What residuals are compared with: noise, and nuisances that may explain them first.

@@ -72,7 +72,7 @@ def onset_of(kind: str, base: Base, candidates: Candidates, screen: Screen) -> O
     if len(times) < 2:
         return None
     effects = [] if kind == UNKNOWN else _best_effects(kind, candidates, screen)
-    if any(effect.about is not None or effect.proposed.history is not None for effect in effects):
+    if any(effect.proposed.changes_in_time for effect in effects):
         return Onset(0.0, float(times[0]), None, OF_ITS_OWN)
     courses = time_courses(base.states.times)
     alike = np.bincount([course.interval for course in courses])

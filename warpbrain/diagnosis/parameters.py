@@ -43,7 +43,8 @@ def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, .
 def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...]:
     """Parameters of the mechanism at coordinates (k,) with a covariance (k, k): to first order.
 
-    The length of a vector follows its components, as `value, size`.
+    The length of a vector follows its components, as `value_size`; of several numbers the first is `moduli_1`, and
+    `moduli` what they are together, if that means anything.
     """
     if effect.proposed.is_there_or_not and effect.proposed.place is None:
         return ()
@@ -78,9 +79,11 @@ def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
         if value is None or isinstance(value, str):
             continue
         numbers = np.ravel(np.asarray(value, dtype=float)) / says.si
-        if len(numbers) == 1:
-            found[name] = (float(numbers[0]), says.unit)
-        elif len(numbers) == 3 and says.kind in ("vector", "position"):
+        if len(numbers) == 1 or says.adds_up:
+            found[name] = (float(numbers.sum()), says.unit)
+        if says.kind == "numbers" and len(numbers) > 1:
+            found |= {f"{name}_{k}": (number, says.unit) for k, number in enumerate(numbers.tolist(), 1)}
+        if len(numbers) == 3 and says.kind in ("vector", "position"):
             unit = says.unit if says.kind == "vector" else "m"
             for axis, number in zip("xyz", numbers.tolist(), strict=True):
                 found[f"{name}_{axis}"] = (number, unit)

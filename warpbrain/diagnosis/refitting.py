@@ -22,6 +22,7 @@ from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.physics.proposal import Proposal
 
 Floats = NDArray[np.float64]
 
@@ -251,7 +252,7 @@ class Refitting:
         length = float(scaled @ scaled)
         switches = all(effect.proposed.is_there_or_not for effect in effects)
         # of what changes in time the finer mesh says nothing: it is computed in the end state alone
-        changing = any(effect.proposed.history is not None or effect.about is not None for effect in effects)
+        changing = any(effect.proposed.changes_in_time for effect in effects)
         if (length < 1e-6 and not switches) or changing:
             return None
         try:
@@ -394,8 +395,7 @@ class Refitting:
             if effect.about is not None:
                 columns[:, own] = effect.about(here)
             elif at is not None and not effect.proposed.is_there_or_not:
-                about = replace(effect.proposed, follows="smooth", start=here)
-                columns[:, own] = Effects(at).of([about], effect.proposed.make(here))[0].columns
+                columns[:, own] = Effects(at).of([_about(effect.proposed, here)], effect.proposed.make(here))[0].columns
             place += size
         return columns
 
@@ -449,3 +449,10 @@ class Refitting:
             size = self._share.constant + float(self._share.along @ z[: len(self._share.along)])
             found.append(_UNSURE * size * self._share.answer[:, None])
         return found
+
+
+def _about(proposal: Proposal, here: Floats) -> Proposal:
+    """The proposal from which the columns about some coefficients (k,) follow."""
+    if proposal.changes_in_time:
+        return replace(proposal, mean=here)
+    return replace(proposal, follows="smooth", start=here)

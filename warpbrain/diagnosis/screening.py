@@ -1,7 +1,8 @@
 """Which kind of mechanism explains residuals best, to first order: evidence of every proposal, averaged over a kind.
 
 Averaging over places, levels and sets is the correction for having looked in many of them. Beside named kinds stands
-the unknown: any smooth force.
+the unknown: any smooth force. What changes in time is credited only with what changes: it is compared with what it is
+at first, if that were for ever (`Effect.lasting`).
 """
 
 from __future__ import annotations
@@ -73,6 +74,8 @@ class Screening:
         self.stack: Stack = explanation.stack(candidates.effects)
         self.forces = flexible
         self.flexible = [explanation.with_more(columns) for columns in flexible]
+        lasting = {kind: candidates.effects[own[0]].lasting for kind, own in candidates.of_kind.items()}
+        self._lasting = {kind: explanation.with_more(own) for kind, own in lasting.items() if own is not None}
         self._kappas = KAPPAS
 
     def standardised(self, kappa: float) -> Screening:
@@ -82,6 +85,11 @@ class Screening:
         found.stack = Stack(known.standardised(self.stack.columns, kappa), self.stack.first)
         found.forces = [known.standardised(known.whitened(columns), kappa) for columns in self.forces]
         found.flexible = [found.explanation.with_more(columns) for columns in found.forces]
+        lasting = {kind: self.candidates.effects[self.candidates.of_kind[kind][0]].lasting for kind in self._lasting}
+        found._lasting = {
+            kind: found.explanation.with_more(known.standardised(known.whitened(own), kappa))
+            for kind, own in lasting.items()
+        }
         found._kappas = np.ones(1)
         return found
 
@@ -89,6 +97,10 @@ class Screening:
         """Evidence for whitened residuals (n, b)."""
         none = self.explanation.log_marginal(residuals, self._kappas)
         places = log_places(self.explanation, self.stack, residuals, self._kappas) - none
+        for kind, lasting in self._lasting.items():
+            own = self.candidates.of_kind[kind]
+            alike = lasting.log_marginal(residuals, self._kappas)
+            places[own] = log_places(lasting, self.stack.some(own), residuals, self._kappas) - alike
         by_kind = self._by_kind(places)
         unknown = log_unknown(self.flexible, residuals, self._kappas) - none
         return Screen((*self.candidates.kinds, UNKNOWN), none, np.vstack([by_kind, unknown]), places)

@@ -87,7 +87,7 @@ class Stage:
         found: dict[str, float] = {}
         for kind, value in screened.items():
             if kind in fits:
-                found[kind] = fits[kind].log_evidence + self.over_places(kind) - none
+                found[kind] = self._gain(kind, none) + self.over_places(kind)
             elif kind != UNKNOWN:
                 found[kind] = value - (none - float(screen.none[0]))
         best_screened = max((screened[kind] for kind in fits if kind != "none"), default=0.0)
@@ -98,6 +98,22 @@ class Stage:
                 found[kind] = min(found[kind], best_fitted - (best_screened - screened[kind]))
         found[UNKNOWN] = self._unknown(fits["none"]) - none
         return found
+
+    def _gain(self, kind: str, none: float) -> float:
+        """Log evidence of the refit of a kind less that without it; of what changes in time, of the change alone."""
+        fit, lasting = self.fits[kind], self.best_effect(kind).lasting
+        if lasting is None:
+            return fit.log_evidence - none
+        without = self.fits["none"]
+
+        def beside_lasting(columns: Floats, linear: Floats) -> float:
+            explanation = Explanation(self.explanation.factor, np.column_stack([columns, lasting]))
+            return float(explanation.log_marginal(explanation.whitened(linear)[:, None])[0])
+
+        # as above, no search that ended too early counts for the kind
+        screened = beside_lasting(self.explanation.nuisances, self.residual)
+        alike = max(beside_lasting(without.columns, without.linear), screened)
+        return beside_lasting(fit.columns, fit.linear) - alike
 
     def over_places(self, kind: str) -> float:
         """What the best of the places and levels of a kind loses where all of them are averaged over."""

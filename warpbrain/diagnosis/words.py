@@ -152,14 +152,23 @@ def _viscoelasticity(values: Values) -> list[str]:
         moduli = values["moduli"]
         found.append(f"at first it is {measured(1.0 + moduli.value, moduli.sd)} times as stiff as in the end")
     if "times" in values:
-        found.append(f"its relaxation time is {_time(values['times'])}")
+        of = "of " if values["times"].sd > values["times"].value else ""
+        found.append(f"its relaxation time is {of}{_time(values['times'])}")
+    branches = [(values.get(f"moduli_{number}"), values.get(f"times_{number}")) for number in (1, 2)]
+    each = [
+        f"{measured(modulus.value, modulus.sd)} in {_time(time)}"
+        for modulus, time in branches
+        if modulus is not None and time is not None
+    ]
+    if each:
+        found.append(f"what relaxes, as a part of that in the end, is {' and '.join(each)}")
     return found
 
 
 def _time(value: Value) -> str:
     if value.sd > value.value:
         # a number with a spread beyond itself would look like a mistake
-        return f"of the order of {number(value.value, 1)} {value.unit}, which these data hardly tell"
+        return f"the order of {number(value.value, 1)} {value.unit}, which these data hardly tell"
     return measured(value.value, value.sd, value.unit)
 
 

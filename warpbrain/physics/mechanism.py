@@ -88,6 +88,8 @@ class Says:
         By how much it must change to change much where it is zero and nothing is expected of it, in the user's unit.
     method : bool
         It is a setting of the method, no property of a body: never differentiated or estimated.
+    adds_up : bool
+        Of several numbers, whether their sum is a number of its own.
     """
 
     doc: str
@@ -104,6 +106,7 @@ class Says:
     source: str = ""
     size: float = 1.0
     method: bool = False
+    adds_up: bool = False
 
 
 def parameter(doc: str, *, default: Any = dataclasses.MISSING, **known: Any) -> Any:

@@ -24,8 +24,9 @@ Floats = NDArray[np.float64]
 Place = tuple[float, float, float]
 
 #: How the effect of a proposal follows its coefficients: in proportion, to first order about a start that does nothing,
-#: all at once, all at once where something that held it lets go, or as a course in time that coefficients hasten.
-Follows = Literal["proportional", "smooth", "switch", "release", "course"]
+#: all at once, all at once where something that held it lets go, as a course in time that coefficients hasten, or as
+#: what came at once and fades.
+Follows = Literal["proportional", "smooth", "switch", "release", "course", "fading"]
 
 
 class NotTestableError(Exception):
@@ -114,7 +115,7 @@ class Proposal:
         Of the coefficients beforehand.
     follows : str
         One of `Follows`. A smooth one does nothing at `start`; a switch has one coefficient, its share; a course is
-        solved once, at `start`.
+        solved once, at `start`; what one that fades does at once is computed at `start`.
     start : (k,) array
         About which a smooth one is differentiated; zero if proportional.
     nothing : (k,) array
@@ -126,7 +127,8 @@ class Proposal:
     place : callable, or None
         Of what lets go: from coefficients to the centre (3,) [m] and radius [m] of what they stand for.
     history : callable, or None
-        From the time since the load came [s] to the part of its effect that is there; None: all of it, always.
+        Of a fading one: from coefficients (k,) and the time since the load came [s] to how many times what it does at
+        once at `start` is there; nothing is left in the end.
     pace : callable, or None
         Of a course: from coefficients to how many times faster than at `start` all of it goes.
     centre, radius : (3,) array and float, or None
@@ -144,7 +146,7 @@ class Proposal:
     patch: Patch | None = None
     of_patch: Callable[[Patch], Proposal] | None = None
     place: Callable[[Floats], tuple[Floats, float]] | None = None
-    history: Callable[[float], float] | None = None
+    history: Callable[[Floats, float], float] | None = None
     pace: Callable[[Floats], float] | None = None
     centre: Floats | None = None
     radius: float | None = None
@@ -218,6 +220,11 @@ class Proposal:
     def is_there_or_not(self) -> bool:
         """Whether it has no size, only a share that says how exactly it is simulated."""
         return self.follows in ("switch", "release")
+
+    @property
+    def changes_in_time(self) -> bool:
+        """Whether what it does changes while loads do not."""
+        return self.follows in ("course", "fading")
 
     def __len__(self) -> int:
         return len(self.mean)

@@ -17,6 +17,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import combinations
 from typing import Any, ClassVar
 
 import numpy as np
@@ -32,8 +33,16 @@ from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body, Term
 
-#: Relaxation times [s] that are looked for.
+#: Relaxation times [s] that are looked for, alone and in pairs.
 _LOOKED_FOR = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+#: Scales of what all branches have together: within the minutes that are recorded anything from a few hundredths of
+#: the modulus relaxes to several times as much.
+_SCALES = (0.2, 2.0)
+#: Standard deviations of `ln tau`, from one time that is looked for to the next, and of the log odds of the first of
+#: two branches.
+_STEP, _ODDS = 0.5 * math.log(10.0), 1.0
+#: The least modulus of all branches together.
+_LEAST = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +61,7 @@ class Viscoelasticity(Mechanism):
         "Modulus of each branch, relative to the case's own, which is what is left in the end.",
         kind="numbers",
         expectation=LogNormal(1.0, 2.7),
+        adds_up=True,
         typical="0.7 kPa left and 2.0 kPa that relax in 9.7 s (cortex); 0.3 and 0.9 kPa, 14.9 s (corona radiata)",
         source="Budday et al. 2017 (diagnosis design, M8)",
     )
@@ -82,25 +92,57 @@ class Viscoelasticity(Mechanism):
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
-        """One branch, of times around those that were recorded."""
+        """One branch of each time that is looked for, and two of each pair of them.
+
+        Tissue relaxes over decades of time, and a few recorded times tell one or two of these apart. Coefficients are
+        the modulus of all branches together, the logarithm of each time, and the log odds of the share that the
+        first of two branches has.
+        """
         situation.require_new(cls.kind)
         if situation.instants < 2:
             raise NotTestableError(f"needs {cls.needs[0]}")
-        found = []
-        for relaxation in _LOOKED_FOR:
+        alone = [(time,) for time in _LOOKED_FOR]
+        return [
+            Proposal(
+                cls._of_coefficients,
+                middle := np.array([0.0, *np.log(times), *np.zeros(len(times) - 1)]),
+                np.array([scale, *np.full(len(times), _STEP), *np.full(len(times) - 1, _ODDS)]),
+                "fading",
+                # all of the case's own modulus, whatever the times
+                np.eye(1, len(middle))[0],
+                nothing=middle,
+                history=_left,
+                region="all tissue",
+            )
+            for scale in _SCALES
+            for times in (*alone, *combinations(_LOOKED_FOR, 2))
+        ]
 
-            def branch(c: NDArray[np.float64], relaxation: float = relaxation) -> "Viscoelasticity":
-                return cls(moduli=(max(float(c[0]), 1e-6),), times=(relaxation,))
-
-            def left(time: float, relaxation: float = relaxation) -> float:
-                return math.exp(-time / relaxation)
-
-            found.append(Proposal(branch, np.zeros(1), np.full(1, 2.0), history=left, region="all tissue"))
-        return found
+    @classmethod
+    def _of_coefficients(cls, c: NDArray[np.float64]) -> "Viscoelasticity":
+        shares, times = _spectrum(c)
+        # the faster branch first
+        order = np.argsort(times)
+        moduli = max(float(c[0]), _LEAST) * shares
+        return cls(moduli=tuple(moduli[order].tolist()), times=tuple(times[order].tolist()))
 
     def bind(self, body: Body) -> "ViscoelasticTerm":
         """See `warpbrain.physics.term.Following`."""
         return ViscoelasticTerm(body, self)
+
+
+def _spectrum(c: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Shares and times [s] of the branches of a proposal, (1,) or (2,), from its coefficients."""
+    if len(c) == 2:
+        return np.ones(1), np.exp(c[1:])
+    first = 1.0 / (1.0 + math.exp(-float(c[3])))
+    return np.array([first, 1.0 - first]), np.exp(c[1:3])
+
+
+def _left(c: NDArray[np.float64], time: float) -> float:
+    """Modulus that has not relaxed, as a proposal has it: where strain is held, it is what stress is proportional to."""
+    shares, times = _spectrum(c)
+    return float(c[0] * (shares @ np.exp(-time / times)))
 
 
 class ViscoelasticTerm(Term):
