@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.dictionary import Candidates
+from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.parameters import numbers_of
 
 Floats = NDArray[np.float64]
@@ -32,9 +33,8 @@ def between_neighbours(candidates: Candidates, kind: str, number: int, z: Floats
     one = effects[number].proposed
     alike = [k for k in candidates.of_kind[kind].tolist() if _same_place(effects[k].proposed.centre, one.centre)]
     alike = [k for k in alike if effects[k].proposed.region == one.region and effects[k].columns.shape[1] == len(z)]
-    numbers = {k: {name: value for name, (value, _) in numbers_of(effects[k], 0.0 * z).items()} for k in alike}
-    beside = [numbers_of(effects[number], 0.1 * axis) for axis in np.eye(len(z))]
-    fitted = set().union(*(_differ({name: value for name, (value, _) in one.items()}, numbers[number]) for one in beside))
+    numbers = {k: _numbers(effects[k], 0.0 * z) for k in alike}
+    fitted = set().union(*(_differ(_numbers(effects[number], 0.1 * axis), numbers[number]) for axis in np.eye(len(z))))
     found = []
     for name, value in numbers[number].items():
         if name in fitted:
@@ -49,6 +49,10 @@ def between_neighbours(candidates: Candidates, kind: str, number: int, z: Floats
             answers = [effects[k].mean + effects[k].columns @ z for k in (low, high)]
             found.append((answers[1] - answers[0]) / (steps * np.sqrt(12.0)))
     return np.array(found).reshape(len(found), len(effects[number].mean)).T
+
+
+def _numbers(effect: Effect, z: Floats) -> dict[str, float]:
+    return {name: value for name, (value, _) in numbers_of(effect, z).items()}
 
 
 def _same_place(first: Floats | None, second: Floats | None) -> bool:

@@ -140,7 +140,7 @@ def _spectrum(c: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.f
 
 
 def _left(c: NDArray[np.float64], time: float) -> float:
-    """Modulus that has not relaxed, as a proposal has it: where strain is held, it is what stress is proportional to."""
+    """Modulus that has not relaxed at a time [s], as a proposal has it: that of strain that is held."""
     shares, times = _spectrum(c)
     return float(c[0] * (shares @ np.exp(-time / times)))
 
