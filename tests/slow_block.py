@@ -24,6 +24,7 @@ PERMEABILITY = 5e-10
 CAUSES: dict[str, Mechanism] = {
     "drainage": Drainage(permeability=PERMEABILITY),
     "viscoelasticity": Viscoelasticity(moduli=(1.0,), times=(100.0,)),
+    "viscoelasticity of two times": Viscoelasticity(moduli=(0.5, 0.5), times=(20.0, 200.0)),
 }
 #: Edge [m], noise [m] and points of the recording.
 _SIDE, _NOISE, _POINTS = 0.06, 2e-5, 40

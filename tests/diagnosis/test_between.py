@@ -31,5 +31,17 @@ def test_a_step_of_the_scan(candidates, number, change):
     np.testing.assert_allclose(found[:, 0], 0.5 * np.array(change) / np.sqrt(12.0))
 
 
+def test_what_coefficients_set_leaves_nothing_open(candidates):
+    def branch(c: np.ndarray) -> Viscoelasticity:
+        return Viscoelasticity(moduli=(max(c[0], 1e-6),), times=(np.exp(c[1]),))
+
+    fitted = tuple(
+        Effect(Proposal(branch, np.array([0.0, np.log(time)]), np.array([2.0, 1.0])), np.zeros(2), columns)
+        for time, columns in ((1.0, np.eye(2)), (3.0, 2.0 * np.eye(2)))
+    )
+    candidates = Candidates(("viscoelasticity",), fitted, {"viscoelasticity": np.arange(2)}, frozenset(), {})
+    assert between_neighbours(candidates, "viscoelasticity", 0, np.array([0.5, 0.1])).shape == (2, 0)
+
+
 def test_what_is_not_scanned_leaves_nothing_open(candidates):
     assert between_neighbours(candidates, "pressure", 3, np.array([1.0])).shape == (2, 0)

@@ -17,6 +17,7 @@ from warpbrain.diagnosis.switching import Known, Solving
 from warpbrain.diagnosis.time_courses import AT_ONCE, EVENLY, time_courses
 from warpbrain.diagnosis.tissue_prior import declared
 from warpbrain.physics.mechanisms.drainage import Drainage
+from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.report.diagnosis.text import when_in_words
 
 _OPTIONS = DiagnosisOptions(candidates=("drainage", "viscoelasticity", "swelling"), mesh_error=False, draws=100)
@@ -32,9 +33,30 @@ def test_fluid_and_relaxing_stress_are_told_apart(diagnosed: tuple[str, Diagnosi
     cause, found = diagnosed
     best = found.ranking[0]
     assert found.verdict.startswith("named")
-    assert best.kind == cause
+    assert [one.kind for one in found.named] == [best.kind] == [CAUSES[cause].kind]
     assert best.probability > 0.9
     assert found.when == Onset(0.0, TIMES[0], None, OF_ITS_OWN)
+
+
+def test_what_relaxes_is_found_with_its_times(diagnosed: tuple[str, Diagnosis]) -> None:
+    cause, found = diagnosed
+    expected = CAUSES[cause]
+    if not isinstance(expected, Viscoelasticity):
+        pytest.skip("nothing relaxes")
+    assert found.explained is not None
+    [acting] = found.explained.mechanisms
+    assert isinstance(acting, Viscoelasticity)
+    # they tell what has not relaxed at the recorded times, and next to nothing of what did before
+    assert [_left(acting, time) for time in TIMES] == pytest.approx([_left(expected, time) for time in TIMES], abs=0.1)
+    values = {value.name: value for value in found.ranking[0].values}
+    together = values["moduli"]
+    assert abs(together.value - sum(expected.moduli)) < 2.0 * together.sd
+    slowest = values[f"times_{len(acting.times)}"]
+    assert abs(np.log(slowest.value / expected.times[-1])) < 2.0 * slowest.sd / slowest.value
+
+
+def _left(acting: Viscoelasticity, time: float) -> float:
+    return sum(m * float(np.exp(-time / t)) for m, t in zip(acting.moduli, acting.times, strict=True))
 
 
 def test_the_permeability_is_found_with_its_spread(diagnosed: tuple[str, Diagnosis]) -> None:

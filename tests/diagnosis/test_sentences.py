@@ -133,7 +133,16 @@ def test_gravity_has_a_level_in_millimetres_and_a_tilt_in_degrees():
         (one("inclusion", ("ratio", 0.25, 0.025, "")), "it is 4.0 ± 0.4 times as soft as the tissue around"),
         (one("viscoelasticity", ("moduli", 1.16, 0.06, "")), "at first it is 2.16 ± 0.06 times as stiff as in the end"),
         (one("viscoelasticity", ("times", 40.0, 5.0, "s")), "its relaxation time is 40 ± 5 s"),
-        (one("viscoelasticity", ("times", 4.6, 18.0, "s")), "of the order of 5 s, which these data hardly tell"),
+        (one("viscoelasticity", ("times", 4.6, 18.0, "s")), "is of the order of 5 s, which these data hardly tell"),
+        (
+            one(
+                "viscoelasticity",
+                *(("moduli_1", 0.115, 0.04, ""), ("moduli_2", 0.107, 0.05, "")),
+                *(("times_1", 7.1, 3.0, "s"), ("times_2", 35.4, 60.0, "s")),
+            ),
+            "what relaxes, as a part of that in the end, is 0.12 ± 0.04 within 7 ± 3 s, "
+            "and 0.11 ± 0.05 within the order of 40 s, which these data hardly tell",
+        ),
         (one("pressure", ("value", -480.0, 20.0, "Pa")), "it is 480 ± 20 Pa lower there than elsewhere"),
         (one("traction", ("value_size", 2130.0, 50.0, "Pa")), "it acts with 2.13 ± 0.05 kPa"),
         (one("fibres", ("stiffness", 260.0, 40.0, "Pa")), "their stiffness is 260 ± 40 Pa"),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.course import Course
 from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
@@ -137,13 +138,12 @@ class Effects:
         return dict(zip(makes, answers.T, strict=True))
 
     def _fading(self, proposal: Proposal, at_once: Floats) -> Effect:
-        history = proposal.history
-        assert history is not None
-        times, rows = np.unique(self.at.sensors.times, return_inverse=True)
+        sensors = self.at.sensors
 
         def left(c: Floats) -> Floats:
-            parts = [history(c, time) if np.isfinite(time) else 0.0 for time in times.tolist()]
-            return at_once * np.array(parts)[rows]
+            parts = parts_of(proposal, c, sensors)
+            # what is so many times stiffer resists as much more, and moves as much less
+            return at_once * np.where(sensors.is_displacement, parts / (1.0 + np.maximum(parts, 0.0)), parts)
 
         axes = _STEP * np.diag(proposal.sd)
         columns = [(left(proposal.mean + axis) - left(proposal.mean - axis)) / (2.0 * _STEP) for axis in axes]
@@ -253,6 +253,14 @@ class Effects:
         found = at.internal_forces() - self._internal
         system.set_materials(own)
         return found
+
+
+def parts_of(proposal: Proposal, c: Floats, sensors: Sensors) -> Floats:
+    """How many times what a fading proposal does at once is there (n,) when each number was recorded."""
+    assert proposal.history is not None
+    times, rows = np.unique(sensors.times, return_inverse=True)
+    parts = [proposal.history(c, time) if np.isfinite(time) else 0.0 for time in times.tolist()]
+    return np.array(parts)[rows]
 
 
 def _effect_of_course(proposal: Proposal, course: Course) -> Effect:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.effects import Effect, Effects
+from warpbrain.diagnosis.effects import Effect, Effects, parts_of
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected
@@ -31,6 +31,8 @@ _ITERATIONS, _HALVINGS = 6, 4
 _ANEW = 0.3
 #: Change of the mesh's error [standard deviations of the noise, all sensors together] with which a fit goes on.
 _MATTERS = 0.3
+#: Step [standard deviations] of a difference between states.
+_BESIDE = 0.05
 #: Steps shorter than this in standard deviations of the prior end the search.
 _SHORT = 0.03
 #: How far [standard deviations] coordinates of tissue and field may go.
@@ -287,11 +289,13 @@ class Refitting:
             if value >= best:
                 break
             state, residual, z, best = beside, left, between, value
-        converged, made_at = False, np.full(len(z), np.inf)
+        converged, made_at, solved = False, np.full(len(z), np.inf), False
         moving = ~np.concatenate([self._linear, np.zeros(len(z) - q, dtype=bool)])
         for iteration in range(_ITERATIONS):
             if anew and iteration > 0 and np.abs(z - made_at)[moving].max(initial=0.0) > _ANEW:
                 columns, made_at = self._columns_at(state, effects, z[q:], columns), z
+                if solved:
+                    columns = self._columns_solved(state, residual, effects, z, columns)
             white = solve_triangular(self.factor, np.column_stack([residual, columns]), lower=True) / kappa
             gradient = white[:, 1:].T @ white[:, 0] - z
             step = np.linalg.solve(np.eye(len(z)) + white[:, 1:].T @ white[:, 1:], gradient)
@@ -312,7 +316,10 @@ class Refitting:
             if not taken:
                 # what is left is rounding, or nothing better lies this way: the last good point stands
                 converged = bool(np.abs(step).max() < 2.0 * _SHORT)
-                break
+                if converged or solved or not anew or not any(effect.proposed.history for effect in effects):
+                    break
+                # tissue that is several times as stiff at first is no small change of what it is in the end
+                solved, made_at = True, np.full(len(z), np.inf)
             if converged:
                 break
         return state, z, residual, columns, converged
@@ -372,6 +379,20 @@ class Refitting:
             at += size
         return state, residual
 
+    def _columns_solved(
+        self, state: SolvedState, residual: Floats, effects: tuple[Effect, ...], z: Floats, columns: Floats
+    ) -> Floats:
+        """Columns with those of tissue and mechanisms from states that are solved beside this one."""
+        columns = columns.copy()
+        numbers = np.arange(len(z))
+        for k in (*numbers[self._tissue].tolist(), *numbers[self._U.shape[1] :].tolist()):
+            beside = z + _BESIDE * np.eye(1, len(z), k)[0]
+            try:
+                columns[:, k] = (residual - self._try(effects, beside, state)[1]) / _BESIDE
+            except (SolveError, InputError):
+                continue
+        return columns
+
     def _columns_at(self, state: SolvedState, effects: tuple[Effect, ...], z: Floats, columns: Floats) -> Floats:
         """Columns with those of tissue, field and mechanisms made anew where they are now."""
         q = self._U.shape[1]
@@ -384,9 +405,10 @@ class Refitting:
                 at = Linearisation(state.system, state.u, state.reactions, state.sensors)
             except SolveError:
                 return columns
-            tissue = tissue_columns(at, self.states, state.hypothesis.theta, self.prior)
+            early = self._early(state, effects, z)
+            tissue = early * tissue_columns(at, self.states, state.hypothesis.theta, self.prior)
             columns[:, self._tissue] = tissue + mesh_by_tissue(state.sensors, self._mesh)
-            columns[:, self._field] = field_columns(at, self.states)
+            columns[:, self._field] = early * field_columns(at, self.states)
         place = 0
         for effect in effects:
             size = effect.columns.shape[1]
@@ -398,6 +420,18 @@ class Refitting:
                 columns[:, own] = Effects(at).of([_about(effect.proposed, here)], effect.proposed.make(here))[0].columns
             place += size
         return columns
+
+    @staticmethod
+    def _early(state: SolvedState, effects: tuple[Effect, ...], z: Floats) -> Floats:
+        """How many times what tissue does in the end (n, 1) it does where it has not relaxed."""
+        stiffer, place = np.ones(len(state.sensors)), 0
+        for effect in effects:
+            size = effect.columns.shape[1]
+            if effect.proposed.history is not None:
+                here = effect.coefficients(z[place : place + size])
+                stiffer += np.maximum(parts_of(effect.proposed, here, state.sensors), 0.0)
+            place += size
+        return np.where(state.sensors.is_displacement, 1.0 / stiffer, stiffer)[:, None]
 
     def _refit(
         self,

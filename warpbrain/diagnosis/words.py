@@ -156,12 +156,12 @@ def _viscoelasticity(values: Values) -> list[str]:
         found.append(f"its relaxation time is {of}{_time(values['times'])}")
     branches = [(values.get(f"moduli_{number}"), values.get(f"times_{number}")) for number in (1, 2)]
     each = [
-        f"{measured(modulus.value, modulus.sd)} in {_time(time)}"
+        f"{measured(modulus.value, modulus.sd)} within {_time(time)}"
         for modulus, time in branches
         if modulus is not None and time is not None
     ]
     if each:
-        found.append(f"what relaxes, as a part of that in the end, is {' and '.join(each)}")
+        found.append(f"what relaxes, as a part of that in the end, is {', and '.join(each)}")
     return found
 
 
