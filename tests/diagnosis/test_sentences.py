@@ -141,7 +141,7 @@ def test_gravity_has_a_level_in_millimetres_and_a_tilt_in_degrees():
                 *(("times_1", 7.1, 3.0, "s"), ("times_2", 35.4, 60.0, "s")),
             ),
             "what relaxes, as a part of that in the end, is 0.12 ± 0.04 within 7 ± 3 s, "
-            "and 0.11 ± 0.05 within the order of 40 s, which these data hardly tell",
+            "and 0.11 ± 0.05 within the order of 35 s, which these data hardly tell",
         ),
         (one("pressure", ("value", -480.0, 20.0, "Pa")), "it is 480 ± 20 Pa lower there than elsewhere"),
         (one("traction", ("value_size", 2130.0, 50.0, "Pa")), "it acts with 2.13 ± 0.05 kPa"),
