@@ -89,7 +89,9 @@ class VirtualCases:
         if effect.proposal is not None and effect.mean.any():
             mean = (effect.proposal.mean - effect.proposal.without) / effect.proposal.sd
         ends = np.sort((mean + LARGEST * np.array([[-1.0], [1.0]])) / (mean + z), axis=0)
-        return own[:, 0] + own[:, 1:] @ z, float(ends[0].max()), float(ends[1].min())
+        # times of relaxation of what does not relax are no matter
+        matter = own[:, 1:].any(axis=0)
+        return own[:, 0] + own[:, 1:] @ z, float(ends[0, matter].max()), float(ends[1, matter].min())
 
     def _of_sizes(self, kind: str, count: int) -> tuple[Floats, list[int]]:
         """Changes (n, b) scaled to each detectability in turn where that is plausible, and where each begins."""
