@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from slow_block import CAUSES, PERMEABILITY, TIMES, write_slow
 
+from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.course import Course, course_times
 from warpbrain.diagnosis.diagnose import Diagnosing
+from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
 from warpbrain.diagnosis.onset import OF_ITS_OWN, Onset, onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.diagnosis.screening import UNKNOWN
+from warpbrain.diagnosis.screening import UNKNOWN, Screening
 from warpbrain.diagnosis.states import Hypothesis, States, steps_to
 from warpbrain.diagnosis.switching import Known, Solving
 from warpbrain.diagnosis.time_courses import AT_ONCE, EVENLY, time_courses
@@ -79,6 +81,40 @@ def test_one_course_is_that_of_every_permeability(tmp_path) -> None:
         other = states.solve(replace(hypothesis, mechanisms=(Drainage(permeability=pace * 1e-9),)))
         expected = other.sensors.computed - base.sensors.computed
         assert np.linalg.norm(course.at(pace) - expected) < 0.05 * np.linalg.norm(expected)
+
+
+@pytest.fixture(scope="module")
+def relaxing(diagnosed: tuple[str, Diagnosis]) -> tuple[Base, Candidates]:
+    base = diagnosed[1].base
+    dictionary = dictionary_of(base.states.case, ("drainage", "viscoelasticity"), len(TIMES))
+    return base, candidates_at(dictionary, base.effects, {})
+
+
+def test_what_lasts_is_no_mark_of_what_changes_in_time(relaxing: tuple[Base, Candidates]) -> None:
+    base, candidates = relaxing
+    screening = Screening(base.explanation, candidates, list(base.smooth_forces))
+    rng = np.random.default_rng(0)
+    for kind, numbers in candidates.of_kind.items():
+        lasting = candidates.effects[numbers[0]].lasting
+        assert lasting is not None
+        whitened = base.explanation.whitened(0.5 * lasting) + rng.normal(size=(len(lasting), 1))
+        screen = screening.run(whitened)
+        assert screen.log_factors[screen.kinds.index(kind), 0] < 0.0
+
+
+@pytest.mark.parametrize("c", [(0.1, np.log(30.0)), (0.1, np.log(10.0), np.log(100.0), 0.5)])
+def test_what_relaxes_moves_less_as_its_times_say(relaxing: tuple[Base, Candidates], c: tuple[float, ...]) -> None:
+    base, candidates = relaxing
+    own = [candidates.effects[k].proposed for k in candidates.of_kind["viscoelasticity"]]
+    proposal = replace(next(one for one in own if len(one) == len(c)), mean=np.array(c))
+    [effect] = base.effects.of([proposal])
+    without, acting = (
+        base.states.solve(replace(base.state.hypothesis, mechanisms=mechanisms))
+        for mechanisms in ((), (proposal.make(np.array(c)),))
+    )
+    expected = acting.sensors.computed - without.sensors.computed
+    # creep is a little slower than relaxation
+    assert np.linalg.norm(effect.mean - expected) < 0.1 * np.linalg.norm(expected)
 
 
 def test_a_course_holds_all_recorded_times_at_all_paces(small_diagnosis: Diagnosis) -> None:
