@@ -19,8 +19,8 @@ from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situat
 
 Floats = NDArray[np.float64]
 
-#: About how many sites there are in the tissue, and on its surface.
-_VOLUME_SITES, _SURFACE_SITES = 350, 160
+#: About how many sites there are in the tissue, and on its surface: no patch is far from all of them.
+_VOLUME_SITES, _SURFACE_SITES = 350, 480
 #: Radii [m] of parts of a held set that may let go, and the distance [m] between their centres.
 RADII, BETWEEN = (0.010, 0.015, 0.023, 0.035, 0.053), 0.014
 

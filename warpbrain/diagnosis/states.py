@@ -163,7 +163,12 @@ class States:
 
     def _sensors(self, moments: Sequence[tuple[Floats, Floats]], expected: Difference | None) -> Sensors:
         if expected is not None:
-            moments = [(u + expected.u, reactions + expected.reactions) for u, reactions in moments]
+            # known of the end; before it as much smaller as the state is
+            u_end, reactions_end = moments[-1]
+            moments = [
+                (u + _part(u, u_end) * expected.u, reactions + _part(reactions, reactions_end) * expected.reactions)
+                for u, reactions in moments
+            ]
         parts = zip(self.times, self.observations, moments, strict=True)
         return sensors_at([(time, observations, *moment) for time, observations, moment in parts], self.centre)
 
@@ -200,6 +205,12 @@ class States:
             field = StiffnessField(log_factor=self.modes @ hypothesis.field)
             model = replace(model, mechanisms=(*model.mechanisms, field))
         return System(model, self.device)
+
+
+def _part(of: Floats, whole: Floats) -> float:
+    """How many times the one (N, 3) the other is, as far as it is alike."""
+    square = float(np.vdot(whole, whole))
+    return float(np.vdot(of, whole)) / square if square > 0.0 else 1.0
 
 
 def steps_to(times: Sequence[float]) -> list[float]:
