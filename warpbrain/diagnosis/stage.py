@@ -18,6 +18,7 @@ from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening, log_unknown
+from warpbrain.diagnosis.single_points import log_gross
 
 Floats = NDArray[np.float64]
 
@@ -84,10 +85,11 @@ class Stage:
             return screened
         # a search that ended too early must not make everything else look better
         none = max(fits["none"].log_evidence, float(screen.none[0]))
+        gross = self._gross(fits["none"])
         found: dict[str, float] = {}
         for kind, value in screened.items():
             if kind in fits:
-                found[kind] = self._gain(kind, none) + self.over_places(kind)
+                found[kind] = self._gain(kind, none) + self.over_places(kind) + self._gross(fits[kind]) - gross
             elif kind != UNKNOWN:
                 found[kind] = value - (none - float(screen.none[0]))
         best_screened = max((screened[kind] for kind in fits if kind != "none"), default=0.0)
@@ -96,8 +98,12 @@ class Stage:
         for kind in found:
             if kind not in fits and self.best_effect(kind).proposal is not None:
                 found[kind] = min(found[kind], best_fitted - (best_screened - screened[kind]))
-        found[UNKNOWN] = self._unknown(fits["none"]) - none
+        found[UNKNOWN] = self._unknown(fits["none"]) - none - gross
         return found
+
+    def _gross(self, fit: Refit) -> float:
+        """What a refit gains where single points may be gross errors."""
+        return log_gross(fit.state.sensors, self.explanation.factor, fit.columns, fit.linear, fit.kappa)
 
     def _gain(self, kind: str, none: float) -> float:
         """Log evidence of the refit of a kind less that without it; of what changes in time, of the change alone."""
@@ -123,10 +129,15 @@ class Stage:
         return float(logsumexp(own)) - float(np.log(len(own))) - float(own.max())
 
     def _unknown(self, none: Refit) -> float:
-        """Log evidence of any smooth force in the place of a mechanism."""
+        """Log evidence of any smooth force in the place of a mechanism, where single points may be gross errors."""
         explanation = none.explanation(self.explanation.factor)
-        loose = [explanation.with_more(force) for force in self.base.smooth_forces]
-        return float(log_unknown(loose, explanation.whitened(none.linear)[:, None])[0])
+        forces = self.base.smooth_forces
+        loose = [explanation.with_more(force) for force in forces]
+        white = explanation.whitened(none.linear)[:, None]
+        best = int(np.argmax([one.log_marginal(white)[0] for one in loose]))
+        columns, kappa = loose[best].nuisances, loose[best].best_kappa(white[:, 0])
+        gross = log_gross(none.state.sensors, self.explanation.factor, columns, none.linear, kappa)
+        return float(log_unknown(loose, white)[0]) + gross
 
 
 def compared(

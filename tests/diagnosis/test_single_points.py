@@ -1,0 +1,77 @@
+"""Evidence that rests on a single point."""
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from warpbrain.diagnosis.sensors import Sensors
+from warpbrain.diagnosis.single_points import log_gross
+
+POINTS = 12
+
+
+def sensors_of(groups):
+    n = len(groups)
+    nothing = np.zeros((n, 1))
+    rest = (nothing, nothing, np.zeros((n, 6)), np.ones(n), np.zeros((n, 3)), np.zeros((n, 3)))
+    return Sensors(np.zeros(n), np.zeros(n), *rest, np.asarray(groups), np.zeros(n, int), np.zeros(n), ("points",))
+
+
+@pytest.fixture
+def model():
+    random = np.random.default_rng(3)
+    groups = np.concatenate([np.repeat(np.arange(POINTS), 3), POINTS + np.arange(5)])
+    n = len(groups)
+    factor = np.linalg.cholesky(0.3 * np.eye(n) + 0.05)
+    return sensors_of(groups), factor, random.normal(size=(n, 4)), random
+
+
+def noise_of(model):
+    sensors, factor, columns, random = model
+    return factor @ random.normal(size=len(sensors)) + columns @ random.normal(size=4)
+
+
+def test_hardly_anything_is_gained_where_no_point_stands_out(model):
+    sensors, factor, columns, _ = model
+    assert 0.0 < log_gross(sensors, factor, columns, noise_of(model), 1.0) < 1.0
+
+
+def test_one_point_that_stands_out_costs_no_more_than_a_gross_error(model):
+    sensors, factor, columns, _ = model
+    residual = noise_of(model)
+    rows = np.flatnonzero(sensors.groups == 4)
+    error = np.zeros(len(residual))
+    error[rows] = [4.0, -3.0, 2.0]
+    explains = np.column_stack([columns, 10.0 * error])
+
+    def evidence(U, r):
+        return multivariate_normal(np.zeros(len(r)), factor @ factor.T + U @ U.T).logpdf(r)
+
+    off = residual + error
+    raw = evidence(explains, off) - evidence(columns, off)
+    fair = raw + log_gross(sensors, factor, explains, off, 1.0) - log_gross(sensors, factor, columns, off, 1.0)
+    # a column made for that very point explains it all; a gross error does nearly as well
+    assert raw > 20.0
+    assert fair < 7.0
+
+
+def test_what_many_points_say_stays_evidence(model):
+    sensors, factor, columns, random = model
+    effect = random.normal(size=len(sensors))
+    residual = noise_of(model) + 1.5 * effect
+    explains = np.column_stack([columns, 2.0 * effect])
+
+    def fair(U):
+        evidence = multivariate_normal(np.zeros(len(residual)), factor @ factor.T + U @ U.T).logpdf(residual)
+        return evidence + log_gross(sensors, factor, U, residual, 1.0)
+
+    assert fair(explains) - fair(columns) > 10.0
+
+
+def test_of_one_point_it_is_the_mixture(model):
+    # without nuisances and correlation nothing is to first order
+    sensors, residual = sensors_of([0, 0, 0, 1, 1, 1]), np.array([9.0, 1.0, -2.0, 0.3, 0.1, 0.0])
+    found = log_gross(sensors, np.eye(6), np.zeros((6, 1)), residual, 1.0)
+    narrow, wide = multivariate_normal(np.zeros(3), np.eye(3)), multivariate_normal(np.zeros(3), 64.0 * np.eye(3))
+    exact = sum(np.log1p(0.03 * wide.pdf(r) / narrow.pdf(r)) for r in (residual[:3], residual[3:]))
+    assert found == pytest.approx(exact, rel=1e-9)
