@@ -33,8 +33,8 @@ class Calibration:
 
 
 #: Of bodies. Offsets: what `python -m referee calibrate` found of 61 calibration cases, rounded; the alternatives' may
-#: be anything from -2 to 9. Temperature: on the cases of scored run 2, looked at since, 2 leaves 32 names that are right
-#: of 41 that 1.25 would say, 1.5 leaves 40, and all three say none that is wrong but for one that 1.25 does.
+#: be anything from -2 to 9. Temperature: of the cases of scored run 2, looked at since, 1.25 would name 41 rightly and
+#: one wrongly, 1.5 names 40 and 2 names 32, none wrongly.
 BODIES = Calibration(1.5, -2.0, 0.0)
 #: Of specimens, set by hand on rods with a known answer.
 SPECIMENS = Calibration(1.5, -1.0, -1.0)
