@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from warpbrain.diagnosis.sensors import Sensors
-from warpbrain.diagnosis.single_points import log_gross
+from warpbrain.diagnosis.single_points import log_gross, log_odds
 
 POINTS = 12
 
@@ -75,3 +75,11 @@ def test_of_one_point_it_is_the_mixture(model):
     narrow, wide = multivariate_normal(np.zeros(3), np.eye(3)), multivariate_normal(np.zeros(3), 64.0 * np.eye(3))
     exact = sum(np.log1p(0.03 * wide.pdf(r) / narrow.pdf(r)) for r in (residual[:3], residual[3:]))
     assert found == pytest.approx(exact, rel=1e-9)
+
+
+def test_odds_are_of_the_point_that_stands_out(model):
+    sensors, factor, columns, _ = model
+    residual = noise_of(model)
+    residual[sensors.groups == 4] += [4.0, -3.0, 2.0]
+    likely = log_odds(sensors, factor, columns, residual, 1.0) > 0.0
+    np.testing.assert_array_equal(likely, sensors.groups == 4)

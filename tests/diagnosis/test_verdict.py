@@ -32,6 +32,7 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         "adequacy_p": 0.5,
         "size": 1.0,
         "unknown_sure": 5.0,
+        "aside": 0.04,
     }
     return Evidence(**(given | known))
 
@@ -51,6 +52,9 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         ({"gravity": 0.97, "pressure": 0.03}, {"placebo_p": 0.3}, CANNOT_SAY),
         ({"gravity": 0.97, "pressure": 0.03}, {"size": 7.0}, CANNOT_SAY),
         ({"gravity": 0.97, "pressure": 0.03}, {"p_value": 0.03}, CANNOT_SAY),
+        ({"gravity": 0.97, "pressure": 0.03}, {"aside": 0.2}, CANNOT_SAY),
+        ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {"aside": 0.2}, CANNOT_SAY),
+        ({"unknown": 0.8, "gravity": 0.2}, {"aside": 0.2}, CANNOT_SAY),
         ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {"p_value": 0.03}, CANNOT_SAY),
     ],
 )

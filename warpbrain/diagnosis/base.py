@@ -6,7 +6,7 @@ not. Where the load is large one round from the declared state is not enough: co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,6 +113,12 @@ class Base:
         times = self.at.sensors.times
         factors = [course.factor(times)[:, None] for course in main_courses(self.states.times)]
         return [factor * columns for columns in self.constant_forces for factor in factors]
+
+    def without(self, rows: NDArray[np.bool_]) -> Base:
+        """The same with more rows (n,) set aside as gross errors."""
+        sigma = np.where(rows, ASIDE * self.noise, self.sigma)
+        explanation = explanation_of(self.at.sensors, sigma, self.nuisances.columns)
+        return replace(self, sigma=sigma, aside=self.aside | rows, explanation=explanation)
 
     def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
         """What nuisances do to the displacement of other points (k, 3) [m], and what makes effects there."""

@@ -108,20 +108,20 @@ class Diagnosing:
             base = finder.find()
         with self._timed("candidates"):
             candidates = self._candidates(base)
-        self.listener.stage("screening")
-        with self._timed("screening"):
-            kappa = base.explanation.best_kappa(base.whitened)
-            first = compared(base, (), candidates, base.explanation, base.residual, kappa, self._draws, rng)
+        first = self._first(base, candidates, rng)
+        refitting, fits = self._refitted(first)
+        first.fits.update(fits)
+        gross = first.gross_errors() if fits else np.zeros(len(base.residual), dtype=bool)
+        if gross.any():
+            self.listener.stage("again without points that are gross errors")
+            base = base.without(gross)
+            first = self._first(base, candidates, rng)
+            refitting, fits = self._refitted(first)
+            first.fits.update(fits)
         with self._timed("significance"):
             where = score_map(
-                base.at, base.explanation, base.whitened, first.null, kappa, 0.7 * spacing, spacing, options.alpha
+                base.at, base.explanation, base.whitened, first.null, first.kappa, 0.7 * spacing, spacing, options.alpha
             )
-        with self._timed("refit"):
-            factor = base.explanation.factor
-            refitting = Refitting(self.states, base.prior, base.nuisances, factor, base.state, base.mesh_errors)
-            # where nothing is missing, nothing is to be fitted that would be
-            alarmed = first.p_value <= options.alpha
-            first.fits.update(self._refits(refitting, first, None, _REFITTED if alarmed else 0))
         with self._timed("held out"):
             judge = Judge(base, options, rng)
             stages, judged = [first], [judge.judge(first)]
@@ -134,6 +134,22 @@ class Diagnosing:
             draws_of_cases = np.random.default_rng([options.seed, 11])
             confusion = VirtualCases(first.screening, first.kappa, options.alpha, draws_of_cases).confusion()
         return self._conclude(stages, judged, judge, where, rng, confusion)
+
+    def _first(self, base: Base, candidates: Candidates, rng: np.random.Generator) -> Stage:
+        """What acts at all, screened."""
+        self.listener.stage("screening")
+        with self._timed("screening"):
+            kappa = base.explanation.best_kappa(base.whitened)
+            return compared(base, (), candidates, base.explanation, base.residual, kappa, self._draws, rng)
+
+    def _refitted(self, first: Stage) -> tuple[Refitting, dict[str, Refit]]:
+        base = first.base
+        with self._timed("refit"):
+            factor = base.explanation.factor
+            refitting = Refitting(self.states, base.prior, base.nuisances, factor, base.state, base.mesh_errors)
+            # where nothing is missing, nothing is to be fitted that would be
+            alarmed = first.p_value <= self.options.alpha
+            return refitting, self._refits(refitting, first, None, _REFITTED if alarmed else 0)
 
     def _candidates(self, base: Base) -> Candidates:
         alternatives = alternatives_at(base.at.sensors, base.nuisances)

@@ -110,8 +110,10 @@ class Judge:
         forces = [np.column_stack([plain[1], force]) for force in self.base.smooth_forces]
         loose = {one: [one.predict(plain[0], columns, plain[2]) for columns in forces] for one in without}
         unknown_sure = max(_sure(predicted, without[one]) for one, each in loose.items() for predicted in each)
+        groups = self.base.at.sensors.groups
+        aside = len(np.unique(groups[self.base.aside])) / len(np.unique(groups))
         evidence = Evidence(
-            self.options.alpha, stage.p_value, ranking, gain, sure, placebo_p, adequacy_p, size, unknown_sure
+            self.options.alpha, stage.p_value, ranking, gain, sure, placebo_p, adequacy_p, size, unknown_sure, aside
         )
         return Judgement(
             decide(evidence),

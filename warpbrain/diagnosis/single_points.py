@@ -24,7 +24,13 @@ _OFTEN, _LARGE = 0.03, 8.0
 
 
 def log_gross(sensors: Sensors, factor: Floats, columns: Floats, residual: Floats, kappa: float) -> float:
-    """What the log evidence of a linear model gains where any point may be a gross error.
+    """What the log evidence of a linear model gains where any point may be a gross error; see `log_odds`."""
+    odds = log_odds(sensors, factor, columns, residual, kappa)
+    return float(np.logaddexp(0.0, odds[np.unique(sensors.groups, return_index=True)[1]]).sum())
+
+
+def log_odds(sensors: Sensors, factor: Floats, columns: Floats, residual: Floats, kappa: float) -> Floats:
+    """Logarithm of the odds (n,) that the point of each row is a gross error, after what all others say of it.
 
     Parameters
     ----------
@@ -42,7 +48,7 @@ def log_gross(sensors: Sensors, factor: Floats, columns: Floats, residual: Float
     precision = np.linalg.inv(noise + columns @ columns.T)
     weighted = precision @ residual
     sizes = np.bincount(sensors.groups)
-    total = 0.0
+    found = np.zeros(len(sensors))
     order = np.argsort(sensors.groups, kind="stable")
     for size in np.unique(sizes[sizes > 0]).tolist():
         rows = order[np.isin(sensors.groups[order], np.flatnonzero(sizes == size))].reshape(-1, size)
@@ -53,5 +59,5 @@ def log_gross(sensors: Sensors, factor: Floats, columns: Floats, residual: Float
         likely = -0.5 * np.einsum("gi,gij,gj->g", apart, own, apart) + 0.5 * np.linalg.slogdet(own)[1]
         gross = -0.5 * np.einsum("gi,gi->g", apart, np.linalg.solve(wide, apart[:, :, None])[:, :, 0])
         gross -= 0.5 * np.linalg.slogdet(wide)[1]
-        total += float(np.log1p(_OFTEN * np.exp(np.minimum(gross - likely, 700.0))).sum())
-    return total
+        found[rows] = (np.log(_OFTEN) + gross - likely)[:, None]
+    return found

@@ -18,7 +18,7 @@ from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening, log_unknown
-from warpbrain.diagnosis.single_points import log_gross
+from warpbrain.diagnosis.single_points import log_gross, log_odds
 
 Floats = NDArray[np.float64]
 
@@ -120,6 +120,18 @@ class Stage:
         screened = beside_lasting(self.explanation.nuisances, self.residual)
         alike = max(beside_lasting(without.columns, without.linear), screened)
         return beside_lasting(fit.columns, fit.linear) - alike
+
+    def gross_errors(self) -> NDArray[np.bool_]:
+        """Rows (n,) of points that are rather gross errors than not, over all refits as they are probable."""
+        from scipy.special import expit, softmax
+
+        values = {**self.log_evidence(), "none": 0.0}
+        weights = softmax([values[kind] for kind in self.fits])
+        chances = [expit(self._odds(fit)) for fit in self.fits.values()]
+        return np.asarray(weights @ np.array(chances) > 0.5)
+
+    def _odds(self, fit: Refit) -> Floats:
+        return log_odds(fit.state.sensors, self.explanation.factor, fit.columns, fit.linear, fit.kappa)
 
     def over_places(self, kind: str) -> float:
         """What the best of the places and levels of a kind loses where all of them are averaged over."""

@@ -5,7 +5,8 @@
    patterns that mean nothing, has a plausible size, and leaves nothing significant. Named + rest if something is left.
 3. Not physics if a nuisance far larger than it should be explains the residuals better than any mechanism.
 4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is, and predicts points
-   that it was not fitted to better. Else: cannot say. A weak alarm is never more than that.
+   that it was not fitted to better. Else: cannot say. A weak alarm is never more than that, nor are recordings of which
+   many points contradict each other.
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ VISIBLE = 2.5
 #: Part of the probability of a false alarm up to which more is claimed than that something is missing: wrong alarms,
 #: in calibration cases without an effect and in traps, are weak ones.
 CLAIM = 0.2
+#: Part of the recorded points that may be gross errors: of more it is the pairing that is in doubt, not single points.
+CONTRADICTED = 0.1
 #: Standard errors by which a gain must be above zero: nine of ten draws are above it.
 ERRORS = 1.28
 
@@ -65,6 +68,8 @@ class Evidence:
         Its largest coefficient in standard deviations of the prior.
     unknown_sure : float
         What `sure` is, of any smooth force.
+    aside : float
+        Part of the recorded points that were set aside as gross errors.
     """
 
     alpha: float
@@ -76,6 +81,7 @@ class Evidence:
     adequacy_p: float
     size: float
     unknown_sure: float
+    aside: float
 
 
 @dataclass(frozen=True)
@@ -144,7 +150,7 @@ def decide(found: Evidence) -> Verdict:
         return Verdict(NAMED if found.adequacy_p > ADEQUATE else NAMED_AND_REST, (best.kind,))
     label_set = _label_set(found.ranking)
     physics = all(ranked.physics for ranked in found.ranking if ranked.kind in label_set)
-    claims = found.p_value <= CLAIM * found.alpha
+    claims = found.p_value <= CLAIM * found.alpha and found.aside <= CONTRADICTED
     if claims and 1 < len(label_set) <= MEMBERS and physics and found.gain > 0.0:
         return Verdict(GROUP, label_set, "; ".join(vetoes))
     if claims and best.kind == UNKNOWN_KIND and best.probability >= 0.5:
@@ -158,6 +164,8 @@ def _vetoes(found: Evidence) -> list[str]:
     vetoes = []
     if found.p_value > CLAIM * found.alpha:
         vetoes.append("the alarm is too weak to claim more")
+    if found.aside > CONTRADICTED:
+        vetoes.append("so many recorded points contradict those around them that they may be paired wrongly")
     if found.gain <= 0.0 or found.sure <= 0.0:
         vetoes.append("points that were held out are not predicted better with it")
     if found.placebo_p > PLACEBO:
