@@ -29,6 +29,8 @@ def virtual():
     explanation = Explanation(np.linalg.cholesky(0.02 * root @ root.T + np.eye(N)), rng.normal(size=(N, 4)))
     plain, shared, weak, wrong = (rng.normal(size=(N, 1)) for _ in range(4))
     columns = {"plain": [3.0 * plain], "one": [3.0 * shared], "other": [3.0 * shared], "weak": [0.02 * weak]}
+    # what no sensor sees
+    columns["unseen"] = [0.0 * weak]
     effects = [Effect(proposal(c), np.zeros(N), c) for own in columns.values() for c in own]
     effects.append(Effect(None, np.zeros(N), 4.0 * wrong))
     of_kind = {kind: np.array([k]) for k, kind in enumerate((*columns, "registration"))}
@@ -90,10 +92,15 @@ def test_the_size_that_is_needed_lies_between_neighbours():
     assert np.isinf(confusion.needed(confusion.named, "a", 0.5))
 
 
+def test_what_no_sensor_sees_has_no_size(confusion):
+    assert confusion.alarm["unseen"] == (None,) * len(SIZES)
+    assert confusion.rows["unseen"][NOTHING] > 0.88
+
+
 def test_alarms_grow_with_detectability(confusion):
     assert 2.0 < confusion.needed(confusion.alarm, "plain", 0.9) < 6.0
 
 
 def test_it_is_said_in_two_sentences(confusion):
     first, second = confusion_sentences(confusion)
-    assert "plain" in first and "hardly ever: one, other, weak" in first and "optimistic" in second
+    assert "plain" in first and "hardly ever: one, other, unseen, weak" in first and "optimistic" in second

@@ -12,6 +12,7 @@ named than virtual ones.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from itertools import pairwise
 
@@ -91,6 +92,9 @@ class VirtualCases:
         ends = np.sort((mean + LARGEST * np.array([[-1.0], [1.0]])) / (mean + z), axis=0)
         # times of relaxation of what does not relax are no matter
         matter = own[:, 1:].any(axis=0)
+        if not matter.any():
+            # no size makes visible what no sensor sees
+            return own[:, 0], math.inf, -math.inf
         return own[:, 0] + own[:, 1:] @ z, float(ends[0, matter].max()), float(ends[1, matter].min())
 
     def _of_sizes(self, kind: str, count: int) -> tuple[Floats, list[int]]:
