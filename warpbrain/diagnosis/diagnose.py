@@ -108,16 +108,11 @@ class Diagnosing:
             base = finder.find()
         with self._timed("candidates"):
             candidates = self._candidates(base)
-        first = self._first(base, candidates, rng)
-        refitting, fits = self._refitted(first)
-        first.fits.update(fits)
-        gross = first.gross_errors() if fits else np.zeros(len(base.residual), dtype=bool)
-        if gross.any():
+        first, refitting = self._first(base, candidates, rng)
+        if first.fits and (gross := first.gross_errors()).any():
             self.listener.stage("again without points that are gross errors")
             base = base.without(gross)
-            first = self._first(base, candidates, rng)
-            refitting, fits = self._refitted(first)
-            first.fits.update(fits)
+            first, refitting = self._first(base, candidates, rng)
         with self._timed("significance"):
             where = score_map(
                 base.at, base.explanation, base.whitened, first.null, first.kappa, 0.7 * spacing, spacing, options.alpha
@@ -135,21 +130,19 @@ class Diagnosing:
             confusion = VirtualCases(first.screening, first.kappa, options.alpha, draws_of_cases).confusion()
         return self._conclude(stages, judged, judge, where, rng, confusion)
 
-    def _first(self, base: Base, candidates: Candidates, rng: np.random.Generator) -> Stage:
-        """What acts at all, screened."""
+    def _first(self, base: Base, candidates: Candidates, rng: np.random.Generator) -> tuple[Stage, Refitting]:
+        """What acts at all: screened, and refitted where something does."""
         self.listener.stage("screening")
         with self._timed("screening"):
             kappa = base.explanation.best_kappa(base.whitened)
-            return compared(base, (), candidates, base.explanation, base.residual, kappa, self._draws, rng)
-
-    def _refitted(self, first: Stage) -> tuple[Refitting, dict[str, Refit]]:
-        base = first.base
+            first = compared(base, (), candidates, base.explanation, base.residual, kappa, self._draws, rng)
         with self._timed("refit"):
             factor = base.explanation.factor
             refitting = Refitting(self.states, base.prior, base.nuisances, factor, base.state, base.mesh_errors)
             # where nothing is missing, nothing is to be fitted that would be
             alarmed = first.p_value <= self.options.alpha
-            return refitting, self._refits(refitting, first, None, _REFITTED if alarmed else 0)
+            first.fits.update(self._refits(refitting, first, None, _REFITTED if alarmed else 0))
+        return first, refitting
 
     def _candidates(self, base: Base) -> Candidates:
         alternatives = alternatives_at(base.at.sensors, base.nuisances)

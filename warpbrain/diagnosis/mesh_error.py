@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.diagnosis.states import TOLERANCE, Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference, Discretisation
@@ -63,6 +64,12 @@ class MeshErrors:
 def expected(known: Difference) -> Difference:
     """The whole error of a mesh, of which elements of half the size show a part."""
     return known.times(Discretisation().mean)
+
+
+def expected_answer(sensors: Sensors, known: Difference) -> Floats:
+    """What the whole error changes (n,) of what is recorded."""
+    change = expected(known)
+    return sensors.answer(change.u, change.reactions)
 
 
 class FinerStates:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effects
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import MeshErrors, expected
+from warpbrain.diagnosis.mesh_error import MeshErrors, expected_answer
 from warpbrain.diagnosis.sensors import Sensors, spread_points
 from warpbrain.diagnosis.states import Hypothesis, States
 from warpbrain.estimation.discretisation import Discretisation
@@ -203,16 +203,14 @@ def _volume_locking(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:
     """What the mesh's error adds (n, 1) to what one standard deviation of compressibility changes."""
     if mesh_errors is None:
         return np.zeros((len(sensors), 1))
-    change = expected(mesh_errors.by_volume)
-    return sensors.answer(change.u, change.reactions)[:, None]
+    return expected_answer(sensors, mesh_errors.by_volume)[:, None]
 
 
 def mesh_by_tissue(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:
     """What the mesh's error adds (n, p) to `tissue_columns`; 0 where the mesh is taken for exact."""
     if mesh_errors is None:
         return np.zeros((len(sensors), 1))
-    changes = [expected(change) for change in mesh_errors.by_tissue]
-    return np.column_stack([sensors.answer(change.u, change.reactions) for change in changes])
+    return np.column_stack([expected_answer(sensors, change) for change in mesh_errors.by_tissue])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.effects import Effect, Effects, parts_of
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected
+from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected, expected_answer
 from warpbrain.diagnosis.nuisances import Nuisances, field_columns, mesh_by_tissue, tissue_columns
 from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
@@ -183,14 +183,13 @@ class Refitting:
         """
         self._share, self._between = None, between
         columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
-        begin = self._best_of(effects, begins, kappa, near or self.start)
-        found = self._descend(effects, begin, columns, kappa, near or self.start, True)
+        found = self._descend(effects, begins, columns, kappa, near or self.start, True)
         if self._mesh is None:
             return self._refit(effects, *found)
         state, z, _, columns, converged = found
         if not effects:
             if self._settle(state, self._mesh):
-                found = self._descend(effects, z, columns, kappa, state, False)
+                found = self._descend(effects, [z], columns, kappa, state, False)
             return self._refit(effects, *found)
         self._share = self._share_of(effects, state, z)
         if self._share is None and converged:
@@ -199,22 +198,21 @@ class Refitting:
             columns = columns.copy()
             own = slice(self._U.shape[1], self._U.shape[1] + len(self._share.along))
             columns[:, own] += np.outer(self._share.answer, self._share.along)
-        return self._refit(effects, *self._descend(effects, z, columns, kappa, state, False))
+        return self._refit(effects, *self._descend(effects, [z], columns, kappa, state, False))
 
     def _best_of(
         self, effects: tuple[Effect, ...], begins: Sequence[Floats], kappa: float, near: SolvedState
-    ) -> Floats:
-        """The best of some coordinates, within limits."""
-        limited = [self._limited(begin) for begin in begins]
-        if len(limited) == 1:
-            return limited[0]
-        values = []
-        for begin in limited:
+    ) -> tuple[SolvedState, Floats, Floats]:
+        """State, residual and coordinates of the best of some coordinates, within limits."""
+        found = []
+        for begin in begins:
+            z = self._limited(begin)
             try:
-                values.append(self._objective(self._try(effects, begin, near)[1], begin, kappa))
+                found.append((*self._try(effects, z, near), z))
             except (SolveError, InputError):
-                values.append(np.inf)
-        return limited[int(np.argmin(values))]
+                if not found and begin is begins[-1]:
+                    raise
+        return min(found, key=lambda one: self._objective(one[1], one[2], kappa))
 
     def _settle(self, state: SolvedState, before: MeshErrors) -> bool:
         """Take the error of the mesh from a fit of nothing, for all fits to come; whether that matters.
@@ -233,8 +231,7 @@ class Refitting:
 
     def _beyond(self, known: MeshErrors, error: Difference, state: SolvedState) -> Floats:
         """What an error of the mesh is beyond that which its tissue alone is known to have, in what is recorded."""
-        change = expected(error.less(known.with_tissue(state.hypothesis.theta, self.prior)))
-        return state.sensors.answer(change.u, change.reactions)
+        return expected_answer(state.sensors, error.less(known.with_tissue(state.hypothesis.theta, self.prior)))
 
     def _share_of(self, effects: tuple[Effect, ...], state: SolvedState, z: Floats) -> _Share | None:
         """What of the mesh's error belongs to the mechanisms, in proportion to their sizes; None if not known.
@@ -268,7 +265,7 @@ class Refitting:
     def _descend(
         self,
         effects: tuple[Effect, ...],
-        z: Floats,
+        begins: Sequence[Floats],
         columns: Floats,
         kappa: float,
         near: SolvedState,
@@ -278,7 +275,7 @@ class Refitting:
         from scipy.linalg import solve_triangular
 
         q = self._U.shape[1]
-        state, residual = self._try(effects, z, near)
+        state, residual, z = self._best_of(effects, begins, kappa, near)
         best = self._objective(residual, z, kappa)
         # far from the base the linear model may have gone too far
         base = self._at_base(z)
