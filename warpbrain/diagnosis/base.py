@@ -116,9 +116,18 @@ class Base:
 
     def without(self, rows: NDArray[np.bool_]) -> Base:
         """The same with more rows (n,) set aside as gross errors."""
-        sigma = np.where(rows, ASIDE * self.noise, self.sigma)
+        return self._with_aside(self.aside | rows)
+
+    def with_back(self, rows: NDArray[np.bool_]) -> Base:
+        """The same without some of the rows (n,) that are set aside."""
+        return self._with_aside(self.aside & ~rows)
+
+    def _with_aside(self, aside: NDArray[np.bool_]) -> Base:
+        if np.array_equal(aside, self.aside):
+            return self
+        sigma = np.where(aside, ASIDE * self.noise, self.noise)
         explanation = explanation_of(self.at.sensors, sigma, self.nuisances.columns)
-        return replace(self, sigma=sigma, aside=self.aside | rows, explanation=explanation)
+        return replace(self, sigma=sigma, aside=aside, explanation=explanation)
 
     def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
         """What nuisances do to the displacement of other points (k, 3) [m], and what makes effects there."""
@@ -182,6 +191,18 @@ class BaseFinder:
         if errors is not None:
             state = self.states.corrected(state, expected(errors.own))
         return self._linearised(first, state, errors)
+
+    def moved(self, base: Base, fit: SolvedState, errors: MeshErrors | None) -> Base:
+        """The same at another state: one that a fit has found far from the base, where all that is linear is wrong.
+
+        Parameters
+        ----------
+        base : Base
+        fit : SolvedState
+        errors : MeshErrors or None
+            There.
+        """
+        return self._linearised(base.declared, fit, errors)
 
     def _freed(self, rough: Base) -> Hypothesis:
         """Tissue and field beside any smooth force; recordings are realigned."""

@@ -42,6 +42,7 @@ from warpbrain.diagnosis.result import (
 )
 from warpbrain.diagnosis.screening import UNKNOWN as UNKNOWN_KIND
 from warpbrain.diagnosis.sentences import assumptions_of, sentence_of
+from warpbrain.diagnosis.sound_points import sound_points
 from warpbrain.diagnosis.stage import Stage, candidates_beside, compared, linear_point
 from warpbrain.diagnosis.states import States
 from warpbrain.diagnosis.traits import Traits, traits_of
@@ -55,6 +56,8 @@ Floats = NDArray[np.float64]
 #: Kinds that are refitted without linearising, at first and beside others, and the log Bayes factor behind the best at
 #: which that ends, and against nothing more that one beside others needs.
 _REFITTED, _REFITTED_BESIDE, _BEHIND, _WORTH = 3, 2, 12.0, 2.0
+#: By how much [nats] the fit of nothing may be better than what is linear about the base, until that is moved there.
+_FAR = 3.0
 #: Mechanisms that are named at most.
 _MOST = 3
 
@@ -106,9 +109,14 @@ class Diagnosing:
         with self._timed("base"):
             finder = BaseFinder(self.states, spacing, options.mesh_error, options.without_nuisances, self.listener)
             base = finder.find()
-        with self._timed("candidates"):
-            candidates = self._candidates(base)
+        base, candidates = self._looked_for(base)
         first, refitting = self._first(base, candidates, rng)
+        if first.beyond > _FAR:
+            self.listener.stage("again about the fit of nothing, which is far from the first")
+            with self._timed("base"):
+                base = finder.moved(base, first.fits["none"].state, refitting.mesh_errors)
+            base, candidates = self._looked_for(base)
+            first, refitting = self._first(base, candidates, rng)
         if first.fits and (gross := first.gross_errors()).any():
             self.listener.stage("again without points that are gross errors")
             base = base.without(gross)
@@ -144,11 +152,15 @@ class Diagnosing:
             first.fits.update(self._refits(refitting, first, None, _REFITTED if alarmed else 0))
         return first, refitting
 
-    def _candidates(self, base: Base) -> Candidates:
-        alternatives = alternatives_at(base.at.sensors, base.nuisances)
-        return candidates_at(
-            self.dictionary, base.effects, alternatives, lambda kind: self.listener.stage(f"candidate: {kind}")
-        )
+    def _looked_for(self, base: Base) -> tuple[Base, Candidates]:
+        """What is looked for at a base, and that with the points that are no gross errors where something acts."""
+        with self._timed("candidates"):
+            alternatives = alternatives_at(base.at.sensors, base.nuisances)
+            candidates = candidates_at(
+                self.dictionary, base.effects, alternatives, lambda kind: self.listener.stage(f"candidate: {kind}")
+            )
+        with self._timed("screening"):
+            return base.with_back(sound_points(base, candidates)), candidates
 
     def _beside(self, refitting: Refitting, before: Stage, judged: Judgement, rng: np.random.Generator) -> Stage:
         """The next stage: what acts beside the kind that was named last."""

@@ -200,6 +200,11 @@ class Refitting:
             columns[:, own] += np.outer(self._share.answer, self._share.along)
         return self._refit(effects, *self._descend(effects, [z], columns, kappa, state, False))
 
+    @property
+    def mesh_errors(self) -> MeshErrors | None:
+        """Of the fit of nothing, where that was fitted; else those that were given."""
+        return self._mesh
+
     def _best_of(
         self, effects: tuple[Effect, ...], begins: Sequence[Floats], kappa: float, near: SolvedState
     ) -> tuple[SolvedState, Floats, Floats]:

@@ -66,9 +66,13 @@ class Screening:
     candidates : Candidates
     flexible : sequence of (n, k) arrays
         Columns of any smooth force, each with a length and a size.
+    kappas : (k,) array
+        Factors on the noise that are averaged over.
     """
 
-    def __init__(self, explanation: Explanation, candidates: Candidates, flexible: list[Floats]) -> None:
+    def __init__(
+        self, explanation: Explanation, candidates: Candidates, flexible: list[Floats], kappas: Floats = KAPPAS
+    ) -> None:
         self.explanation = explanation
         self.candidates = candidates
         self.stack: Stack = explanation.stack(candidates.effects)
@@ -76,7 +80,7 @@ class Screening:
         self.flexible = [explanation.with_more(columns) for columns in flexible]
         lasting = {kind: candidates.effects[own[0]].lasting for kind, own in candidates.of_kind.items()}
         self._lasting = {kind: explanation.with_more(own) for kind, own in lasting.items() if own is not None}
-        self._kappas = KAPPAS
+        self._kappas = kappas
 
     def standardised(self, kappa: float) -> Screening:
         """The same for residuals `S^-1/2 r`, in which noise and nuisances are of variance one: the factor is known."""

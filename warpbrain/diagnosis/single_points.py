@@ -20,7 +20,7 @@ from warpbrain.diagnosis.sensors import Sensors
 Floats = NDArray[np.float64]
 
 #: Probability that a point is a gross error, and how large one is in standard deviations of the noise.
-_OFTEN, _LARGE = 0.03, 8.0
+OFTEN, LARGE = 0.03, 8.0
 
 
 def log_gross(sensors: Sensors, factor: Floats, columns: Floats, residual: Floats, kappa: float) -> float:
@@ -55,9 +55,9 @@ def log_odds(sensors: Sensors, factor: Floats, columns: Floats, residual: Floats
         own = precision[rows[:, :, None], rows[:, None, :]]
         covariance = np.linalg.inv(own)
         apart = np.einsum("gij,gj->gi", covariance, weighted[rows])
-        wide = covariance + (_LARGE**2 - 1.0) * noise[rows[:, :, None], rows[:, None, :]]
+        wide = covariance + (LARGE**2 - 1.0) * noise[rows[:, :, None], rows[:, None, :]]
         likely = -0.5 * np.einsum("gi,gij,gj->g", apart, own, apart) + 0.5 * np.linalg.slogdet(own)[1]
         gross = -0.5 * np.einsum("gi,gi->g", apart, np.linalg.solve(wide, apart[:, :, None])[:, :, 0])
         gross -= 0.5 * np.linalg.slogdet(wide)[1]
-        found[rows] = (np.log(_OFTEN) + gross - likely)[:, None]
+        found[rows] = (np.log(OFTEN) + gross - likely)[:, None]
     return found

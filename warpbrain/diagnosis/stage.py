@@ -73,6 +73,11 @@ class Stage:
             return none.linear, none.columns, none.kappa
         return self.residual, self.explanation.nuisances, self.kappa
 
+    @property
+    def beyond(self) -> float:
+        """How much better [nats] the fit without anything more is than what is linear about this state."""
+        return self.fits["none"].log_evidence - float(self.screen.none[0]) if "none" in self.fits else 0.0
+
     def best_effect(self, kind: str) -> Effect:
         """The most probable effect of a kind."""
         return self.candidates.effects[self.screen.best_effect(self.candidates, kind)]

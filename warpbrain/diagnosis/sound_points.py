@@ -1,0 +1,58 @@
+"""Which points that were set aside as gross errors are none, once all that may be missing is considered.
+
+A point that no smooth force explains is set aside before anything is looked for; see `gross_errors`. But what acts in
+one place moves the point beside it by millimetres and its neighbours by little: the one point that tells most. So each
+point that was set aside is asked again, with `e` the probability of a gross error, `q` the wide distribution of one, and
+every hypothesis `H` that is looked for,
+
+    odds = (1 - e) sum_H p(H) p(r | H) / (e sum_H p(H) p(r, its noise q | H)),
+
+with half of `p(H)` for nothing missing. A gross error alone is no reason for a mechanism: its neighbours have to agree.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.base import Base
+from warpbrain.diagnosis.dictionary import Candidates
+from warpbrain.diagnosis.screening import Screening
+from warpbrain.diagnosis.sensing import explanation_of
+from warpbrain.diagnosis.single_points import LARGE, OFTEN
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+def sound_points(base: Base, candidates: Candidates) -> Bools:
+    """Rows (n,) of points that were set aside, and are rather no gross errors.
+
+    Parameters
+    ----------
+    base : Base
+    candidates : Candidates
+        There.
+    """
+    sensors, sigma = base.at.sensors, base.sigma
+    kappa = np.array([base.explanation.best_kappa(base.whitened)])
+    sound = np.zeros(len(sensors), dtype=bool)
+    while True:
+        groups = np.unique(sensors.groups[base.aside & ~sound]).tolist()
+        odds = [_log_odds(base, candidates, sigma, sensors.groups == group, kappa) for group in groups]
+        if not odds or max(odds) <= 0.0:
+            return sound
+        sound |= sensors.groups == groups[int(np.argmax(odds))]
+        sigma = np.where(sound, base.noise, base.sigma)
+
+
+def _log_odds(base: Base, candidates: Candidates, sigma: Floats, rows: Bools, kappa: Floats) -> float:
+    """Logarithm of the odds that a point is no gross error."""
+    densities = []
+    for factor in (1.0, LARGE):
+        noise = np.where(rows, factor * base.noise, sigma)
+        explanation = explanation_of(base.at.sensors, noise, base.nuisances.columns)
+        screening = Screening(explanation, candidates, base.smooth_forces, kappa)
+        screen = screening.run(explanation.whitened(base.residual)[:, None])
+        densities.append(float(screen.none[0] + np.logaddexp(0.0, screen.alarm[0])))
+    return float(np.log1p(-OFTEN) - np.log(OFTEN)) + densities[0] - densities[1]
