@@ -17,6 +17,7 @@ from warpbrain.diagnosis.base import Base, BaseFinder
 from warpbrain.diagnosis.between import between_neighbours
 from warpbrain.diagnosis.concluding import named_together
 from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
+from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import Explanation, Stack
 from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.judging import Judge, Judgement
@@ -26,6 +27,7 @@ from warpbrain.diagnosis.observable import require_observable
 from warpbrain.diagnosis.onset import onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions, Listener
 from warpbrain.diagnosis.parameters import SEEN, smallest_of
+from warpbrain.diagnosis.placing import placed
 from warpbrain.diagnosis.refining import refined
 from warpbrain.diagnosis.refitting import Refit, Refitting
 from warpbrain.diagnosis.result import (
@@ -191,14 +193,12 @@ class Diagnosing:
         near = None if known is None else known.state
         fits: dict[str, Refit] = {}
         for kind in chosen if known is not None else ["none", *chosen]:
-            effect = None if kind == "none" else stage.best_effect(kind)
+            effect, between = None if kind == "none" else stage.best_effect(kind), None
             if effect is not None and effect.proposal is None:
                 continue
             self.listener.stage(f"refit without linearising: {' and '.join((*stage.known, kind))}")
-            between = None
-            if effect is not None and effect.proposed.of_patch is not None:
-                found = refined(stage, stage.screen.best_effect(stage.candidates, kind))
-                effect, between = found.effect, found.unresolved
+            if effect is not None:
+                effect, between = self._between_places(stage, kind)
             begin = linear_point(stage.explanation, stage.residual, stage.explanation.nuisances, effect, stage.kappa)
             begins = [begin]
             if known is None and "none" in fits:
@@ -212,6 +212,19 @@ class Diagnosing:
             except (SolveError, InputError):
                 continue
         return fits
+
+    @staticmethod
+    def _between_places(stage: Stage, kind: str) -> tuple[Effect, Floats | None]:
+        """The best effect of a kind between the places of its scan, and what the mesh leaves open of that, if known."""
+        number = stage.screen.best_effect(stage.candidates, kind)
+        effect = stage.candidates.effects[number]
+        if effect.proposed.of_patch is not None:
+            found = refined(stage, number)
+            return found.effect, found.unresolved
+        if effect.proposed.elsewhere is not None:
+            effect = placed(stage, number)
+            return effect, np.zeros((len(stage.residual), 0))
+        return effect, None
 
     @staticmethod
     def _between(stage: Stage, kind: str, begin: Floats) -> Floats | None:

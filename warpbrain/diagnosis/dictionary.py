@@ -137,6 +137,8 @@ class Candidates:
     alternatives : frozenset of str
         Kinds that are no physics.
     rejected : dict of str to str
+    makes : Effects
+        Which makes those of smooth ones at the same state.
     """
 
     kinds: tuple[str, ...]
@@ -144,6 +146,7 @@ class Candidates:
     of_kind: dict[str, NDArray[np.int64]]
     alternatives: frozenset[str]
     rejected: dict[str, str]
+    makes: Effects
 
     def changes_in_time(self, kind: str) -> bool:
         """Whether what a kind does changes while loads do not."""
@@ -186,4 +189,4 @@ def candidates_at(
     for name, effect in alternatives.items():
         of_kind[name] = np.array([len(found)])
         found.append(effect)
-    return Candidates(tuple(of_kind), tuple(found), of_kind, frozenset(alternatives), rejected)
+    return Candidates(tuple(of_kind), tuple(found), of_kind, frozenset(alternatives), rejected, effects)

@@ -64,7 +64,7 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
 
 def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
     """Numbers of the mechanism at coordinates (k,), by name, with units; of what lets go its place."""
-    if effect.proposed.place is not None:
+    if effect.proposed.is_there_or_not and effect.proposed.place is not None:
         centre, radius = effect.proposed.place(effect.coefficients(z))
         return {
             **{f"centre_{axis}": (x, "m") for axis, x in zip("xyz", centre.tolist(), strict=True)},

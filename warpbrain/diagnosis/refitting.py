@@ -247,7 +247,7 @@ class Refitting:
         away, middle, at = [], [], self._U.shape[1]
         for effect in effects:
             proposed, size = effect.proposed, effect.columns.shape[1]
-            has_size = not proposed.is_there_or_not
+            has_size = (np.arange(size) < size - proposed.placing) & (not proposed.is_there_or_not)
             # along what it is: its coefficients, each in standard deviations
             away.append(has_size * (effect.coefficients(z[at : at + size]) - proposed.without) / proposed.sd)
             middle.append(has_size * (proposed.mean - proposed.without) / proposed.sd)

@@ -2,8 +2,8 @@
 
 A point that no smooth force explains is set aside before anything is looked for; see `gross_errors`. But what acts in
 one place moves the point beside it by millimetres and its neighbours by little: the one point that tells most. So each
-point that was set aside is asked again, with `e` the probability of a gross error, `q` the wide distribution of one, and
-every hypothesis `H` that is looked for,
+point that was set aside is asked again, with `e` the probability of a gross error, `q` the wide distribution of one,
+and every hypothesis `H` that is looked for,
 
     odds = (1 - e) sum_H p(H) p(r | H) / (e sum_H p(H) p(r, its noise q | H)),
 

@@ -209,7 +209,7 @@ def candidates_beside(fit: Refit, candidates: Candidates) -> Candidates:
             own[k] = effect
         of_kind[kind] = np.arange(len(found), len(found) + len(own))
         found.extend(own)
-    return replace(candidates, kinds=tuple(of_kind), effects=tuple(found), of_kind=of_kind)
+    return replace(candidates, kinds=tuple(of_kind), effects=tuple(found), of_kind=of_kind, makes=effects)
 
 
 def _is_smooth(effect: Effect) -> bool:

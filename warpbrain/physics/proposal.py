@@ -124,8 +124,14 @@ class Proposal:
         What the case's own boundaries no longer hold.
     of_patch : callable, or None
         Of what lets go: from another patch to the same there.
+    elsewhere : callable, or None
+        Of what acts in one place: from another centre (3,) [m] and radius [m] to the same there.
+    on_surface : bool
+        Whether that place is one of the surface.
     place : callable, or None
-        Of what lets go: from coefficients to the centre (3,) [m] and radius [m] of what they stand for.
+        Of what was refined between the places of a scan: from coefficients to the centre (3,) [m] and radius [m].
+    placing : int
+        How many of the last coefficients say where it is, and have no size.
     history : callable, or None
         Of a fading one: from coefficients (k,) and the time since the load came [s] to how many times what it does at
         once at `start` is there; nothing is left in the end.
@@ -145,7 +151,10 @@ class Proposal:
     nothing: Floats = field(default_factory=lambda: np.zeros(0))
     patch: Patch | None = None
     of_patch: Callable[[Patch], Proposal] | None = None
+    elsewhere: Callable[[Floats, float], Proposal] | None = None
+    on_surface: bool = False
     place: Callable[[Floats], tuple[Floats, float]] | None = None
+    placing: int = 0
     history: Callable[[Floats, float], float] | None = None
     pace: Callable[[Floats], float] | None = None
     centre: Floats | None = None
@@ -190,13 +199,13 @@ class Proposal:
         radii : sequence of float
         situation : Situation
         """
-        found = []
-        for site in situation.volume_sites:
-            x, y, z = site.tolist()
-            for radius in radii:
-                one = partial(_placed, make, (x, y, z), radius)
-                found.append(cls.of_one(one, 0.0, sd, "smooth", centre=site, radius=radius))
-        return found
+
+        def ball(centre: Floats, radius: float) -> Proposal:
+            x, y, z = centre.tolist()
+            one = partial(_placed, make, (x, y, z), radius)
+            return cls.of_one(one, 0.0, sd, "smooth", elsewhere=ball, centre=centre, radius=radius)
+
+        return [ball(site, radius) for site in situation.volume_sites for radius in radii]
 
     @classmethod
     def along_axes(cls, make: Callable[[float, Place], Mechanism], sd: float, what: str) -> list[Proposal]:

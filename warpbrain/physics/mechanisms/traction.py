@@ -69,17 +69,24 @@ class Traction(Load, Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Patches of two sizes all over the free surface."""
-        found = []
-        for site in situation.surface_sites:
-            for radius in _RADII:
+        return [cls._pulling(site, radius) for site in situation.surface_sites for radius in _RADII]
 
-                def pulling(
-                    c: NDArray[np.float64], site: NDArray[np.float64] = site, radius: float = radius
-                ) -> Traction:
-                    return cls(centre=tuple(site.tolist()), value=tuple(c.tolist()), radius=radius)
+    @classmethod
+    def _pulling(cls, site: NDArray[np.float64], radius: float) -> Proposal:
+        x, y, z = site.tolist()
 
-                found.append(Proposal(pulling, np.zeros(3), np.full(3, _USUAL), centre=site, radius=radius))
-        return found
+        def make(c: NDArray[np.float64]) -> Traction:
+            return cls(centre=(x, y, z), value=tuple(c.tolist()), radius=radius)
+
+        return Proposal(
+            make,
+            np.zeros(3),
+            np.full(3, _USUAL),
+            elsewhere=cls._pulling,
+            on_surface=True,
+            centre=site,
+            radius=radius,
+        )
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
         def traction(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,0 +1,190 @@
+"""What acts in one place, between the places of a scan: a load on a patch, a ball that swells, a stiffer region.
+
+A scan has a few sites in each direction, and two radii. From the best of them the place is moved as long as the linear
+model gets better, at first by half a step of the scan, then by a quarter. There the centre and the radius become
+coefficients beside the amount, which the fit changes without linearising. Their prior is as wide as that a step of the
+scan is as probable as it is under a uniform one, and wider by what the scan leaves open: so the evidence of the fit is
+the average over places near by, not the best, and amounts are no surer than the place is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.diagnosis.effects import Effect
+from warpbrain.diagnosis.evidence import Inner
+from warpbrain.diagnosis.screening import log_places
+from warpbrain.diagnosis.stage import Stage
+from warpbrain.errors import SolveError
+from warpbrain.mesh import TetMesh, face_vectors
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.proposal import Proposal
+
+Floats = NDArray[np.float64]
+
+#: Parts of a step of the scan by which a place is moved, one after the other; and how often each at most.
+_STEPS, _MOVES = (0.5, 0.25), 6
+#: Standard deviation in steps where a normal density is at its middle what a uniform one in the step is; and the most
+#: that neighbours tell of, in such.
+_CELL, _WIDEST = 1.0 / np.sqrt(2.0 * np.pi), 3.0
+#: How far [standard deviations] the amount may be from zero where the place is sought: it is linear in it there.
+_FARTHEST = 3.0
+
+
+def placed(stage: Stage, number: int) -> Effect:
+    """What the best effect of a scan comes to between its places.
+
+    Parameters
+    ----------
+    stage : Stage
+    number : int
+        Of the effect, which acts in one place.
+
+    Returns
+    -------
+    Effect
+        With columns (n, k + d + 1): of its own coefficients, of its centre along d directions (two along the surface
+        for what acts there), of the logarithm of its radius.
+    """
+    scan = _Scan(stage, number)
+    best, value = _at(stage, stage.candidates.effects[number].proposed)
+    for part in _STEPS:
+        for _ in range(_MOVES):
+            beside = [_at(stage, proposal) for proposal in scan.beside(best.proposed, part)]
+            effect, other = max(beside, key=lambda one: one[1], default=(best, value))
+            if other <= value:
+                break
+            best, value = effect, other
+    return _wider(stage, best, scan)
+
+
+def _at(stage: Stage, proposal: Proposal) -> tuple[Effect, float]:
+    """The effect of a proposal at the state of a stage, and its log evidence there."""
+    try:
+        [effect] = stage.candidates.makes.of([proposal])
+    except SolveError:
+        return Effect(proposal, np.zeros(0), np.zeros((0, 0))), -np.inf
+    white = stage.explanation.whitened(stage.residual)[:, None]
+    return effect, float(log_places(stage.explanation, stage.explanation.stack([effect]), white)[0, 0])
+
+
+class _Scan:
+    """The places of a scan, and steps from one to the next.
+
+    Parameters
+    ----------
+    stage : Stage
+    number : int
+        Of the best effect.
+    """
+
+    def __init__(self, stage: Stage, number: int) -> None:
+        self._stage, self._mesh = stage, stage.base.at.system.model.mesh
+        effects = stage.candidates.effects
+        own = next(own for own in stage.candidates.of_kind.values() if number in own).tolist()
+        self._numbers = [k for k in own if effects[k].proposed.elsewhere is not None]
+        self._centres = np.array([effects[k].proposed.centre for k in self._numbers])
+        self._radii = np.array([effects[k].proposed.radius for k in self._numbers])
+        levels = np.unique(self._radii)
+        self._step_of_radius = float(np.mean(np.diff(np.log(levels)))) if len(levels) > 1 else np.log(2.0)
+        self._limits = levels[0] * np.exp(-self._step_of_radius), levels[-1] * np.exp(self._step_of_radius)
+        self._step = _typical_distance(np.unique(self._centres, axis=0))
+
+    def directions(self, proposal: Proposal) -> Floats:
+        """Unit vectors (d, 3) along which its centre moves: along the surface, or any."""
+        assert proposal.centre is not None
+        return _tangents(self._mesh, proposal.centre) if proposal.on_surface else np.eye(3)
+
+    def steps(self, directions: Floats) -> Floats:
+        """From one place to the next (d + 1,): of the centre [m], and of the logarithm of the radius."""
+        return np.array([*np.full(len(directions), self._step), self._step_of_radius])
+
+    def beside(self, proposal: Proposal, part: float) -> list[Proposal]:
+        """The same, moved by a part of a step in each direction, and with other radii."""
+        assert proposal.elsewhere is not None and proposal.centre is not None and proposal.radius is not None
+        directions = self.directions(proposal)
+        found = []
+        for move in np.vstack([part * np.diag(self.steps(directions)), -part * np.diag(self.steps(directions))]):
+            radius = proposal.radius * float(np.exp(move[-1]))
+            centre = proposal.centre + move[:-1] @ directions
+            if proposal.on_surface:
+                centre = _on_surface(self._mesh, centre)
+            if self._limits[0] <= radius <= self._limits[1]:
+                found.append(proposal.elsewhere(centre, radius))
+        return found
+
+    def spread(self, best: Proposal, directions: Floats) -> Floats:
+        """Standard deviation (d + 1,) of the place beforehand: a step of the scan, and what the scan leaves open."""
+        from scipy.special import softmax
+
+        assert best.centre is not None and best.radius is not None
+        at = np.column_stack([(self._centres - best.centre) @ directions.T, np.log(self._radii / best.radius)])
+        weights = softmax(self._stage.screen.places[self._numbers, 0])
+        open_ = weights @ (at - weights @ at) ** 2
+        cell = _CELL * self.steps(directions)
+        return np.asarray(np.minimum(np.sqrt(cell**2 + open_), _WIDEST * cell))
+
+
+def _typical_distance(points: Floats) -> float:
+    """Of a point to the nearest other one."""
+    from scipy.spatial import cKDTree
+
+    return float(np.median(cKDTree(points).query(points, k=2)[0][:, 1]))
+
+
+def _nearest_face(mesh: TetMesh, point: Floats) -> tuple[Floats, Floats]:
+    """Middle of the nearest face of the surface, and its unit normal."""
+    faces = mesh.boundary
+    middles = mesh.points[faces].mean(axis=1)
+    nearest = int(np.argmin(np.linalg.norm(middles - point, axis=1)))
+    [normal] = face_vectors(mesh.points, faces[[nearest]])
+    return middles[nearest], normal / np.linalg.norm(normal)
+
+
+def _on_surface(mesh: TetMesh, point: Floats) -> Floats:
+    """A point near the surface, moved onto the plane of the nearest face."""
+    middle, normal = _nearest_face(mesh, point)
+    return np.asarray(point - normal @ (point - middle) * normal)
+
+
+def _tangents(mesh: TetMesh, point: Floats) -> Floats:
+    """Two directions (2, 3) along the surface."""
+    _, normal = _nearest_face(mesh, point)
+    return np.asarray(np.linalg.svd(normal[None])[2][1:])
+
+
+def _wider(stage: Stage, best: Effect, scan: _Scan) -> Effect:
+    """The same with its place among its coefficients."""
+    proposal = best.proposed
+    assert proposal.elsewhere is not None and proposal.centre is not None and proposal.radius is not None
+    centre, radius, elsewhere, count = proposal.centre, proposal.radius, proposal.elsewhere, len(proposal)
+    directions = scan.directions(proposal)
+    sd = scan.spread(proposal, directions)
+
+    def place(c: Floats) -> tuple[Floats, float]:
+        return centre + c[count:-1] @ directions, radius * float(np.exp(c[-1]))
+
+    def make(c: Floats) -> Mechanism:
+        return elsewhere(*place(c)).make(c[:count])
+
+    white = stage.explanation.whitened(stage.residual)[:, None]
+    z, _ = Inner(stage.explanation, stage.explanation.stack([best]), white).coefficients(stage.kappa, 0)
+    here = proposal.mean + proposal.sd * np.clip(z, -_FARTHEST, _FARTHEST)
+    nowhere = np.zeros(len(sd))
+    wider = replace(
+        proposal,
+        make=make,
+        mean=np.concatenate([proposal.mean, nowhere]),
+        sd=np.concatenate([proposal.sd, sd]),
+        follows="smooth",
+        start=np.concatenate([here, nowhere]),
+        nothing=np.concatenate([proposal.without, nowhere]),
+        place=place,
+        elsewhere=None,
+        placing=len(sd),
+    )
+    [effect] = stage.candidates.makes.of([wider])
+    return effect
