@@ -137,8 +137,8 @@ class Candidates:
     alternatives : frozenset of str
         Kinds that are no physics.
     rejected : dict of str to str
-    makes : Effects
-        Which makes those of smooth ones at the same state.
+    makes : Effects or None
+        Which makes those of smooth ones at the same state; None if effects did not come from a state.
     """
 
     kinds: tuple[str, ...]
@@ -146,7 +146,7 @@ class Candidates:
     of_kind: dict[str, NDArray[np.int64]]
     alternatives: frozenset[str]
     rejected: dict[str, str]
-    makes: Effects
+    makes: Effects | None = None
 
     def changes_in_time(self, kind: str) -> bool:
         """Whether what a kind does changes while loads do not."""

@@ -64,7 +64,7 @@ def placed(stage: Stage, number: int) -> Effect:
 def _at(stage: Stage, proposal: Proposal) -> tuple[Effect, float]:
     """The effect of a proposal at the state of a stage, and its log evidence there."""
     try:
-        [effect] = stage.candidates.makes.of([proposal])
+        effect = _made(stage, proposal)
     except SolveError:
         return Effect(proposal, np.zeros(0), np.zeros((0, 0))), -np.inf
     white = stage.explanation.whitened(stage.residual)[:, None]
@@ -186,5 +186,10 @@ def _wider(stage: Stage, best: Effect, scan: _Scan) -> Effect:
         elsewhere=None,
         placing=len(sd),
     )
-    [effect] = stage.candidates.makes.of([wider])
+    return _made(stage, wider)
+
+
+def _made(stage: Stage, proposal: Proposal) -> Effect:
+    assert stage.candidates.makes is not None
+    [effect] = stage.candidates.makes.of([proposal])
     return effect

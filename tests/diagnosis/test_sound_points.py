@@ -1,0 +1,49 @@
+"""Points that were set aside: a gross error stays there, what a local cause moves comes back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpbrain.diagnosis.dictionary import candidates_at, dictionary_of
+from warpbrain.diagnosis.sound_points import sound_points
+
+
+@pytest.fixture(scope="module")
+def setting(small_diagnosis):
+    base = small_diagnosis.base
+    candidates = candidates_at(dictionary_of(small_diagnosis.case, ["swelling"]), base.effects, {})
+    sensors = base.at.sensors
+    noise = base.explanation.factor @ np.random.default_rng(5).normal(size=len(sensors))
+    return base, candidates, noise
+
+
+def aside(base, residual, group):
+    rows = base.at.sensors.groups == group
+    return replace(base, residual=residual).without(rows), rows
+
+
+def test_the_point_that_a_local_cause_moves_most_comes_back(setting):
+    base, candidates, noise = setting
+    local = [effect for effect in candidates.effects if effect.proposed.centre is not None]
+    effect = max(local, key=lambda one: np.abs(one.columns / base.sigma[:, None]).max())
+    answer = 4.0 * effect.columns[:, 0]
+    most = base.at.sensors.groups[np.argmax(np.abs(answer))]
+    changed, rows = aside(base, answer + noise, most)
+    assert np.array_equal(sound_points(changed, candidates), rows)
+
+
+def test_a_gross_error_does_not(setting):
+    base, candidates, noise = setting
+    group = base.at.sensors.groups[np.flatnonzero(base.at.sensors.is_displacement)[0]]
+    residual = noise.copy()
+    residual[base.at.sensors.groups == group] += 12.0 * base.noise[base.at.sensors.groups == group]
+    changed, _ = aside(base, residual, group)
+    assert not sound_points(changed, candidates).any()
+
+
+def test_where_nothing_was_set_aside_nothing_comes_back(setting):
+    base, candidates, noise = setting
+    none = replace(base, residual=noise).with_back(base.aside)
+    assert not none.aside.any()
+    assert not sound_points(none, candidates).any()
