@@ -149,11 +149,15 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         max_iterations: int,
         residual_squared: wp.array[scalar],
         tolerance_squared: wp.array[scalar],
+        least: wp.array[scalar],
         iterations: wp.array[int],
         go_on: wp.array[int],
     ):
         iterations[0] = iterations[0] + 1
         go_on[0] = 1
+        # of a matrix that is not positive definite nothing is found, however long it goes on
+        if least[0] <= scalar(0.0):
+            go_on[0] = 0
         # written so that a residual that is not a number ends the loop
         if not (residual_squared[0] > tolerance_squared[0]) or iterations[0] >= max_iterations:
             go_on[0] = 0
@@ -164,8 +168,11 @@ def linear_kernels(precision: Precision) -> LinearKernels:
 
 
 @contextmanager
-def _conditional_loop(test_convergence: Any) -> Iterator[None]:
+def _conditional_loop(test_convergence: Any, least: wp.array) -> Iterator[None]:
     """While a graph of the CPU is being captured: let Warp's CG loop on the device until it has converged.
+
+    It also ends where the least curvature (1,) is not positive: on an indefinite matrix CG may wander about until
+    `max_iterations`, and who watches the curvature has no use for what it finds there.
 
     Replaces a function of Warp for that moment, in the whole process: not for captures in several threads at once.
     """
@@ -182,7 +189,7 @@ def _conditional_loop(test_convergence: Any) -> Iterator[None]:
         iterations, go_on = cur_iter_and_condition[0:1], cur_iter_and_condition[1:2]
 
         def test() -> None:
-            inputs = [maxiter, r_norm_sq, atol_sq, iterations, go_on]
+            inputs = [maxiter, r_norm_sq, atol_sq, least, iterations, go_on]
             wp.launch(test_convergence, dim=1, inputs=inputs, device=atol_sq.device)
 
         def cycle() -> None:
@@ -246,7 +253,7 @@ class ConjugateGradient:
         self._device = right_hand_side.device
         self._kind = preconditioner
         self._inverse = wp.empty(self._size, dtype=precision.mat33, device=self._device)
-        self._least = wp.zeros(1, dtype=precision.scalar, device=self._device)
+        self._least = wp.full(1, math.inf, dtype=precision.scalar, device=self._device)
         chunks = (self._size + _CHUNK - 1) // _CHUNK
         self._partial = wp.zeros((chunks, 2), dtype=precision.scalar, device=self._device)
         self._watch = watch_curvature
@@ -386,7 +393,7 @@ class ConjugateGradient:
         if self._watch:
             self._least.fill_(float("inf"))
         if self._device.is_cpu:
-            with _conditional_loop(self._kernels.test_convergence):
+            with _conditional_loop(self._kernels.test_convergence, self._least):
                 self._outcome = solver(M=self._fsai)
         else:
             self._outcome = solver(M=self._fsai)
