@@ -147,6 +147,8 @@ class Refitting:
         self._finer = FinerStates(states) if mesh_errors is None else mesh_errors.finer
         self._share: _Share | None = None
         self._between: Floats | None = None
+        # of the last state of this fit that was followed over time
+        self._course: tuple[Floats, ...] = ()
         self._U = nuisances.columns
         self._tissue, self._field = nuisances.part("tissue"), nuisances.part("stiffness field")
         self._linear = np.ones(self._U.shape[1], dtype=bool)
@@ -181,7 +183,7 @@ class Refitting:
         SolveError
             If there is no equilibrium near the beginning.
         """
-        self._share, self._between = None, between
+        self._share, self._between, self._course = None, between, ()
         columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
         found = self._descend(effects, begins, columns, kappa, near or self.start, True)
         if self._mesh is None:
@@ -364,9 +366,10 @@ class Refitting:
         begin = self.start if near is None else near
         error = None if self._mesh is None else expected(self._mesh.with_tissue(hypothesis.theta, self.prior))
         try:
-            state = self.states.solve(hypothesis, begin.u, error)
+            state = self.states.solve(hypothesis, begin.u, error, begin.course or self._course)
         except SolveError:
             state = self.states.solve(hypothesis, None, error)
+        self._course = state.course or self._course
         at = self._U.shape[1]
         linear = self._U[:, self._linear] @ z[:at][self._linear]
         residual = state.sensors.residual - linear

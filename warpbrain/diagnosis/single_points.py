@@ -25,7 +25,11 @@ OFTEN, LARGE = 0.03, 8.0
 
 def log_gross(sensors: Sensors, factor: Floats, columns: Floats, residual: Floats, kappa: float) -> float:
     """What the log evidence of a linear model gains where any point may be a gross error; see `log_odds`."""
-    odds = log_odds(sensors, factor, columns, residual, kappa)
+    return log_gain(sensors, log_odds(sensors, factor, columns, residual, kappa))
+
+
+def log_gain(sensors: Sensors, odds: Floats) -> float:
+    """The same where the odds (n,) of `log_odds` are known."""
     return float(np.logaddexp(0.0, odds[np.unique(sensors.groups, return_index=True)[1]]).sum())
 
 

@@ -6,7 +6,7 @@ columns are nuisances then, each with the width of its own prior.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening, log_unknown
-from warpbrain.diagnosis.single_points import log_gross, log_odds
+from warpbrain.diagnosis.single_points import log_gain, log_gross, log_odds
 
 Floats = NDArray[np.float64]
 
@@ -59,6 +59,7 @@ class Stage:
     p_value: float
     kappa: float
     fits: dict[str, Refit]
+    _known_odds: dict[Refit, Floats] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def explanation(self) -> Explanation:
@@ -108,7 +109,7 @@ class Stage:
 
     def _gross(self, fit: Refit) -> float:
         """What a refit gains where single points may be gross errors."""
-        return log_gross(fit.state.sensors, self.explanation.factor, fit.columns, fit.linear, fit.kappa)
+        return log_gain(fit.state.sensors, self._odds(fit))
 
     def _gain(self, kind: str, none: float) -> float:
         """Log evidence of the refit of a kind less that without it; of what changes in time, of the change alone."""
@@ -136,7 +137,12 @@ class Stage:
         return np.asarray(weights @ np.array(chances) > 0.5)
 
     def _odds(self, fit: Refit) -> Floats:
-        return log_odds(fit.state.sensors, self.explanation.factor, fit.columns, fit.linear, fit.kappa)
+        # an inverse of the size of the sensors, which the evidence and the judge ask for in turn
+        if fit not in self._known_odds:
+            self._known_odds[fit] = log_odds(
+                fit.state.sensors, self.explanation.factor, fit.columns, fit.linear, fit.kappa
+            )
+        return self._known_odds[fit]
 
     def over_places(self, kind: str) -> float:
         """What the best of the places and levels of a kind loses where all of them are averaged over."""

@@ -69,6 +69,8 @@ class SolvedState:
     sensors : Sensors
         There, the expected error of the mesh put right: with walls where they are, not where elements that are too
         stiff leave them, or a point in a narrow ventricle is taken for one of the other wall.
+    course : tuple of (N, 3) arrays
+        Displacement [m] at each of `steps_to` where it was followed over time; empty where it was not.
     """
 
     hypothesis: Hypothesis
@@ -76,6 +78,7 @@ class SolvedState:
     u: Floats
     reactions: Floats
     sensors: Sensors
+    course: tuple[Floats, ...] = ()
 
 
 class States:
@@ -122,7 +125,11 @@ class States:
         return replace(applied, mesh=mesh, boundaries=boundaries, mechanisms=(*kept, *hypothesis.mechanisms))
 
     def solve(
-        self, hypothesis: Hypothesis, start: Floats | None = None, expected: Difference | None = None
+        self,
+        hypothesis: Hypothesis,
+        start: Floats | None = None,
+        expected: Difference | None = None,
+        course: Sequence[Floats] = (),
     ) -> SolvedState:
         """The equilibrium under a hypothesis.
 
@@ -133,6 +140,8 @@ class States:
             A displacement [m] that is near to it.
         expected : Difference, optional
             What it lacks of the state without the error of the mesh; sensors are there.
+        course : sequence of (N, 3) arrays, optional
+            Of a state that is near to it, if it is followed over time.
 
         Raises
         ------
@@ -148,14 +157,18 @@ class States:
         # relaxing stress or fluid of its own: what a term has in its memory beside that changes no state in time
         in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
         if in_time and np.isfinite(self.times[0]):
-            found = {moment.time: moment.state for moment in follow_slowly(system, steps_to(self.times), options)}
+            near = course or (() if start is None else (start,))
+            moments = follow_slowly(system, steps_to(self.times), options, near=near)
+            found = {moment.time: moment.state for moment in moments}
+            course = tuple(state.u for state in found.values())
             states = [found[time] for time in self.times]
         else:
+            course = ()
             states = [EquilibriumSolver(system, options).solve(model.external_forces(), start)] * len(self.times)
         external = model.external_forces()
         reactions = [model.reactions(state.internal, external) for state in states]
         sensors = self._sensors([(state.u, R) for state, R in zip(states, reactions, strict=True)], expected)
-        return SolvedState(hypothesis, system, states[-1].u, reactions[-1], sensors)
+        return SolvedState(hypothesis, system, states[-1].u, reactions[-1], sensors, tuple(course))
 
     def corrected(self, state: SolvedState, expected: Difference) -> SolvedState:
         """A state that does not change in time, with sensors where it is without the error of the mesh."""

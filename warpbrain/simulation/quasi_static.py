@@ -11,12 +11,15 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver, NewtonStep
 from warpbrain.simulation.held import require_held
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
+
+Floats = NDArray[np.float64]
 
 #: How often a step is halved before the run gives up.
 _HALVINGS = 6
@@ -62,10 +65,12 @@ def follow_slowly(
     options: EquilibriumOptions | None = None,
     on_step: Callable[[NewtonStep], None] | None = None,
     clock: PhaseClock | None = None,
+    near: Sequence[Floats] = (),
 ) -> Iterator[Moment]:
     """Equilibria at a series of times, from rest at the time 0.
 
-    What acts without a ramp of its own is there from the first step on.
+    What acts without a ramp of its own is there from the first step on. A course that is near to this one changes no
+    equilibrium, only where the search for each begins: at the state before and what the other course goes on by.
 
     Parameters
     ----------
@@ -78,6 +83,8 @@ def follow_slowly(
         Called with each `NewtonStep`.
     clock : PhaseClock, optional
         Adds up the wall time by phase.
+    near : sequence of (n, 3) arrays, optional
+        Displacement [m] at each of the times in a course that is near to this one; its first alone will do.
 
     Yields
     ------
@@ -103,8 +110,9 @@ def follow_slowly(
     solver = EquilibriumSolver(system, options, on_step, clock)
     system.forget()
     u, now, pending = np.zeros(system.model.mesh.points.shape), 0.0, False
-    for time in series.tolist():
+    for number, time in enumerate(series.tolist()):
         step, taken = time - now, 0
+        guess = _ahead(u, near, number)
         while now < time:
             if pending:
                 # only now is it known that nobody looks at the state before any more
@@ -114,8 +122,11 @@ def follow_slowly(
             # the last step ends at the time itself, whatever the rounding
             end = time if now + 1.5 * step > time else now + step
             try:
-                state = solver.try_step(u, end - now, end)
+                state = solver.try_step(u if guess is None else guess, end - now, end)
             except SolveError:
+                if guess is not None:
+                    guess = None
+                    continue
                 step *= 0.5
                 if step < (time - now) * 0.5**_HALVINGS:
                     raise
@@ -123,3 +134,10 @@ def follow_slowly(
             u, now, taken, pending = state.u, end, taken + 1, True
         system.u.assign(u)
         yield Moment(time, state, taken)
+
+
+def _ahead(u: Floats, near: Sequence[Floats], number: int) -> Floats | None:
+    """Where the state (n, 3) of a step may be, by the state before and a course that is near; None without one."""
+    if number >= len(near):
+        return None
+    return near[number] if number == 0 else u + (near[number] - near[number - 1])
