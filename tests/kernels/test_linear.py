@@ -129,6 +129,16 @@ def test_indefinite_matrix_is_told(preconditioner: str, k: float, m: float, devi
     assert result.indefinite
 
 
+def test_an_indefinite_matrix_ends_the_solve() -> None:
+    """On the CPU, where the loop is ours: nothing is found by going on, and there may be 10,000 iterations to come."""
+    system = system_with(1.0, -1e5, "cpu")
+    assert np.linalg.eigvalsh(matrix_of(system).toarray())[0] < 0.0
+    _, watched = solve(system, "block-jacobi", max_iterations=300, tolerance=1e-30)
+    _, blind = solve(system, "block-jacobi", max_iterations=300, tolerance=1e-30, watch_curvature=False)
+    assert watched.indefinite and not watched.converged
+    assert watched.iterations < blind.iterations == 300
+
+
 @every_preconditioner
 def test_too_few_iterations_are_told(preconditioner: str, device: str) -> None:
     _, result = solve(system_with(1.0, 0.0, device), preconditioner, max_iterations=3)

@@ -14,7 +14,7 @@ from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanism import Facts, ParameterError
 from warpbrain.physics.mechanisms.drainage import Drainage, DrainageTerm
 from warpbrain.simulation.dynamics import Simulator
-from warpbrain.simulation.equilibrium import solve_equilibrium
+from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.sensitivity import SensitivitySolver
@@ -122,6 +122,20 @@ def test_in_the_end_the_skeleton_carries_the_load_alone():
     moments = list(follow_slowly(System(model, "cpu"), [1.0, 1e3, 1e6, 1e9]))
     assert np.abs(moments[0].state.u - alone).max() > 0.1 * np.abs(alone).max()
     assert np.abs(moments[-1].state.u - alone).max() < 1e-6 * np.abs(alone).max()
+
+
+@pytest.mark.parametrize("part", [0.9, -3.0])
+def test_a_course_that_is_near_changes_nothing_but_the_way(part: float):
+    """However far away it is: the states are equilibria, and a search that ends nowhere begins once more without it."""
+    times, options = [1.0, 10.0, 100.0, 1000.0], EquilibriumOptions(tolerance=1e-9)
+    model = squeezed(Drainage(permeability=1e-8, drained="table"))
+    alone = [moment.state for moment in follow_slowly(System(model, "cpu"), times, options)]
+    near = [part * state.u for state in alone]
+    beside = [moment.state for moment in follow_slowly(System(model, "cpu"), times, options, near=near)]
+    size = np.abs(alone[-1].u).max()
+    assert max(np.abs(a.u - b.u).max() for a, b in zip(alone, beside, strict=True)) < 1e-6 * size
+    if part > 0.0:
+        assert sum(len(state.history) for state in beside) < sum(len(state.history) for state in alone)
 
 
 def test_exchange_and_flow_come_to_balance():
