@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from warpbrain.diagnosis.averaging import averaged_values
 from warpbrain.diagnosis.judging import Judgement
-from warpbrain.diagnosis.parameters import values_of
 from warpbrain.diagnosis.result import Ranked
 from warpbrain.diagnosis.stage import Stage
 
@@ -21,8 +21,11 @@ def named_together(stages: Sequence[Stage], judged: Sequence[Judgement]) -> tupl
     if not found:
         return ()
     final = stages[len(found) - 1].fits[found[-1].kind]
-    for k, (effect, z, covariance) in enumerate(zip(final.effects, final.coefficients, final.covariances, strict=True)):
-        values = values_of(effect, z, covariance)
+    for k, effect in enumerate(final.effects):
+        if effect.proposed.of_patch is not None:
+            # where it lets go was averaged over places
+            continue
+        values = averaged_values(stages[k], found[k].kind, final, k)
         own = {value.name for value in values}
         # what was averaged over places and levels stays as it was found
         found[k] = replace(found[k], values=(*values, *(v for v in found[k].values if v.name not in own)))

@@ -141,9 +141,7 @@ class Effects:
         sensors = self.at.sensors
 
         def left(c: Floats) -> Floats:
-            parts = parts_of(proposal, c, sensors)
-            # what is so many times stiffer resists as much more, and moves as much less
-            return at_once * np.where(sensors.is_displacement, parts / (1.0 + np.maximum(parts, 0.0)), parts)
+            return at_once * faded(parts_of(proposal, c, sensors), sensors.is_displacement)
 
         axes = _STEP * np.diag(proposal.sd)
         columns = [(left(proposal.mean + axis) - left(proposal.mean - axis)) / (2.0 * _STEP) for axis in axes]
@@ -253,6 +251,14 @@ class Effects:
         found = at.internal_forces() - self._internal
         system.set_materials(own)
         return found
+
+
+def faded(parts: Floats, is_displacement: NDArray[np.bool_]) -> Floats:
+    """How many times what a fading proposal does at once is seen, where that many times are there.
+
+    What is so many times stiffer resists as much more, and moves as much less.
+    """
+    return np.asarray(np.where(is_displacement, parts / (1.0 + np.maximum(parts, 0.0)), parts))
 
 
 def parts_of(proposal: Proposal, c: Floats, sensors: Sensors) -> Floats:

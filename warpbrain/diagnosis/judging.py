@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.diagnosis.averaging import averaged_values
 from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.calibration import probabilities
 from warpbrain.diagnosis.evidence import Inner
 from warpbrain.diagnosis.flexible import SCALES
 from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo, scattered_blocks, spatial_blocks
+from warpbrain.diagnosis.letting_go import where_it_lets_go
 from warpbrain.diagnosis.locating import ball_of
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.parameters import scanned_values, values_of
@@ -160,13 +162,19 @@ class Judge:
         if effect.proposed.is_there_or_not and fit is not None:
             own = explanation.stack(fit.effects[-1:]).of(0)
         d = explanation.detectability(own[:, 0] + own[:, 1:] @ z, kappa)
-        centre, radius = _place(stage, kind) if fit is None else _place_of(fit) or _place(stage, kind)
+        if fit is None:
+            (centre, radius), values = _place(stage, kind), values_of(effect, z, covariance)
+        elif effect.proposed.of_patch is not None:
+            where = where_it_lets_go(stage, kind)
+            centre, radius, values = where.centre, where.radius, where.values
+        else:
+            centre, radius = _place_of(fit) or _place(stage, kind)
+            values = averaged_values(stage, kind, fit, len(fit.effects) - 1)
         why = "less probable than what was refitted" if stage.p_value <= self.options.alpha else "nothing is missing"
         why = "" if fit is not None else why
         own_places = candidates.of_kind[kind]
         scanned = [candidates.effects[k] for k in own_places.tolist()]
         weights = softmax(screen.places[own_places, 0])
-        values = values_of(effect if fit is None else fit.effects[-1], z, covariance)
         values += tuple(v for v in scanned_values(scanned, weights) if v.name not in {known.name for known in values})
         return Ranked(kind, True, log_evidence, chance, d, change, values, centre, radius, effect.proposed.region, why)
 

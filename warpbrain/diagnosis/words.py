@@ -150,10 +150,13 @@ def _viscoelasticity(values: Values) -> list[str]:
     found = []
     if "moduli" in values:
         moduli = values["moduli"]
-        found.append(f"at first it is {measured(1.0 + moduli.value, moduli.sd)} times as stiff as in the end")
+        found.append(
+            f"at first it is {measured(1.0 + moduli.value, moduli.sd)} times as stiff as in the end, whether it "
+            "relaxes in one time or in two; what relaxes before the first recording is hardly seen"
+        )
     if "times" in values:
         of = "of " if values["times"].sd > values["times"].value else ""
-        found.append(f"its relaxation time is {of}{_time(values['times'])}")
+        found.append(f"if it has one, its relaxation time is {of}{_time(values['times'])}")
     branches = [(values.get(f"moduli_{number}"), values.get(f"times_{number}")) for number in (1, 2)]
     each = [
         f"{measured(modulus.value, modulus.sd)} within {_time(time)}"
@@ -161,7 +164,7 @@ def _viscoelasticity(values: Values) -> list[str]:
         if modulus is not None and time is not None
     ]
     if each:
-        found.append(f"what relaxes, as a part of that in the end, is {', and '.join(each)}")
+        found.append(f"if it has two, what relaxes, as a part of that in the end, is {', and '.join(each)}")
     return found
 
 

@@ -134,7 +134,7 @@ class Proposal:
         How many of the last coefficients say where it is, and have no size.
     history : callable, or None
         Of a fading one: from coefficients (k,) and the time since the load came [s] to how many times what it does at
-        once at `start` is there; nothing is left in the end.
+        once at `start` is there, in proportion to the first of them; nothing is left in the end.
     pace : callable, or None
         Of a course: from coefficients to how many times faster than at `start` all of it goes.
     centre, radius : (3,) array and float, or None
