@@ -29,6 +29,7 @@ SAID = {
 LEFT = [
     Verdict("group", ("gravity", "swelling")),
     Verdict("unknown", ()),
+    Verdict("unknown", ("gravity",)),
     Verdict("not physics", ("registration",)),
     Verdict("cannot say", ("gravity",)),
 ]

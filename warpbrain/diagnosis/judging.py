@@ -21,7 +21,7 @@ from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.result import Ranked
 from warpbrain.diagnosis.screening import UNKNOWN
 from warpbrain.diagnosis.stage import Stage
-from warpbrain.diagnosis.verdict import ERRORS, Evidence, Verdict, decide
+from warpbrain.diagnosis.verdict import ADEQUATE, ERRORS, Evidence, Verdict, decide
 
 Floats = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ class Judge:
         ranking = tuple(sorted(ranked, key=lambda one: -one.probability))
         best = next((one.kind for one in ranking if one.kind in fits), None)
         improvement, gain, sure, placebo_p, adequacy_p, size = (0.0, 0.0, 0.0), 0.0, 0.0, 1.0, 1.0, 0.0
-        band = None
+        needed, band = 1.0, None
         way = self._regions if best is None else ways[best]
         if best is not None:
             own = fits[best]
@@ -108,6 +108,8 @@ class Judge:
             dense = way.predict(own.linear, own.columns, plain[2]).log_density
             placebo_p = float((1 + sum(one.log_density >= dense for one in patterns)) / (1 + len(patterns)))
             adequacy_p = self._adequacy(own)
+            if adequacy_p <= ADEQUATE:
+                needed = probabilities({best: stage.beside_unknown(best), "without": 0.0}, frozenset())[best]
             size = float(np.abs(own.coefficients[-1]).max())
         forces = [np.column_stack([plain[1], force]) for force in self.base.smooth_forces]
         loose = {one: [one.predict(plain[0], columns, plain[2]) for columns in forces] for one in without}
@@ -115,7 +117,17 @@ class Judge:
         groups = self.base.at.sensors.groups
         aside = len(np.unique(groups[self.base.aside])) / len(np.unique(groups))
         evidence = Evidence(
-            self.options.alpha, stage.p_value, ranking, gain, sure, placebo_p, adequacy_p, size, unknown_sure, aside
+            self.options.alpha,
+            stage.p_value,
+            ranking,
+            gain,
+            sure,
+            placebo_p,
+            adequacy_p,
+            needed,
+            size,
+            unknown_sure,
+            aside,
         )
         return Judgement(
             decide(evidence),
@@ -150,17 +162,16 @@ class Judge:
         effect = candidates.effects[number]
         if effect.proposal is None:
             return Ranked(kind, False, log_evidence, chance, 0.0, None, (), None, None, "", "no physics")
-        own = stage.screening.stack.of(number)
         fit = stage.fits.get(kind)
         if fit is not None:
             z, covariance, kappa = fit.coefficients[-1], fit.covariances[-1], fit.kappa
+            own = explanation.stack(fit.effects[-1:]).of(0)
         else:
+            own = stage.screening.stack.of(number)
             # where physics is missing, the noise that the stage needs is no noise
             kappa = 1.0
             whitened = explanation.whitened(stage.residual)[:, None]
             z, covariance = Inner(explanation, stage.screening.stack, whitened).coefficients(kappa, number)
-        if effect.proposed.is_there_or_not and fit is not None:
-            own = explanation.stack(fit.effects[-1:]).of(0)
         d = explanation.detectability(own[:, 0] + own[:, 1:] @ z, kappa)
         if fit is None:
             (centre, radius), values = _place(stage, kind), values_of(effect, z, covariance)

@@ -43,7 +43,7 @@ def next_measurements(
         return ()
     first, second = (candidates.effects[screen.best_effect(candidates, kind)] for kind in kinds[:2])
     width = first.columns.shape[1]
-    # of what lets go the share alone: it is compared in its place of the scan
+    # of what was refined between places the amount alone: it is compared in its place of the scan
     z = fits[kinds[0]].coefficients[0][:width] if kinds[0] in fits else np.ones(width)
     noise = base.typical_noise
     columns = base.nuisances.columns

@@ -57,6 +57,12 @@ def sentence_of(
         members = [ranked for ranked in ranking if ranked.kind in verdict.kinds]
         said = "; or ".join(f"{_clause(one)} ({_percent(one.probability)})" for one in members)
         return f"Something is missing ({_chance(p_value)}), and these data do not tell which of these it is: {said}."
+    if verdict.verdict == UNKNOWN and verdict.kinds:
+        nearest = next(_clause(one) for one in ranking if one.kind in verdict.kinds)
+        return (
+            f"Something is missing ({_chance(p_value)}) that none of the known mechanisms explains alone: a force without "
+            f"a name acts, in the place of what comes nearest or beside it. Nearest: {nearest}.{traits_in_words(unknown)}"
+        )
     if verdict.verdict == UNKNOWN:
         return (
             f"Something is missing ({_chance(p_value)}) that none of the known mechanisms explains: a force without a "

@@ -151,15 +151,19 @@ class Stage:
         own = self.screen.places[self.candidates.of_kind[kind], 0]
         return float(logsumexp(own)) - float(np.log(len(own))) - float(own.max())
 
-    def _unknown(self, none: Refit) -> float:
-        """Log evidence of any smooth force in the place of a mechanism, where single points may be gross errors."""
-        explanation = none.explanation(self.explanation.factor)
+    def beside_unknown(self, kind: str) -> float:
+        """Log evidence of the refit of a kind beside any smooth force, against that force without it."""
+        return self._unknown(self.fits[kind]) + self.over_places(kind) - self._unknown(self.fits["none"])
+
+    def _unknown(self, fit: Refit) -> float:
+        """Log evidence of any smooth force beside a fit, where single points may be gross errors."""
+        explanation = fit.explanation(self.explanation.factor)
         forces = self.base.smooth_forces
         loose = [explanation.with_more(force) for force in forces]
-        white = explanation.whitened(none.linear)[:, None]
+        white = explanation.whitened(fit.linear)[:, None]
         best = int(np.argmax([one.log_marginal(white)[0] for one in loose]))
         columns, kappa = loose[best].nuisances, loose[best].best_kappa(white[:, 0])
-        gross = log_gross(none.state.sensors, self.explanation.factor, columns, none.linear, kappa)
+        gross = log_gross(fit.state.sensors, self.explanation.factor, columns, fit.linear, kappa)
         return float(log_unknown(loose, white)[0]) + gross
 
 

@@ -4,9 +4,11 @@
 2. Named if one mechanism is probable enough, predicts points that it was not fitted to better than without it and than
    patterns that mean nothing, has a plausible size, and leaves nothing significant. Named + rest if something is left.
 3. Not physics if a nuisance far larger than it should be explains the residuals better than any mechanism.
+   Something that is left may be all of it: then the name must be probable enough beside any smooth force, too.
 4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is, and predicts points
-   that it was not fitted to better. Else: cannot say. A weak alarm is never more than that, nor are recordings of which
-   many points contradict each other.
+   that it was not fitted to better; or if it may be, and the best mechanism leaves something significant: then a force
+   without a name acts in either case. Else: cannot say. A weak alarm is never more than that, nor are recordings of
+   which many points contradict each other.
 """
 
 from __future__ import annotations
@@ -64,6 +66,8 @@ class Evidence:
         what acts in few places is in few regions, and what a neighbour tells is no gain here and there.
     placebo_p, adequacy_p : float
         Of it.
+    needed : float
+        Probability that it acts beside any smooth force, against that force alone, where something is left.
     size : float
         Its largest coefficient in standard deviations of the prior.
     unknown_sure : float
@@ -79,6 +83,7 @@ class Evidence:
     sure: float
     placebo_p: float
     adequacy_p: float
+    needed: float
     size: float
     unknown_sure: float
     aside: float
@@ -92,7 +97,7 @@ class Verdict:
     ----------
     verdict : str
     kinds : tuple of str
-        Named, or of the group.
+        Named, or of the group; of the unknown what comes nearest and leaves something, if that may act beside it.
     why : str
         What kept it from a name, if something did.
     """
@@ -153,9 +158,10 @@ def decide(found: Evidence) -> Verdict:
     claims = found.p_value <= CLAIM * found.alpha and found.aside <= CONTRADICTED
     if claims and 1 < len(label_set) <= MEMBERS and physics and found.gain > 0.0:
         return Verdict(GROUP, label_set, "; ".join(vetoes))
-    if claims and best.kind == UNKNOWN_KIND and best.probability >= 0.5:
+    left = best.physics and UNKNOWN_KIND in label_set and found.adequacy_p <= ADEQUATE
+    if claims and (left or (best.kind == UNKNOWN_KIND and best.probability >= 0.5)):
         if found.unknown_sure > 0.0:
-            return Verdict(UNKNOWN, ())
+            return Verdict(UNKNOWN, (best.kind,) if left else ())
         vetoes = ["any smooth force fits better than a mechanism, but does not predict points that were held out"]
     return Verdict(CANNOT_SAY, label_set, "; ".join(vetoes))
 
@@ -174,6 +180,8 @@ def _vetoes(found: Evidence) -> list[str]:
         vetoes.append("an effect of that size would hardly be seen")
     if found.size > LARGEST:
         vetoes.append("its size would be implausible")
+    if found.needed < SURE:
+        vetoes.append("beside any smooth force, which has to act anyway, it adds little")
     return vetoes
 
 
