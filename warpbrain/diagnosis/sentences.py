@@ -61,7 +61,8 @@ def sentence_of(
         nearest = next(_clause(one) for one in ranking if one.kind in verdict.kinds)
         return (
             f"Something is missing ({_chance(p_value)}) that none of the known mechanisms explains alone: a force "
-            f"without a name acts, in the place of what comes nearest or beside it. Nearest: {nearest}.{traits_in_words(unknown)}"
+            f"without a name acts, in the place of what comes nearest or beside it. Nearest: {nearest}."
+            f"{traits_in_words(unknown)}"
         )
     if verdict.verdict == UNKNOWN:
         return (
