@@ -185,6 +185,7 @@ def _wider(stage: Stage, best: Effect, scan: _Scan) -> Effect:
         place=place,
         elsewhere=None,
         placing=len(sd),
+        log_covered=float(np.log(sd / (_CELL * scan.steps(directions))).sum()),
     )
     return _made(stage, wider)
 

@@ -145,10 +145,15 @@ class Stage:
         return self._known_odds[fit]
 
     def over_places(self, kind: str) -> float:
-        """What the best of the places and levels of a kind loses where all of them are averaged over."""
+        """What the best of the places and levels of a kind loses where all of them are averaged over.
+
+        Of a refit that has its place among its coefficients: of all places as many as it is averaged over already.
+        """
         from scipy.special import logsumexp
 
         own = self.screen.places[self.candidates.of_kind[kind], 0]
+        if kind in self.fits and (proposal := self.fits[kind].effects[-1].proposed).placing:
+            return proposal.log_covered - float(np.log(len(own)))
         return float(logsumexp(own)) - float(np.log(len(own))) - float(own.max())
 
     def beside_unknown(self, kind: str) -> float:

@@ -132,6 +132,8 @@ class Proposal:
         Of what was refined between the places of a scan: from coefficients to the centre (3,) [m] and radius [m].
     placing : int
         How many of the last coefficients say where it is, and have no size.
+    log_covered : float
+        Logarithm of how many places of a scan they are as wide as.
     history : callable, or None
         Of a fading one: from coefficients (k,) and the time since the load came [s] to how many times what it does at
         once at `start` is there, in proportion to the first of them; nothing is left in the end.
@@ -155,6 +157,7 @@ class Proposal:
     on_surface: bool = False
     place: Callable[[Floats], tuple[Floats, float]] | None = None
     placing: int = 0
+    log_covered: float = 0.0
     history: Callable[[Floats, float], float] | None = None
     pace: Callable[[Floats], float] | None = None
     centre: Floats | None = None
