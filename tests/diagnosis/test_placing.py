@@ -42,28 +42,35 @@ def found(request, small_diagnosis):
     return stage, centre, stage.candidates.effects[number], placed(stage, number)
 
 
+@pytest.fixture(scope="module")
+def refit(found):
+    """As `found`, with the effect."""
+    stage, centre, best, refined = found
+    return stage, centre, best, refined.effect
+
+
 def begun(stage, effect):
     begin = linear_point(stage.explanation, stage.residual, stage.explanation.nuisances, effect, 1.0)
     return begin[-effect.columns.shape[1] :]
 
 
-def test_a_place_is_found_between_sites(found):
-    stage, centre, best, effect = found
+def test_a_place_is_found_between_sites(refit):
+    stage, centre, best, effect = refit
     where, _ = effect.proposed.place(effect.coefficients(begun(stage, effect)))
     off = np.linalg.norm(where - centre)
     assert off < 0.005
     assert off <= np.linalg.norm(best.proposed.centre - centre) + 1e-4
 
 
-def test_it_is_worth_more_than_the_best_site_and_pays_for_its_place(found):
-    stage, _, best, effect = found
+def test_it_is_worth_more_than_the_best_site_and_pays_for_its_place(refit):
+    stage, _, best, effect = refit
     white = stage.explanation.whitened(stage.residual)[:, None]
     site, between = log_places(stage.explanation, stage.explanation.stack([best, effect]), white)[:, 0]
     assert between > site - 3.0
 
 
-def test_its_columns_are_what_moving_it_changes(found):
-    stage, _, best, effect = found
+def test_its_columns_are_what_moving_it_changes(refit):
+    stage, _, best, effect = refit
     proposal = effect.proposed
     z = (proposal.start - proposal.mean) / proposal.sd
     count = len(best.proposed)
@@ -78,10 +85,10 @@ def test_its_columns_are_what_moving_it_changes(found):
         assert np.linalg.norm(slope - effect.columns[:, k]) < 0.05 * np.linalg.norm(slope)
 
 
-def test_what_is_said_of_it_are_its_amount_its_centre_and_its_radius(found):
-    _, _, _, effect = found
+def test_what_is_said_of_it_are_its_amount_its_centre_and_its_radius(refit):
+    stage, _, _, effect = refit
     size = effect.columns.shape[1]
-    values = {value.name: value for value in values_of(effect, begun(found[0], effect), 0.01 * np.eye(size))}
+    values = {value.name: value for value in values_of(effect, begun(stage, effect), 0.01 * np.eye(size))}
     assert values["radius"].unit == "mm"
     assert values["radius"].sd > 0.0
     assert values["centre_x"].sd > 0.0
@@ -90,3 +97,13 @@ def test_what_is_said_of_it_are_its_amount_its_centre_and_its_radius(found):
     if effect.proposed.on_surface:
         assert size == 3 + 2 + 1
         assert "centre_z" not in values or values["centre_z"].sd < 1e-6
+
+
+def test_what_the_mesh_leaves_open_of_the_place_is_told(found):
+    stage, _, _, refined = found
+    placing = refined.effect.proposed.placing
+    open_ = np.linalg.norm(refined.unresolved, axis=0)
+    whole = np.linalg.norm(refined.effect.columns[:, -placing:], axis=0)
+    assert refined.unresolved.shape == (len(stage.residual), placing)
+    assert np.all(open_ > 0.0)
+    assert np.all(open_ < 3.0 * whole)

@@ -218,13 +218,10 @@ class Diagnosing:
         """The best effect of a kind between the places of its scan, and what the mesh leaves open of that, if known."""
         number = stage.screen.best_effect(stage.candidates, kind)
         effect = stage.candidates.effects[number]
-        if effect.proposed.of_patch is not None:
-            found = refined(stage, number)
-            return found.effect, found.unresolved
-        if effect.proposed.elsewhere is not None:
-            effect = placed(stage, number)
-            return effect, np.zeros((len(stage.residual), 0))
-        return effect, None
+        if effect.proposed.of_patch is None and effect.proposed.elsewhere is None:
+            return effect, None
+        found = placed(stage, number) if effect.proposed.of_patch is None else refined(stage, number)
+        return found.effect, found.unresolved
 
     @staticmethod
     def _between(stage: Stage, kind: str, begin: Floats) -> Floats | None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import Inner
+from warpbrain.diagnosis.refining import Refined
 from warpbrain.diagnosis.screening import log_places
 from warpbrain.diagnosis.stage import Stage
 from warpbrain.errors import SolveError
@@ -30,11 +31,14 @@ _STEPS, _MOVES = (0.5, 0.25), 6
 #: Standard deviation in steps where a normal density is at its middle what a uniform one in the step is; and the most
 #: that neighbours tell of, in such.
 _CELL, _WIDEST = 1.0 / np.sqrt(2.0 * np.pi), 3.0
+#: Standard deviation of the logarithm of a radius of which nobody knows how sharply it ends: a ball with an edge has as
+#: much in it as one that falls off smoothly to twice a radius which is 16 % smaller.
+_PROFILE = 0.15
 #: How far [standard deviations] the amount may be from zero where the place is sought: it is linear in it there.
 _FARTHEST = 3.0
 
 
-def placed(stage: Stage, number: int) -> Effect:
+def placed(stage: Stage, number: int) -> Refined:
     """What the best effect of a scan comes to between its places.
 
     Parameters
@@ -42,12 +46,6 @@ def placed(stage: Stage, number: int) -> Effect:
     stage : Stage
     number : int
         Of the effect, which acts in one place.
-
-    Returns
-    -------
-    Effect
-        With columns (n, k + d + 1): of its own coefficients, of its centre along d directions (two along the surface
-        for what acts there), of the logarithm of its radius.
     """
     scan = _Scan(stage, number)
     best, value = _at(stage, stage.candidates.effects[number].proposed)
@@ -58,7 +56,18 @@ def placed(stage: Stage, number: int) -> Effect:
             if other <= value:
                 break
             best, value = effect, other
-    return _wider(stage, best, scan)
+    wider = _wider(stage, best, scan)
+    proposal = wider.proposed
+    assert proposal.radius is not None
+    sd = proposal.sd[-proposal.placing :]
+    open_ = _unresolved(stage.base.at.system.model.mesh, proposal.radius, proposal.placing - 1)
+    return Refined(wider, wider.columns[:, -proposal.placing :] * (open_ / sd))
+
+
+def _unresolved(mesh: TetMesh, radius: float, directions: int) -> Floats:
+    """Standard deviation (d + 1,) of the place that no fit resolves: uniform in an edge, and how sharply it ends."""
+    edge = (6.0 * np.sqrt(2.0) * mesh.volume / len(mesh.tetrahedra)) ** (1.0 / 3.0) / np.sqrt(12.0)
+    return np.array([*np.full(directions, edge), np.hypot(edge / radius, _PROFILE)])
 
 
 def _at(stage: Stage, proposal: Proposal) -> tuple[Effect, float]:

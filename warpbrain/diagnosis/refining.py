@@ -34,13 +34,14 @@ _CELL, _WIDEST = np.array([BETWEEN, BETWEEN, np.log(_STEP)]) / np.sqrt(12.0), 3.
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """A patch between the places of a scan.
+    """What acts in one place, between the places of a scan.
 
     Attributes
     ----------
     effect : Effect
-        With columns (n, 4): of its share, of its centre along both tangents, of the logarithm of its radius.
-    unresolved : (n, 3) array
+        With columns (n, k + d + 1): of its own coefficients, of its centre along d directions, of the logarithm of its
+        radius. Along a surface d is 2, and what lets go has one coefficient, its share.
+    unresolved : (n, d + 1) array
         What the mesh leaves open of centre and radius, one standard deviation each.
     """
 
