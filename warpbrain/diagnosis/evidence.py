@@ -135,6 +135,24 @@ class Explanation:
         k2 = kappa**2
         return np.asarray((rows - self._WV @ ((self._WV.T @ rows) / (k2 + self._D)[:, None])) / k2)
 
+    def inverse_times(self, residual: Floats, kappa: float) -> Floats:
+        """`C^-1 r` of a residual (n,) that is not whitened, with `C = kappa^2 L L^T + U U^T`."""
+        return np.asarray(self._inverse_factor.T @ self.precision_times(self.whitened(residual)[:, None], kappa)[:, 0])
+
+    def inverse_blocks(self, rows: NDArray[np.int64], kappa: float) -> Floats:
+        """Blocks (g, s, s) of `C^-1` that belong to rows (g, s)."""
+        A, B = self._inverse_factor[:, rows], self._of_inverse[:, rows]
+        weighted = B / (kappa**2 + self._D)[:, None, None]
+        return np.asarray((np.einsum("ngi,ngj->gij", A, A) - np.einsum("qgi,qgj->gij", weighted, B)) / kappa**2)
+
+    @cached_property
+    def _inverse_factor(self) -> Floats:
+        return self.whitened(np.eye(self.size))
+
+    @cached_property
+    def _of_inverse(self) -> Floats:
+        return np.asarray(self._WV.T @ self._inverse_factor)
+
     def standardised(self, rows: Floats, kappa: float) -> Floats:
         """`S^-1/2` of whitened rows (n, b): independent and of variance one where nothing is missing."""
         root = np.sqrt(kappa**2 + self._D)

@@ -8,6 +8,9 @@ evidence is multiplied by
 
 where `p` is what the others say of the point under the hypothesis: a block of the inverse of the covariance. What
 stands out far beyond any smooth force was set aside before; see `gross_errors`.
+
+The factor `kappa` on the noise is averaged over with these factors in place, not before: one gross error would make it
+large, and whatever explains that one point would be credited with the noise of all others.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.diagnosis.evidence import KAPPAS, Explanation, kappa_log_prior
 from warpbrain.diagnosis.sensors import Sensors
 
 Floats = NDArray[np.float64]
@@ -23,43 +27,57 @@ Floats = NDArray[np.float64]
 OFTEN, LARGE = 0.03, 8.0
 
 
-def log_gross(sensors: Sensors, factor: Floats, columns: Floats, residual: Floats, kappa: float) -> float:
-    """What the log evidence of a linear model gains where any point may be a gross error; see `log_odds`."""
-    return log_gain(sensors, log_odds(sensors, factor, columns, residual, kappa))
+def log_evidence_and_odds(
+    sensors: Sensors, explanation: Explanation, residual: Floats, kappas: Floats = KAPPAS
+) -> tuple[float, Floats]:
+    """Log evidence of a linear model where any point may be a gross error, and the odds (n,) of `log_odds`.
+
+    Parameters
+    ----------
+    sensors : Sensors
+    explanation : Explanation
+    residual : (n,) array
+        With all nuisances at zero, not whitened.
+    kappas : (k,) array
+        Factors on the noise that are averaged over.
+
+    Returns
+    -------
+    (float, (n,) array)
+        Odds are those at the most probable factor.
+    """
+    from scipy.special import logsumexp
+
+    odds = np.array([log_odds(sensors, explanation, residual, kappa) for kappa in kappas.tolist()])
+    first = np.unique(sensors.groups, return_index=True)[1]
+    gains = np.logaddexp(0.0, odds[:, first]).sum(axis=1)
+    logs = explanation.log_none(explanation.whitened(residual)[:, None], kappas)[:, 0] + kappa_log_prior(kappas) + gains
+    return float(logsumexp(logs)), odds[int(np.argmax(logs))]
 
 
-def log_gain(sensors: Sensors, odds: Floats) -> float:
-    """The same where the odds (n,) of `log_odds` are known."""
-    return float(np.logaddexp(0.0, odds[np.unique(sensors.groups, return_index=True)[1]]).sum())
-
-
-def log_odds(sensors: Sensors, factor: Floats, columns: Floats, residual: Floats, kappa: float) -> Floats:
+def log_odds(sensors: Sensors, explanation: Explanation, residual: Floats, kappa: float) -> Floats:
     """Logarithm of the odds (n,) that the point of each row is a gross error, after what all others say of it.
 
     Parameters
     ----------
     sensors : Sensors
-    factor : (n, n) array
-        Of the noise, lower triangular.
-    columns : (n, q) array
-        Of one standard deviation each.
+    explanation : Explanation
     residual : (n,) array
-        With all of them at zero.
+        With all nuisances at zero, not whitened.
     kappa : float
         Factor on the noise.
     """
-    noise = kappa**2 * factor @ factor.T
-    precision = np.linalg.inv(noise + columns @ columns.T)
-    weighted = precision @ residual
+    weighted = explanation.inverse_times(residual, kappa)
     sizes = np.bincount(sensors.groups)
     found = np.zeros(len(sensors))
     order = np.argsort(sensors.groups, kind="stable")
     for size in np.unique(sizes[sizes > 0]).tolist():
         rows = order[np.isin(sensors.groups[order], np.flatnonzero(sizes == size))].reshape(-1, size)
-        own = precision[rows[:, :, None], rows[:, None, :]]
+        own = explanation.inverse_blocks(rows, kappa)
         covariance = np.linalg.inv(own)
         apart = np.einsum("gij,gj->gi", covariance, weighted[rows])
-        wide = covariance + (LARGE**2 - 1.0) * noise[rows[:, :, None], rows[:, None, :]]
+        factors = explanation.factor[rows]
+        wide = covariance + (LARGE**2 - 1.0) * kappa**2 * np.einsum("gin,gjn->gij", factors, factors)
         likely = -0.5 * np.einsum("gi,gij,gj->g", apart, own, apart) + 0.5 * np.linalg.slogdet(own)[1]
         gross = -0.5 * np.einsum("gi,gi->g", apart, np.linalg.solve(wide, apart[:, :, None])[:, :, 0])
         gross -= 0.5 * np.linalg.slogdet(wide)[1]

@@ -17,8 +17,8 @@ from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.refitting import Refit
-from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening, log_unknown
-from warpbrain.diagnosis.single_points import log_gain, log_gross, log_odds
+from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening
+from warpbrain.diagnosis.single_points import log_evidence_and_odds
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ class Stage:
     p_value: float
     kappa: float
     fits: dict[str, Refit]
-    _known_odds: dict[Refit, Floats] = field(default_factory=dict, init=False, repr=False)
+    _known: dict[Refit, tuple[float, Floats]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def explanation(self) -> Explanation:
@@ -109,7 +109,7 @@ class Stage:
 
     def _gross(self, fit: Refit) -> float:
         """What a refit gains where single points may be gross errors."""
-        return log_gain(fit.state.sensors, self._odds(fit))
+        return self._evidence_and_odds(fit)[0] - fit.log_evidence
 
     def _gain(self, kind: str, none: float) -> float:
         """Log evidence of the refit of a kind less that without it; of what changes in time, of the change alone."""
@@ -133,16 +133,15 @@ class Stage:
 
         values = {**self.log_evidence(), "none": 0.0}
         weights = softmax([values[kind] for kind in self.fits])
-        chances = [expit(self._odds(fit)) for fit in self.fits.values()]
+        chances = [expit(self._evidence_and_odds(fit)[1]) for fit in self.fits.values()]
         return np.asarray(weights @ np.array(chances) > 0.5)
 
-    def _odds(self, fit: Refit) -> Floats:
-        # an inverse of the size of the sensors, which the evidence and the judge ask for in turn
-        if fit not in self._known_odds:
-            self._known_odds[fit] = log_odds(
-                fit.state.sensors, self.explanation.factor, fit.columns, fit.linear, fit.kappa
-            )
-        return self._known_odds[fit]
+    def _evidence_and_odds(self, fit: Refit) -> tuple[float, Floats]:
+        # which the evidence and the judge ask for in turn
+        if fit not in self._known:
+            explanation = fit.explanation(self.explanation.factor)
+            self._known[fit] = log_evidence_and_odds(fit.state.sensors, explanation, fit.linear)
+        return self._known[fit]
 
     def over_places(self, kind: str) -> float:
         """What the best of the places and levels of a kind loses where all of them are averaged over.
@@ -162,14 +161,16 @@ class Stage:
 
     def _unknown(self, fit: Refit) -> float:
         """Log evidence of any smooth force beside a fit, where single points may be gross errors."""
+        from scipy.special import logsumexp
+
         explanation = fit.explanation(self.explanation.factor)
         forces = self.base.smooth_forces
         loose = [explanation.with_more(force) for force in forces]
         white = explanation.whitened(fit.linear)[:, None]
-        best = int(np.argmax([one.log_marginal(white)[0] for one in loose]))
-        columns, kappa = loose[best].nuisances, loose[best].best_kappa(white[:, 0])
-        gross = log_gross(fit.state.sensors, self.explanation.factor, columns, fit.linear, kappa)
-        return float(log_unknown(loose, white)[0]) + gross
+        plain = [float(one.log_marginal(white)[0]) for one in loose]
+        best = int(np.argmax(plain))
+        gross = log_evidence_and_odds(fit.state.sensors, loose[best], fit.linear)[0] - plain[best]
+        return float(logsumexp(plain) - np.log(len(plain))) + gross
 
 
 def compared(
