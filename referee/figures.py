@@ -90,6 +90,7 @@ def _accuracy(file: Path, effects: Sequence[Outcome]) -> None:
     ticks = [f"{bin_name(low, high)}\n({count})" for (low, high), count in zip(BINS, counts, strict=True)]
     axes.set_xticks(range(len(BINS)), ticks)
     axes.set(ylim=(0, 1.05), xlabel="detectability of the effect (cases)", ylabel="share, with 95 % interval")
-    axes.legend(loc="upper left", frameon=False)
+    # above the axes: intervals of few cases reach everywhere within
+    figure.legend(loc="outside upper center", ncols=len(series), frameon=False)
     figure.savefig(file, dpi=150)
     plt.close(figure)
