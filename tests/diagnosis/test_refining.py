@@ -1,37 +1,21 @@
 """A patch that lets go between the places of a scan: found, with its centre and radius."""
 
-import copy
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from loosened_block import loosened
 
-from warpbrain.diagnosis.dictionary import BETWEEN, RADII, candidates_at, dictionary_of, patch_of
-from warpbrain.diagnosis.effects import Effects
+from warpbrain.diagnosis.dictionary import BETWEEN, RADII
 from warpbrain.diagnosis.parameters import values_of
 from warpbrain.diagnosis.refining import refined
 from warpbrain.diagnosis.screening import log_places
-from warpbrain.diagnosis.stage import Stage, compared, linear_point
+from warpbrain.diagnosis.stage import Stage, linear_point
 
 CENTRE, RADIUS = np.array([0.036, 0.024, 0.0]), 0.027
 
 
 @pytest.fixture(scope="module")
 def stage(small_diagnosis) -> Stage:
-    """A block that something holds at its bottom, which lets go on a patch that no scan has the place of."""
-    base = small_diagnosis.base
-    mesh = base.at.system.model.mesh
-    held = mesh.node_sets["bottom"]
-    at = copy.copy(base.at)
-    at._surfaces, at._of_surfaces = {}, {}
-    at.reactions = np.where(held[:, None], np.array([0.04, 0.02, -0.05]), 0.0)
-    base = replace(base, at=at, effects=Effects(at))
-    candidates = candidates_at(dictionary_of(small_diagnosis.case, ["contact"]), base.effects, {})
-    patch = patch_of(mesh, "bottom", held, CENTRE, RADIUS)
-    lifting = next(e for e in candidates.effects if e.proposed.make(e.proposed.mean).state == "lifting")
-    truth = base.effects.of([lifting.proposed.of_patch(patch)])[0].mean
-    residual = truth + base.explanation.factor @ np.random.default_rng(2).normal(size=len(truth))
-    return compared(base, (), candidates, base.explanation, residual, 1.0, 40, np.random.default_rng(3))
+    return loosened(small_diagnosis, CENTRE, RADIUS, "lifting")
 
 
 def test_a_patch_is_found_between_places(stage):
