@@ -13,6 +13,7 @@ from warpbrain.mesh import (
     nodes_of,
     pinched_nodes,
     split_boundary,
+    tangents,
 )
 
 
@@ -98,3 +99,13 @@ def test_pinched_nodes():
     assert points[found].tolist() == [[1, 1, 0], [1, 1, 1]]
     at_a_corner = (cell == (0, 0, 0)).all(axis=1) | (cell == (1, 1, 1)).all(axis=1)
     assert points[pinched_nodes(boundary_faces(tets[at_a_corner]))].tolist() == [[1, 1, 1]]
+
+
+@pytest.mark.parametrize("shape", [(3,), (7, 3)])
+def test_tangents_are_at_right_angles_to_their_direction_and_to_each_other(shape):
+    normals = np.random.default_rng(1).normal(size=shape)
+    along = tangents(normals)
+    assert along.shape == (*shape[:-1], 2, 3)
+    np.testing.assert_allclose(np.einsum("...ki,...i->...k", along, normals), 0.0, atol=1e-14)
+    gram = np.einsum("...ki,...li->...kl", along, along)
+    np.testing.assert_allclose(gram, np.broadcast_to(np.eye(2), gram.shape), atol=1e-14)

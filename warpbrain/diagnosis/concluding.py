@@ -21,7 +21,8 @@ def named_together(stages: Sequence[Stage], judged: Sequence[Judgement]) -> tupl
     if not found:
         return ()
     final = stages[len(found) - 1].fits[found[-1].kind]
-    for k, effect in enumerate(final.effects):
+    # the last one was judged by this very fit
+    for k, effect in enumerate(final.effects[:-1]):
         if effect.proposed.of_patch is not None:
             # where it lets go was averaged over places
             continue

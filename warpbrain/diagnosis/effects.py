@@ -161,8 +161,7 @@ class Effects:
     def _effect(self, proposal: Proposal, answers: Floats) -> Effect:
         if proposal.is_there_or_not:
             if proposal.follows == "release":
-                patch = proposal.patch
-                assert patch is not None
+                patch = proposal.released
                 answer = self.at.released(patch.members, patch.held, _lifts(proposal.make(proposal.mean)))
             else:
                 answer = self._solved.there(proposal.make(proposal.mean))

@@ -37,6 +37,13 @@ def kappa_log_prior(kappas: Floats = KAPPAS, sd: float = KAPPA_SD) -> Floats:
     return np.asarray(found - logsumexp(found))
 
 
+def log_mean(logs: Floats) -> Floats:
+    """Logarithm of the mean over the first axis of what these are the logarithms of."""
+    from scipy.special import logsumexp
+
+    return np.asarray(logsumexp(logs, axis=0) - np.log(len(logs)))
+
+
 @dataclass(frozen=True, eq=False)
 class Stack:
     """Effects side by side, whitened: columns of each (its mean first), and which are whose.

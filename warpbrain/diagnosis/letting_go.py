@@ -79,7 +79,7 @@ def where_it_lets_go(stage: Stage, kind: str) -> Placed:
         tried.extend(_tried(stage, mesh, alike))
     if not tried:
         # of a surface that lets go as a whole, and is larger than any patch
-        whole = [_patch(one) for one in proposals]
+        whole = [one.released for one in proposals]
         weights = softmax(stage.screen.places[probable, 0] / BODIES.temperature)
         return _mean(np.array([one.centre for one in whole]), np.array([one.radius for one in whole]), weights)
     effects = list({id(one.effect): one.effect for one in tried}.values())
@@ -99,30 +99,25 @@ class _Tried:
     effect: Effect
 
 
-def _patch(proposal: Proposal) -> Patch:
-    assert proposal.patch is not None
-    return proposal.patch
-
-
 def _by_what_they_do(proposals: Sequence[Proposal]) -> list[list[Proposal]]:
     """Proposals that do the same on patches of the same surface."""
     found: dict[str, list[Proposal]] = {}
     any_of: dict[str, Patch] = {}
     for one in proposals:
         assert one.of_patch is not None
-        same = one.of_patch(any_of.setdefault(_patch(one).surface, _patch(one)))
+        same = one.of_patch(any_of.setdefault(one.released.surface, one.released))
         found.setdefault(repr(same.make(same.mean)), []).append(one)
     return list(found.values())
 
 
 def _tried(stage: Stage, mesh: TetMesh, proposals: Sequence[Proposal]) -> list[_Tried]:
     """Patches of any radius about nodes and edges of a surface that are near to some that do the same."""
-    patch, make = _patch(proposals[0]), proposals[0].of_patch
+    patch, make = proposals[0].released, proposals[0].of_patch
     assert make is not None
     faces = mesh.boundary[patch.held[mesh.boundary].all(axis=1)]
     edges = np.unique(np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0)
     centres = np.concatenate([mesh.points[np.unique(faces)], mesh.points[edges].mean(axis=1)])
-    near = np.array([_patch(one).centre for one in proposals])
+    near = np.array([one.released.centre for one in proposals])
     distances = np.linalg.norm(centres[:, None] - near, axis=2).min(axis=1)
     known: dict[bytes, Effect | None] = {}
     found = []

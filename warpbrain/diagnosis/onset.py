@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.effects import Effect
+from warpbrain.diagnosis.evidence import log_mean
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, log_places, log_unknown
 from warpbrain.diagnosis.time_courses import TimeCourse, time_courses
 
@@ -91,8 +92,6 @@ def _best_effects(kind: str, candidates: Candidates, screen: Screen) -> list[Eff
 
 def _log_evidence(base: Base, effects: list[Effect], factor: Floats) -> float:
     """Log density of the residual with what follows a factor (n,) on each row; without effects: any smooth force."""
-    from scipy.special import logsumexp
-
     whitened = base.whitened[:, None]
     if not effects:
         loose = [base.explanation.with_more(factor[:, None] * columns) for columns in base.constant_forces]
@@ -101,7 +100,7 @@ def _log_evidence(base: Base, effects: list[Effect], factor: Floats) -> float:
         replace(effect, mean=factor * effect.mean, columns=factor[:, None] * effect.columns) for effect in effects
     ]
     found = log_places(base.explanation, base.explanation.stack(scaled), whitened)[:, 0]
-    return float(logsumexp(found)) - float(np.log(len(found)))
+    return float(log_mean(found))
 
 
 def _summary(edges: list[float], courses: list[TimeCourse], evidence: Floats) -> Onset:

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import Inner
-from warpbrain.diagnosis.refining import Refined
+from warpbrain.diagnosis.refining import Refined, spread_of_place
 from warpbrain.diagnosis.screening import log_places
 from warpbrain.diagnosis.stage import Stage
 from warpbrain.errors import SolveError
-from warpbrain.mesh import TetMesh, face_vectors
+from warpbrain.mesh import TetMesh, face_vectors, tangents
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import Proposal
 
@@ -28,9 +28,8 @@ Floats = NDArray[np.float64]
 
 #: Parts of a step of the scan by which a place is moved, one after the other; and how often each at most.
 _STEPS, _MOVES = (0.5, 0.25), 6
-#: Standard deviation in steps where a normal density is at its middle what a uniform one in the step is; and the most
-#: that neighbours tell of, in such.
-_CELL, _WIDEST = 1.0 / np.sqrt(2.0 * np.pi), 3.0
+#: Standard deviation in steps where a normal density is at its middle what a uniform one in the step is.
+_CELL = 1.0 / np.sqrt(2.0 * np.pi)
 #: Standard deviation of the logarithm of a radius of which nobody knows how sharply it ends: a ball with an edge has as
 #: much in it as one that falls off smoothly to twice a radius which is 16 % smaller.
 _PROFILE = 0.15
@@ -127,14 +126,9 @@ class _Scan:
 
     def spread(self, best: Proposal, directions: Floats) -> Floats:
         """Standard deviation (d + 1,) of the place beforehand: a step of the scan, and what the scan leaves open."""
-        from scipy.special import softmax
-
         assert best.centre is not None and best.radius is not None
         at = np.column_stack([(self._centres - best.centre) @ directions.T, np.log(self._radii / best.radius)])
-        weights = softmax(self._stage.screen.places[self._numbers, 0])
-        open_ = weights @ (at - weights @ at) ** 2
-        cell = _CELL * self.steps(directions)
-        return np.asarray(np.minimum(np.sqrt(cell**2 + open_), _WIDEST * cell))
+        return spread_of_place(at, self._stage.screen.places[self._numbers, 0], _CELL * self.steps(directions))
 
 
 def _typical_distance(points: Floats) -> float:
@@ -161,8 +155,7 @@ def _on_surface(mesh: TetMesh, point: Floats) -> Floats:
 
 def _tangents(mesh: TetMesh, point: Floats) -> Floats:
     """Two directions (2, 3) along the surface."""
-    _, normal = _nearest_face(mesh, point)
-    return np.asarray(np.linalg.svd(normal[None])[2][1:])
+    return tangents(_nearest_face(mesh, point)[1])
 
 
 def _wider(stage: Stage, best: Effect, scan: _Scan) -> Effect:

@@ -19,7 +19,7 @@ from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.screening import log_places
 from warpbrain.diagnosis.stage import Stage
 from warpbrain.errors import SolveError
-from warpbrain.mesh import TetMesh, face_vectors
+from warpbrain.mesh import TetMesh, face_vectors, tangents
 from warpbrain.physics.proposal import Patch, Proposal
 
 Floats = NDArray[np.float64]
@@ -69,25 +69,20 @@ def refined(stage: Stage, number: int) -> Refined:
         if chosen == 0 or _same(effects[chosen], best):
             break
         best = effects[chosen]
-    tangents = _tangents(mesh, _patch(best.proposed))
-    coordinates = np.array([_coordinates(one.proposed, best.proposed, tangents) for one in effects])
+    along = _tangents(mesh, best.proposed.released)
+    coordinates = np.array([_coordinates(one.proposed, best.proposed, along) for one in effects])
     slopes = _slopes(coordinates, np.array([one.mean for one in effects]))
-    sd = _spread(stage, number, best.proposed, tangents)
-    return Refined(_effect(best, tangents, slopes, sd), slopes * _unresolved(mesh, _patch(best.proposed)))
-
-
-def _patch(proposal: Proposal) -> Patch:
-    assert proposal.patch is not None
-    return proposal.patch
+    sd = _spread(stage, number, best.proposed, along)
+    return Refined(_effect(best, along, slopes, sd), slopes * _unresolved(mesh, best.proposed.released))
 
 
 def _same(first: Effect, second: Effect) -> bool:
-    return np.array_equal(_patch(first.proposed).members, _patch(second.proposed).members)
+    return np.array_equal(first.proposed.released.members, second.proposed.released.members)
 
 
 def _neighbours(stage: Stage, mesh: TetMesh, proposal: Proposal) -> list[Effect]:
     """Of patches with a centre within a step of the scan, and a radius."""
-    patch, make = _patch(proposal), proposal.of_patch
+    patch, make = proposal.released, proposal.of_patch
     assert make is not None
     nodes = np.flatnonzero(patch.held & (np.linalg.norm(mesh.points - patch.centre, axis=1) <= BETWEEN))
     centres = [patch.centre, *mesh.points[nodes]]
@@ -109,13 +104,13 @@ def _tangents(mesh: TetMesh, patch: Patch) -> Floats:
     """Two directions (2, 3) along the surface of a patch."""
     faces = mesh.boundary[patch.members[mesh.boundary].all(axis=1)]
     outward = face_vectors(mesh.points, faces).sum(axis=0)
-    return np.asarray(np.linalg.svd(outward[None])[2][1:])
+    return tangents(outward)
 
 
-def _coordinates(proposal: Proposal, origin: Proposal, tangents: Floats) -> Floats:
+def _coordinates(proposal: Proposal, origin: Proposal, along: Floats) -> Floats:
     """Of a patch about another: along both tangents [m], and the logarithm of its radius."""
-    one, other = _patch(proposal), _patch(origin)
-    return np.array([*(tangents @ (one.centre - other.centre)), np.log(one.radius / other.radius)])
+    one, other = proposal.released, origin.released
+    return np.array([*(along @ (one.centre - other.centre)), np.log(one.radius / other.radius)])
 
 
 def _slopes(coordinates: Floats, answers: Floats) -> Floats:
@@ -124,18 +119,33 @@ def _slopes(coordinates: Floats, answers: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(design, answers, rcond=1e-6)[0][1:].T) / _CELL
 
 
-def _spread(stage: Stage, number: int, best: Proposal, tangents: Floats) -> Floats:
+def _spread(stage: Stage, number: int, best: Proposal, along: Floats) -> Floats:
     """Standard deviation (3,) of the coordinates beforehand: a step of the scan, and what the scan leaves open."""
+    effects = stage.candidates.effects
+    region = effects[number].proposed.released.held
+    own = next(own for own in stage.candidates.of_kind.values() if number in own)
+    alike = [k for k in own.tolist() if np.array_equal(effects[k].proposed.released.held, region)]
+    at = np.array([_coordinates(effects[k].proposed, best, along) for k in alike])
+    return spread_of_place(at, stage.screen.places[alike, 0], _CELL)
+
+
+def spread_of_place(at: Floats, evidence: Floats, cell: Floats) -> Floats:
+    """Standard deviation (d,) of a place beforehand: a step of a scan, and what the scan leaves open.
+
+    Parameters
+    ----------
+    at : (v, d) array
+        Coordinates of the places of the scan.
+    evidence : (v,) array
+        Theirs, logarithms.
+    cell : (d,) array
+        Standard deviation within a step.
+    """
     from scipy.special import softmax
 
-    effects = stage.candidates.effects
-    region = _patch(effects[number].proposed).held
-    own = next(own for own in stage.candidates.of_kind.values() if number in own)
-    alike = [k for k in own.tolist() if np.array_equal(_patch(effects[k].proposed).held, region)]
-    at = np.array([_coordinates(effects[k].proposed, best, tangents) for k in alike])
-    weights = softmax(stage.screen.places[alike, 0])
+    weights = softmax(evidence)
     open_ = weights @ (at - weights @ at) ** 2
-    return np.minimum(np.sqrt(_CELL**2 + open_), _WIDEST * _CELL)
+    return np.asarray(np.minimum(np.sqrt(cell**2 + open_), _WIDEST * cell))
 
 
 def _unresolved(mesh: TetMesh, patch: Patch) -> Floats:
@@ -146,11 +156,11 @@ def _unresolved(mesh: TetMesh, patch: Patch) -> Floats:
     return np.array([edge, edge, edge / patch.radius]) / np.sqrt(12.0)
 
 
-def _effect(best: Effect, tangents: Floats, slopes: Floats, sd: Floats) -> Effect:
-    proposal, patch = best.proposed, _patch(best.proposed)
+def _effect(best: Effect, along: Floats, slopes: Floats, sd: Floats) -> Effect:
+    proposal, patch = best.proposed, best.proposed.released
 
     def place(c: Floats) -> tuple[Floats, float]:
-        return patch.centre + c[1:3] @ tangents, patch.radius * float(np.exp(c[3]))
+        return patch.centre + c[1:3] @ along, patch.radius * float(np.exp(c[3]))
 
     wider = replace(
         proposal,

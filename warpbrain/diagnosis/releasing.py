@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import SolveError
+from warpbrain.mesh import tangents
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -67,7 +68,7 @@ class HeldSurface:
             whole[:, part] -= towards.T @ factors.solve(np.asarray(towards[:, part].todense()))
         self._towards = towards
         # two tangents and the normal
-        along = np.linalg.svd(normals[self.members][:, None])[2][:, 1:]
+        along = tangents(normals[self.members])
         self._frames = np.concatenate([along, normals[self.members][:, None]], axis=1)
         turned = np.einsum("aki,aibj,blj->akbl", self._frames, whole.reshape(count, 3, count, 3), self._frames)
         self._S = turned.reshape(3 * count, 3 * count)

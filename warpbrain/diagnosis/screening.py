@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Stack, kappa_log_prior
+from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Stack, kappa_log_prior, log_mean
 
 Floats = NDArray[np.float64]
 
@@ -46,9 +46,7 @@ class Screen:
     @property
     def alarm(self) -> Floats:
         """Log Bayes factor (b,) of anything missing: the mean over kinds."""
-        from scipy.special import logsumexp
-
-        return np.asarray(logsumexp(self.log_factors, axis=0) - np.log(len(self.log_factors)))
+        return log_mean(self.log_factors)
 
     def best_effect(self, candidates: Candidates, kind: str, number: int = 0) -> int:
         """Number of the most probable effect of a kind."""
@@ -110,9 +108,7 @@ class Screening:
         return Screen((*self.candidates.kinds, UNKNOWN), none, np.vstack([by_kind, unknown]), places)
 
     def _by_kind(self, places: Floats) -> Floats:
-        from scipy.special import logsumexp
-
-        rows = [logsumexp(places[own], axis=0) - np.log(len(own)) for own in self.candidates.of_kind.values()]
+        rows = [log_mean(places[own]) for own in self.candidates.of_kind.values()]
         return np.array(rows).reshape(len(rows), places.shape[1])
 
 
@@ -127,7 +123,4 @@ def log_places(explanation: Explanation, stack: Stack, residuals: Floats, kappas
 
 def log_unknown(flexible: Sequence[Explanation], residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
     """Log density (b,) of whitened residuals with a force of any of some lengths and sizes, all alike likely."""
-    from scipy.special import logsumexp
-
-    found = [explanation.log_marginal(residuals, kappas) for explanation in flexible]
-    return np.asarray(logsumexp(np.array(found), axis=0) - np.log(len(found)))
+    return log_mean(np.array([explanation.log_marginal(residuals, kappas) for explanation in flexible]))

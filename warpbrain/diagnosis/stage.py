@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.effects import Effect, Effects
-from warpbrain.diagnosis.evidence import Explanation
+from warpbrain.diagnosis.evidence import Explanation, log_mean
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening
@@ -60,6 +60,7 @@ class Stage:
     kappa: float
     fits: dict[str, Refit]
     _known: dict[Refit, tuple[float, Floats]] = field(default_factory=dict, init=False, repr=False)
+    _unknowns: dict[Refit, float] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def explanation(self) -> Explanation:
@@ -148,12 +149,10 @@ class Stage:
 
         Of a refit that has its place among its coefficients: of all places as many as it is averaged over already.
         """
-        from scipy.special import logsumexp
-
         own = self.screen.places[self.candidates.of_kind[kind], 0]
         if kind in self.fits and (proposal := self.fits[kind].effects[-1].proposed).placing:
             return proposal.log_covered - float(np.log(len(own)))
-        return float(logsumexp(own)) - float(np.log(len(own))) - float(own.max())
+        return float(log_mean(own)) - float(own.max())
 
     def beside_unknown(self, kind: str) -> float:
         """Log evidence of the refit of a kind beside any smooth force, against that force without it."""
@@ -161,16 +160,20 @@ class Stage:
 
     def _unknown(self, fit: Refit) -> float:
         """Log evidence of any smooth force beside a fit, where single points may be gross errors."""
-        from scipy.special import logsumexp
+        # as above
+        if fit not in self._unknowns:
+            self._unknowns[fit] = self._with_any_force(fit)
+        return self._unknowns[fit]
 
+    def _with_any_force(self, fit: Refit) -> float:
         explanation = fit.explanation(self.explanation.factor)
         forces = self.base.smooth_forces
         loose = [explanation.with_more(force) for force in forces]
         white = explanation.whitened(fit.linear)[:, None]
-        plain = [float(one.log_marginal(white)[0]) for one in loose]
+        plain = np.array([one.log_marginal(white)[0] for one in loose])
         best = int(np.argmax(plain))
-        gross = log_evidence_and_odds(fit.state.sensors, loose[best], fit.linear)[0] - plain[best]
-        return float(logsumexp(plain) - np.log(len(plain))) + gross
+        gross = log_evidence_and_odds(fit.state.sensors, loose[best], fit.linear)[0] - float(plain[best])
+        return float(log_mean(plain)) + gross
 
 
 def compared(

@@ -3,8 +3,8 @@
 1. No alarm if the global test is not significant: nothing missing, with what would have been seen.
 2. Named if one mechanism is probable enough, predicts points that it was not fitted to better than without it and than
    patterns that mean nothing, has a plausible size, and leaves nothing significant. Named + rest if something is left.
+   That may be all of it: then the name must be probable enough beside any smooth force, too.
 3. Not physics if a nuisance far larger than it should be explains the residuals better than any mechanism.
-   Something that is left may be all of it: then the name must be probable enough beside any smooth force, too.
 4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is, and predicts points
    that it was not fitted to better; or if it may be, and the best mechanism leaves something significant: then a force
    without a name acts in either case. Else: cannot say. A weak alarm is never more than that, nor are recordings of

@@ -17,6 +17,7 @@ from warpbrain.mesh.surface import (
     nodes_of,
     pinched_nodes,
     split_boundary,
+    tangents,
     vertex_normals,
 )
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
@@ -42,6 +43,7 @@ __all__ = [
     "read_mesh_file",
     "split_boundary",
     "surface_forces",
+    "tangents",
     "vertex_normals",
     "volume_forces",
     "write_mesh",

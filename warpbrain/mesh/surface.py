@@ -210,6 +210,11 @@ def face_vectors(points: ArrayLike, faces: ArrayLike) -> Floats:
     return np.asarray(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) / 2.0)
 
 
+def tangents(normals: ArrayLike) -> Floats:
+    """Two unit vectors (..., 2, 3) at right angles to directions (..., 3), and to each other."""
+    return np.asarray(np.linalg.svd(np.asarray(normals, dtype=np.float64)[..., None, :])[2][..., 1:, :])
+
+
 def vertex_normals(mesh: TetMesh) -> Floats:
     """Outward unit normals (n, 3) at the nodes of the boundary, means over their faces; zero at all other nodes."""
     faces = mesh.boundary

@@ -229,6 +229,12 @@ class Proposal:
         ]
 
     @property
+    def released(self) -> Patch:
+        """The patch of what lets go."""
+        assert self.patch is not None
+        return self.patch
+
+    @property
     def is_there_or_not(self) -> bool:
         """Whether it has no size, only a share that says how exactly it is simulated."""
         return self.follows in ("switch", "release")

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.mesh import QuadraticMesh, TetMesh, volume_forces
+from warpbrain.mesh import QuadraticMesh, TetMesh, tangents, volume_forces
 from warpbrain.physics.directions import unit_vector
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Load
@@ -119,7 +119,7 @@ class Gravity(Load, Mechanism):
         down = unit_vector("gravity_axis", situation.gravity_axis)
         lowest = float((-points @ down).min())
         height = float(np.ptp(points @ down))
-        across = np.linalg.svd(down[None])[2][1:]
+        across = tangents(down)
         found = []
         for level in np.linspace(-0.05, 0.9, _LEVELS) * height:
 
