@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from functools import cache
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.course import Course
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.sensors import Sensors
+from warpbrain.diagnosis.sparse_columns import SparseColumns
 from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
@@ -25,6 +27,9 @@ Floats = NDArray[np.float64]
 _STEP = 1e-3
 #: The same of a course.
 _STEP_OF_COURSE = 0.05
+#: What acts by forces on nodes, and all that a mechanism may act by.
+_PUSHING: frozenset[type] = frozenset((Load, Following, Substituting))
+_ACTING = _PUSHING | {Weakening, Growing}
 
 
 class Solved(Protocol):
@@ -182,37 +187,40 @@ class Effects:
                     total[:, same] -= self._added([own], None)
         return total
 
-    def _added(self, mechanisms: Sequence[Mechanism], present: Mechanism | None) -> Floats:
+    def _added(self, mechanisms: Sequence[Any], present: Mechanism | None) -> Floats:
         """What each mechanism changes beside all that acts, (n, count)."""
         at, system = self.at, self.at.system
         mesh = system.model.mesh
         stiff = present.stiffness_factor(mesh, 1.0) if isinstance(present, Weakening) else 1.0
         large = 1.0 + present.growth(mesh, 1.0) if isinstance(present, Growing) else 1.0
-        count = len(mechanisms)
-        forces = np.zeros((count, system.size, 3))
-        stiffer = np.zeros((count, system.elements))
-        larger = np.zeros((count, system.elements))
+        pushed = SparseColumns(3 * system.size)
+        stiffer, larger = SparseColumns(system.elements), SparseColumns(system.elements)
         for number, mechanism in enumerate(mechanisms):
-            factor = mechanism.factor()
-            if isinstance(mechanism, Load):
-                forces[number] += factor * mechanism.nodal_forces(mesh)
-            if isinstance(mechanism, Following):
-                forces[number] -= self._following(mechanism)
-            if isinstance(mechanism, Substituting):
-                forces[number] -= self._substituting(mechanism)
-            if isinstance(mechanism, Weakening):
-                stiffer[number] = mechanism.stiffness_factor(mesh, factor) / stiff - 1.0
-            if isinstance(mechanism, Growing):
-                larger[number] = (1.0 + mechanism.growth(mesh, factor)) / large - 1.0
-        total = np.zeros((len(at.sensors), count))
-        pushed = forces.any(axis=(1, 2))
-        if pushed.any():
-            total[:, pushed] += at.answers(forces[pushed])
+            factor, faces = mechanism.factor(), _faces(mechanism.__class__)
+            if not faces.isdisjoint(_PUSHING):
+                pushed.add(number, self._forces(mechanism, faces).ravel())
+            if Weakening in faces:
+                stiffer.add(number, mechanism.stiffness_factor(mesh, factor) / stiff - 1.0)
+            if Growing in faces:
+                larger.add(number, (1.0 + mechanism.growth(mesh, factor)) / large - 1.0)
+        total = np.zeros((len(at.sensors), len(mechanisms)))
+        if pushed.numbers:
+            total[:, pushed.numbers] += at.answers_of_columns(pushed.matrix())
         for weights, own in ((stiffer, "element_forces"), (larger, "growth_forces")):
-            altered = weights.any(axis=1)
-            if altered.any():
-                total[:, altered] += at.answers_of_elements(getattr(at, own), weights[altered].T)
+            if weights.numbers:
+                total[:, weights.numbers] += at.answers_of_elements(getattr(at, own), weights.matrix())
         return total
+
+    def _forces(self, mechanism: Any, faces: frozenset[type]) -> Floats:
+        """Nodal forces (N, 3) of a mechanism with these faces."""
+        found = np.zeros((self.at.system.size, 3))
+        if Load in faces:
+            found += mechanism.factor() * mechanism.nodal_forces(self.at.system.model.mesh)
+        if Following in faces:
+            found -= self._following(mechanism)
+        if Substituting in faces:
+            found -= self._substituting(mechanism)
+        return found
 
     def _following(self, mechanism: Following) -> Floats:
         """Internal forces (N, 3) of a term that is not there."""
@@ -250,6 +258,12 @@ class Effects:
         found = at.internal_forces() - self._internal
         system.set_materials(own)
         return found
+
+
+@cache
+def _faces(kind: Hashable) -> frozenset[type]:
+    """What mechanisms of a class act by: asked of thousands, and a protocol is slow to answer."""
+    return frozenset(face for face in _ACTING if issubclass(cast(type, kind), face))
 
 
 def faded(parts: Floats, is_displacement: NDArray[np.bool_]) -> Floats:

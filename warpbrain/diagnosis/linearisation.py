@@ -140,18 +140,28 @@ class Linearisation:
         flat = np.asarray(forces).reshape(-1, len(self._free))
         return self._answers(flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
 
+    def answers_of_columns(self, forces: Any) -> Floats:
+        """The same of forces that act here and there, SciPy CSC (3 N, k): (n, k)."""
+        return self._answers(forces)
+
     def _answers(self, forces: Any) -> Floats:
         """What forces (3 N, k) change: by the compliance, or by equilibria if that is fewer of them."""
+        from scipy.sparse import issparse
+
         count = forces.shape[1]
         if "compliance" in self.__dict__ or count >= len(self.sensors):
             return np.asarray(self.compliance @ forces)
+        forces = forces.toarray() if issparse(forces) else forces
         du = np.zeros((len(self._free), count))
         du[self._free] = self._factors.solve(np.ascontiguousarray(forces[self._free]))
         dR = np.where(self._free[:, None], 0.0, self.stiffness @ du - forces)
         return np.asarray(self.sensors.by_displacement @ du + self.sensors.by_reactions @ dR)
 
-    def answers_of_elements(self, element_forces: Floats, weights: Floats) -> Floats:
-        """What internal forces of elements (m, 4, 3) [N], times weights (m, k), change: (n, k)."""
+    def answers_of_elements(self, element_forces: Floats, weights: Any) -> Floats:
+        """What internal forces of elements (m, 4, 3) [N], times weights (m, k), change: (n, k).
+
+        Weights are an array, or SciPy CSC where most of them are zero.
+        """
         from scipy.sparse import csr_matrix
 
         nodes = self.system.tetrahedra
@@ -159,7 +169,7 @@ class Linearisation:
         rows = (3 * nodes[:, :, None] + np.arange(3)).ravel()
         columns = np.repeat(np.arange(elements), 12)
         gather: Any = csr_matrix((element_forces.ravel(), (rows, columns)), (len(self._free), elements))
-        return -self._answers(np.asarray(gather @ weights))
+        return -self._answers(gather @ weights)
 
     @cached_property
     def element_forces(self) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ def _orbits(*orbits: tuple[float, tuple[float, ...]]) -> tuple[Floats, Floats]:
     return np.concatenate(points), weights
 
 
+@cache
 def triangle_rule() -> tuple[Floats, Floats]:
     """Six points of a rule of degree 4 on a triangle (Dunavant 1985): barycentric points (6, 3), weights (6,)."""
     a, b = 0.445948490915965, 0.091576213509771
@@ -61,33 +63,43 @@ def volume_forces(mesh: TetMesh | QuadraticMesh, density: Field) -> Floats:
         return np.asarray(mesh.node_volumes[:, None] * density(mesh.points))
     bary, weights = tetrahedron_rule()
     corners = mesh.points[mesh.elements[:, :4]]
-    return _summed(mesh, mesh.elements, corners, mesh.corners.volumes, bary, weights, shape_values(bary), density)
+    sizes = weights[:, None] * mesh.corners.volumes
+    return _summed(mesh, mesh.elements, _points_on(corners, bary), sizes, shape_values(bary), density)
 
 
 def surface_forces(mesh: TetMesh | QuadraticMesh, traction: Field) -> Floats:
     """Forces (n, 3) [N] of a force on the boundary [Pa], by a rule of degree 4 on each triangle."""
-    linear = mesh if isinstance(mesh, TetMesh) else mesh.corners
-    faces = linear.boundary
-    areas = np.linalg.norm(face_vectors(linear.points, faces), axis=1)
-    bary, weights = triangle_rule()
+    bary, _ = triangle_rule()
     if isinstance(mesh, TetMesh):
-        return _summed(mesh, faces, mesh.points[faces], areas, bary, weights, bary, traction)
-    return _summed(mesh, mesh.faces, mesh.points[faces], areas, bary, weights, shape_values(bary), traction)
+        return _summed(mesh, mesh.boundary, *mesh.boundary_rule, bary, traction)
+    return _summed(mesh, mesh.faces, *mesh.corners.boundary_rule, shape_values(bary), traction)
+
+
+def rule_on_boundary(mesh: TetMesh) -> tuple[Floats, Floats]:
+    """Points (q, b, 3) [m] of the rule on the triangles of a boundary, and for what area (q, b) [m2] each stands."""
+    bary, weights = triangle_rule()
+    areas = np.linalg.norm(face_vectors(mesh.points, mesh.boundary), axis=1)
+    return _points_on(mesh.points[mesh.boundary], bary), weights[:, None] * areas
+
+
+def _points_on(corners: Floats, bary: Floats) -> Floats:
+    """Barycentric points (q, c) of elements with corners (k, c, 3): (q, k, 3)."""
+    return np.asarray(np.einsum("qc,kci->qki", bary, corners, optimize=True))
 
 
 def _summed(
     mesh: TetMesh | QuadraticMesh,
     nodes: NDArray[np.integer],
-    corners: Floats,
+    at: Floats,
     sizes: Floats,
-    bary: Floats,
-    weights: Floats,
     shapes: Floats,
     field: Field,
 ) -> Floats:
-    """Sum over elements with nodes (k, s), corners (k, c, 3) and sizes (k,), at points of shape values (q, s)."""
-    at = np.einsum("qc,kci->qki", bary, corners, optimize=True)
-    force = (weights[:, None] * sizes)[:, :, None] * field(at.reshape(-1, 3)).reshape(at.shape)
+    """Sum over elements with nodes (k, s), at points (q, k, 3) that stand for sizes (q, k), shape values (q, s)."""
+    values = field(at.reshape(-1, 3)).reshape(at.shape)
+    # of a patch most elements have nothing
+    acts = np.flatnonzero(values.any(axis=(0, 2)))
+    force = sizes[:, acts, None] * values[:, acts]
     by_node = np.einsum("qs,qki->iks", shapes, force, optimize=True).reshape(3, -1)
-    count = len(mesh.points)
-    return np.column_stack([np.bincount(nodes.ravel(), weights=along, minlength=count) for along in by_node])
+    where, count = nodes[acts].ravel(), len(mesh.points)
+    return np.column_stack([np.bincount(where, weights=along, minlength=count) for along in by_node])

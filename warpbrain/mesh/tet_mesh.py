@@ -179,6 +179,16 @@ class TetMesh:
         return boundary_faces(self.tetrahedra)
 
     @cached_property
+    def boundary_rule(self) -> tuple[Floats, Floats]:
+        """Where fields on the boundary are asked for, and for what area each point stands; made once.
+
+        See `warpbrain.mesh.integrals.rule_on_boundary`.
+        """
+        from warpbrain.mesh.integrals import rule_on_boundary
+
+        return rule_on_boundary(self)
+
+    @cached_property
     def finer(self) -> tuple[TetMesh, Ints]:
         """The mesh with every tetrahedron cut into eight, and between which nodes its own lie; made once.
 

@@ -23,15 +23,15 @@ def draw_slice(axes: Any, anatomy: Anatomy, view: View, place: float, threshold:
 
     mesh = anatomy.mesh
     section = cut(mesh.points, mesh.tetrahedra, np.asarray(anatomy.fields["score"]), view.axis, place)
-    axes.add_patch(PathPatch(_path(section.polygons), facecolor=TISSUE, edgecolor=TISSUE, linewidth=0.3))
+    axes.add_artist(PathPatch(_path(section.polygons), facecolor=TISSUE, edgecolor=TISSUE, linewidth=0.3))
     significant = section.values > threshold
     if significant.any():
         inside = [polygon for polygon, here in zip(section.polygons, significant, strict=True) if here]
-        axes.add_patch(PathPatch(_path(inside), facecolor=TINT, edgecolor=TINT, linewidth=0.3))
+        axes.add_artist(PathPatch(_path(inside), facecolor=TINT, edgecolor=TINT, linewidth=0.3))
     blind = np.asarray(anatomy.fields["blind"])[mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
     if blind.any():
         hidden = [polygon for polygon, here in zip(section.polygons, blind, strict=True) if here]
-        axes.add_patch(
+        axes.add_artist(
             PathPatch(_path(hidden), facecolor="none", edgecolor=HATCHING, hatch="//////", linewidth=0.0, zorder=2.0)
         )
     segments = in_view(level_line(section, threshold))

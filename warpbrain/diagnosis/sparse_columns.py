@@ -1,0 +1,47 @@
+"""Columns of which most are zero almost everywhere, side by side: what thousands of patches do to one mesh."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class SparseColumns:
+    """Collects columns of one length; of those that are zero nothing is kept.
+
+    Parameters
+    ----------
+    size : int
+        Rows.
+
+    Attributes
+    ----------
+    numbers : list of int
+        Under which those that are not zero were added.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.numbers: list[int] = []
+        self._size = size
+        self._rows: list[NDArray[np.int64]] = []
+        self._values: list[Floats] = []
+
+    def add(self, number: int, column: Floats) -> None:
+        """Add a column (size,)."""
+        rows = np.flatnonzero(column)
+        if len(rows):
+            self.numbers.append(number)
+            self._rows.append(rows)
+            self._values.append(column[rows])
+
+    def matrix(self) -> Any:
+        """Those that are not zero: SciPy CSC (size, k), in the order of `numbers`."""
+        from scipy.sparse import csc_matrix
+
+        first = np.cumsum([0, *(len(rows) for rows in self._rows)])
+        shape = self._size, len(self.numbers)
+        return csc_matrix((np.concatenate(self._values), np.concatenate(self._rows), first), shape)
