@@ -8,6 +8,7 @@ from scipy.stats import kstest, multivariate_normal
 
 from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Inner, kappa_log_prior
+from warpbrain.diagnosis.screening import log_places
 
 N = 40
 
@@ -102,3 +103,37 @@ def test_the_evidence_of_a_pair_is_that_of_quadrature() -> None:
     left = np.linalg.solve(factor, residual - first * a - second * b)
     density = np.exp(-0.5 * (np.sum(left**2, axis=0) + a**2 + b**2)) / np.prod(np.diag(factor)) / (2.0 * np.pi) ** 4
     assert pair == pytest.approx(np.log(density.sum() * (z[1] - z[0]) ** 2), rel=1e-6)
+
+
+def test_other_noise_on_some_rows_is_that_of_a_model_made_with_it() -> None:
+    rng = np.random.default_rng(11)
+    known = Explanation(np.linalg.cholesky(np.cov(rng.normal(size=(20, 60)))), rng.normal(size=(20, 4)))
+    rows = np.isin(np.arange(20), [3, 4, 11])
+    factor = np.where(rows, 1e-3, 1.0)[:, None] * known.factor
+    made, found = Explanation(factor, known.nuisances), known.with_noise(rows, 1e-3)
+    columns = rng.normal(size=(20, 5))
+    anew = known.whitened_anew(known.whitened(columns), rows, 1e-3)
+    assert np.allclose(anew, made.whitened(columns), rtol=1e-9)
+    assert np.allclose(found.log_marginal(anew), made.log_marginal(made.whitened(columns)), rtol=1e-10)
+    assert np.allclose(found.inverse_times(columns[:, 0], 1.2), made.inverse_times(columns[:, 0], 1.2), rtol=1e-8)
+
+
+def test_more_nuisances_are_those_of_a_model_made_with_all() -> None:
+    rng = np.random.default_rng(12)
+    known = Explanation(np.linalg.cholesky(np.cov(rng.normal(size=(20, 60)))), rng.normal(size=(20, 4)))
+    # asked for before, or what belongs to fewer nuisances might be kept
+    residual, more = rng.normal(size=20), rng.normal(size=(20, 3))
+    rows = np.arange(20).reshape(-1, 2)
+    known.inverse_blocks(rows, 1.0)
+    found = known.with_more(more)
+    made = Explanation(known.factor, np.column_stack([known.nuisances, more]))
+    assert np.allclose(found.log_marginal(residual[:, None]), made.log_marginal(residual[:, None]), rtol=1e-12)
+    assert np.allclose(found.inverse_blocks(rows, 1.1), made.inverse_blocks(rows, 1.1))
+
+
+def test_a_stack_of_forces_has_the_evidence_of_more_nuisances() -> None:
+    rng = np.random.default_rng(13)
+    known = Explanation(np.diag(rng.uniform(0.5, 2.0, 20)), rng.normal(size=(20, 4)))
+    force, residuals = rng.normal(size=(20, 6)), rng.normal(size=(20, 3))
+    found = log_places(known, known.stack_of_forces([force]), residuals)[0]
+    assert np.allclose(found, known.with_more(force).log_marginal(residuals), rtol=1e-10)

@@ -12,6 +12,7 @@ the size of the nuisances, not of the sensors.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -86,11 +87,17 @@ class Explanation:
     def __init__(self, factor: Floats, nuisances: Floats) -> None:
         self.factor = factor
         self.nuisances = nuisances
-        self._W = self.whitened(nuisances)
-        values, vectors = np.linalg.eigh(self._W.T @ self._W)
+        self._factorise(self.whitened(nuisances))
+
+    def _factorise(self, whitened: Floats) -> None:
+        """Take whitened nuisances (n, q)."""
+        self._W = whitened
+        values, vectors = np.linalg.eigh(whitened.T @ whitened)
         self._D: Floats = np.maximum(values, 0.0)
-        self._WV = self._W @ vectors
-        self._log_det = 2.0 * float(np.log(np.diag(factor)).sum())
+        self._WV = whitened @ vectors
+        self._log_det = 2.0 * float(np.log(np.diag(self.factor)).sum())
+        # what is known of the noise alone stays known
+        self.__dict__.pop("_of_inverse", None)
 
     def whitened(self, rows: Floats) -> Floats:
         """`L^-1` of rows."""
@@ -100,7 +107,27 @@ class Explanation:
 
     def with_more(self, nuisances: Floats) -> Explanation:
         """The same with more nuisances (n, p)."""
-        return Explanation(self.factor, np.concatenate([self.nuisances, nuisances], axis=1))
+        found = copy.copy(self)
+        found.nuisances = np.concatenate([self.nuisances, nuisances], axis=1)
+        found._factorise(np.concatenate([self._W, self.whitened(nuisances)], axis=1))
+        return found
+
+    def with_noise(self, rows: NDArray[np.bool_], times: float) -> Explanation:
+        """The same with the noise of some rows (n,) so many times as large, what they share with others included."""
+        found = copy.copy(self)
+        found.factor = np.where(rows, times, 1.0)[:, None] * self.factor
+        found.__dict__.pop("_inverse_factor", None)
+        found._factorise(self.whitened_anew(self._W, rows, times))
+        return found
+
+    def whitened_anew(self, whitened: Floats, rows: NDArray[np.bool_], times: float) -> Floats:
+        """What is whitened (n, k), whitened by the noise of `with_noise` instead.
+
+        With `D` the diagonal of the factors on the noise, `(D L)^-1 = L^-1 + L^-1 (D^-1 - I)`: of as many columns of
+        `L^-1` as there are such rows.
+        """
+        own = self.whitened(np.eye(self.size)[:, rows])
+        return np.asarray(whitened + (1.0 / times - 1.0) * (own @ (self.factor[rows] @ whitened)))
 
     @property
     def size(self) -> int:
@@ -109,11 +136,17 @@ class Explanation:
 
     def stack(self, effects: Sequence[Effect]) -> Stack:
         """Whiten effects."""
-        counts = [1 + effect.columns.shape[1] for effect in effects]
-        if not effects:
+        return self._stacked([np.column_stack([effect.mean, effect.columns]) for effect in effects])
+
+    def stack_of_forces(self, forces: Sequence[Floats]) -> Stack:
+        """The same of columns (n, k) each, whose mean is zero."""
+        return self._stacked([np.column_stack([np.zeros(self.size), columns]) for columns in forces])
+
+    def _stacked(self, each: Sequence[Floats]) -> Stack:
+        if not each:
             return Stack(np.zeros((self.size, 0)), np.zeros(1, dtype=np.int64))
-        columns = np.concatenate([np.column_stack([effect.mean, effect.columns]) for effect in effects], axis=1)
-        return Stack(self.whitened(columns), np.concatenate([[0], np.cumsum(counts)]))
+        first = np.cumsum([0, *(columns.shape[1] for columns in each)])
+        return Stack(self.whitened(np.concatenate(each, axis=1)), first)
 
     def log_none(self, residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
         """Log density of whitened residuals (n, b) without any cause: (kappas, b)."""

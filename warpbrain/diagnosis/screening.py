@@ -74,8 +74,7 @@ class Screening:
         self.explanation = explanation
         self.candidates = candidates
         self.stack: Stack = explanation.stack(candidates.effects)
-        self.forces = flexible
-        self.flexible = [explanation.with_more(columns) for columns in flexible]
+        self.forces: Stack = explanation.stack_of_forces(flexible)
         lasting = {kind: candidates.effects[own[0]].lasting for kind, own in candidates.of_kind.items()}
         self._lasting = {kind: explanation.with_more(own) for kind, own in lasting.items() if own is not None}
         self._kappas = kappas
@@ -85,14 +84,22 @@ class Screening:
         found, known = copy.copy(self), self.explanation
         found.explanation = Explanation(np.eye(known.size), np.zeros((known.size, 0)))
         found.stack = Stack(known.standardised(self.stack.columns, kappa), self.stack.first)
-        found.forces = [known.standardised(known.whitened(columns), kappa) for columns in self.forces]
-        found.flexible = [found.explanation.with_more(columns) for columns in found.forces]
+        found.forces = Stack(known.standardised(self.forces.columns, kappa), self.forces.first)
         lasting = {kind: self.candidates.effects[self.candidates.of_kind[kind][0]].lasting for kind in self._lasting}
         found._lasting = {
             kind: found.explanation.with_more(known.standardised(known.whitened(own), kappa))
             for kind, own in lasting.items()
         }
         found._kappas = np.ones(1)
+        return found
+
+    def with_noise(self, rows: NDArray[np.bool_], times: float) -> Screening:
+        """The same with the noise of some rows (n,) so many times as large; see `Explanation.with_noise`."""
+        found, known = copy.copy(self), self.explanation
+        found.explanation = known.with_noise(rows, times)
+        found.stack = Stack(known.whitened_anew(self.stack.columns, rows, times), self.stack.first)
+        found.forces = Stack(known.whitened_anew(self.forces.columns, rows, times), self.forces.first)
+        found._lasting = {kind: lasting.with_noise(rows, times) for kind, lasting in self._lasting.items()}
         return found
 
     def run(self, residuals: Floats) -> Screen:
@@ -104,7 +111,7 @@ class Screening:
             alike = lasting.log_marginal(residuals, self._kappas)
             places[own] = log_places(lasting, self.stack.some(own), residuals, self._kappas) - alike
         by_kind = self._by_kind(places)
-        unknown = log_unknown(self.flexible, residuals, self._kappas) - none
+        unknown = log_mean(log_places(self.explanation, self.forces, residuals, self._kappas)) - none
         return Screen((*self.candidates.kinds, UNKNOWN), none, np.vstack([by_kind, unknown]), places)
 
     def _by_kind(self, places: Floats) -> Floats:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.dictionary import Candidates
+from warpbrain.diagnosis.gross_errors import ASIDE
 from warpbrain.diagnosis.screening import Screening
-from warpbrain.diagnosis.sensing import explanation_of
 from warpbrain.diagnosis.single_points import LARGE, OFTEN
 
 Floats = NDArray[np.float64]
@@ -34,25 +34,27 @@ def sound_points(base: Base, candidates: Candidates) -> Bools:
     candidates : Candidates
         There.
     """
-    sensors, sigma = base.at.sensors, base.sigma
+    sound = np.zeros(len(base.aside), dtype=bool)
+    if not base.aside.any():
+        return sound
     kappa = np.array([base.explanation.best_kappa(base.whitened)])
-    sound = np.zeros(len(sensors), dtype=bool)
+    screening = Screening(base.explanation, candidates, base.smooth_forces, kappa)
     while True:
-        groups = np.unique(sensors.groups[base.aside & ~sound]).tolist()
-        odds = [_log_odds(base, candidates, sigma, sensors.groups == group, kappa) for group in groups]
+        points = np.unique(base.at.sensors.groups[base.aside & ~sound]).tolist()
+        each = [base.at.sensors.groups == point for point in points]
+        odds = [_log_odds(screening, base.residual, rows) for rows in each]
         if not odds or max(odds) <= 0.0:
             return sound
-        sound |= sensors.groups == groups[int(np.argmax(odds))]
-        sigma = np.where(sound, base.noise, base.sigma)
+        soundest = each[int(np.argmax(odds))]
+        sound |= soundest
+        screening = screening.with_noise(soundest, 1.0 / ASIDE)
 
 
-def _log_odds(base: Base, candidates: Candidates, sigma: Floats, rows: Bools, kappa: Floats) -> float:
-    """Logarithm of the odds that a point is no gross error."""
+def _log_odds(screening: Screening, residual: Floats, rows: Bools) -> float:
+    """Logarithm of the odds that a point, whose rows are set aside in a screening, is no gross error."""
     densities = []
-    for factor in (1.0, LARGE):
-        noise = np.where(rows, factor * base.noise, sigma)
-        explanation = explanation_of(base.at.sensors, noise, base.nuisances.columns)
-        screening = Screening(explanation, candidates, base.smooth_forces, kappa)
-        screen = screening.run(explanation.whitened(base.residual)[:, None])
+    for times in (1.0, LARGE):
+        asked = screening.with_noise(rows, times / ASIDE)
+        screen = asked.run(asked.explanation.whitened(residual)[:, None])
         densities.append(float(screen.none[0] + np.logaddexp(0.0, screen.alarm[0])))
     return float(np.log1p(-OFTEN) - np.log(OFTEN)) + densities[0] - densities[1]

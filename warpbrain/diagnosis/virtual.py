@@ -75,7 +75,8 @@ class VirtualCases:
     def drawn(self, cause: str, count: int) -> Floats:
         """What a cause changes of what is recorded (n, count), standardised, as it is expected beforehand."""
         if cause == UNKNOWN:
-            each = [forces[self._rng.integers(len(forces))] for forces in [self.screening.forces] * count]
+            forces = self.screening.forces
+            each = [forces.of(int(self._rng.integers(len(forces))))[:, 1:] for _ in range(count)]
             return np.column_stack([columns @ self._rng.normal(size=columns.shape[1]) for columns in each])
         return np.column_stack([self._one(number)[0] for number in self._members(cause, count)])
 
