@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.sensors import Sensors
+from warpbrain.diagnosis.sensors import Sensors, rows_of_points
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -36,12 +36,11 @@ def gross_errors(sensors: Sensors, explanation: Explanation, kappa: float, resid
     residual : (n,) array
         As recorded, not whitened.
     """
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
     S = kappa**2 * explanation.factor @ explanation.factor.T + explanation.nuisances @ explanation.nuisances.T
     aside = np.zeros(len(sensors), dtype=bool)
-    groups = np.unique(sensors.groups)
-    rows_of = {group: np.flatnonzero(sensors.groups == group) for group in groups.tolist()}
+    points = rows_of_points(sensors.groups)
     for _ in range(_ROUNDS):
         kept = np.flatnonzero(~aside)
         place = np.full(len(sensors), -1)
@@ -49,24 +48,21 @@ def gross_errors(sensors: Sensors, explanation: Explanation, kappa: float, resid
         precision = np.linalg.inv(S[np.ix_(kept, kept)])
         weighted = precision @ residual[kept]
         found = []
-        for rows in rows_of.values():
-            own = place[rows]
-            if (own < 0).any():
-                continue
-            covariance = np.linalg.inv(precision[np.ix_(own, own)])
-            apart = covariance @ weighted[own]
-            square = float(apart @ precision[np.ix_(own, own)] @ apart)
-            if chi2.sf(square, len(rows)) < _UNLIKELY:
-                found.append(rows)
+        for rows in points:
+            own = place[rows[(place[rows] >= 0).all(axis=1)]]
+            # what all others leave of a point, by its own block of the inverse
+            apart = np.linalg.solve(precision[own[:, :, None], own[:, None, :]], weighted[own][:, :, None])[:, :, 0]
+            squares = np.sum(weighted[own] * apart, axis=1)
+            found.extend(kept[own[chdtrc(rows.shape[1], squares) < _UNLIKELY]].ravel().tolist())
         if not found:
             break
-        for rows in found:
-            aside[rows] = True
-    return _without_clusters(sensors, aside, rows_of)
+        aside[found] = True
+    return _without_clusters(sensors, aside)
 
 
-def _without_clusters(sensors: Sensors, aside: Bools, rows_of: dict[int, NDArray[np.int64]]) -> Bools:
-    out = [rows for rows in rows_of.values() if aside[rows[0]] and np.isfinite(sensors.positions[rows[0]]).all()]
+def _without_clusters(sensors: Sensors, aside: Bools) -> Bools:
+    there = aside & np.isfinite(sensors.positions).all(axis=1)
+    out = [np.flatnonzero(sensors.groups == group) for group in np.unique(sensors.groups[there]).tolist()]
     if not out:
         return aside
     where = np.array([sensors.positions[rows[0]] for rows in out])

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.releasing import HeldSurface
+from warpbrain.diagnosis.releasing import TOGETHER, HeldSurface
 from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.errors import SolveError
 from warpbrain.mesh import vertex_normals
@@ -94,7 +94,11 @@ class Linearisation:
         mark = dense @ np.random.default_rng(0).normal(size=dense.shape[1])
         _, different, which = np.unique(mark, return_index=True, return_inverse=True)
         A = np.zeros((by_displacement.shape[0], len(free)))
-        A[:, free] = self._factors.solve(np.ascontiguousarray(dense[different].T)).T[which.ravel()]
+        solved = np.empty((len(different), dense.shape[1]))
+        for first in range(0, len(different), TOGETHER):
+            part = slice(first, first + TOGETHER)
+            solved[part] = self._factors.solve(np.ascontiguousarray(dense[different[part]].T)).T
+        A[:, free] = solved[which.ravel()]
         A[:, ~free] = -np.asarray(by_R.todense())
         return A
 

@@ -22,8 +22,10 @@ from warpbrain.mesh import tangents
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-#: Right-hand sides that are solved together, and changes of what is lifted off at most.
-_TOGETHER, _CHANGES = 256, 20
+#: Right-hand sides that are solved together: more do not stay in the cache.
+TOGETHER = 32
+#: Changes of what is lifted off at most.
+_CHANGES = 20
 #: Part of the size of the body farther than which nothing goes to first order: then little holds it any more.
 _FARTHEST = 0.2
 
@@ -63,8 +65,8 @@ class HeldSurface:
         own = np.repeat(members, 3)
         towards = stiffness[free][:, own].tocsc()
         whole = np.asarray(stiffness[own][:, own].todense())
-        for first in range(0, 3 * count, _TOGETHER):
-            part = slice(first, first + _TOGETHER)
+        for first in range(0, 3 * count, TOGETHER):
+            part = slice(first, first + TOGETHER)
             whole[:, part] -= towards.T @ factors.solve(np.asarray(towards[:, part].todense()))
         self._towards = towards
         # two tangents and the normal

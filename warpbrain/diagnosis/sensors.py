@@ -74,6 +74,14 @@ class Sensors:
         return np.asarray(self.by_displacement @ du.ravel() + self.by_reactions @ dR.ravel())
 
 
+def rows_of_points(groups: Ints) -> list[Ints]:
+    """Rows of each point (g, s), those of points with as many rows together; `groups` as in `Sensors`."""
+    sizes = np.bincount(groups)
+    order = np.argsort(groups, kind="stable")
+    each = [order[sizes[groups[order]] == size] for size in np.unique(sizes[sizes > 0]).tolist()]
+    return [rows.reshape(-1, sizes[groups[rows[0]]]) for rows in each]
+
+
 #: What was recorded at a time, with displacement and reactions (N, 3) then.
 Instant = tuple[float, Observations, Floats, Floats]
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.evidence import KAPPAS, Explanation, kappa_log_prior
-from warpbrain.diagnosis.sensors import Sensors
+from warpbrain.diagnosis.sensors import Sensors, rows_of_points
 
 Floats = NDArray[np.float64]
 
@@ -68,11 +68,8 @@ def log_odds(sensors: Sensors, explanation: Explanation, residual: Floats, kappa
         Factor on the noise.
     """
     weighted = explanation.inverse_times(residual, kappa)
-    sizes = np.bincount(sensors.groups)
     found = np.zeros(len(sensors))
-    order = np.argsort(sensors.groups, kind="stable")
-    for size in np.unique(sizes[sizes > 0]).tolist():
-        rows = order[np.isin(sensors.groups[order], np.flatnonzero(sizes == size))].reshape(-1, size)
+    for rows in rows_of_points(sensors.groups):
         own = explanation.inverse_blocks(rows, kappa)
         covariance = np.linalg.inv(own)
         apart = np.einsum("gij,gj->gi", covariance, weighted[rows])

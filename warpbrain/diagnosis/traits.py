@@ -89,7 +89,7 @@ def traits_of(
     centre : (3,) array
         About which moments are taken [m].
     """
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
     sites, answers = force_patches(at, length)
     # patches that fall on what is held do nothing, and nothing is known of them
@@ -111,7 +111,7 @@ def traits_of(
 
     def there(own: slice) -> bool:
         square = float(mean[own] @ np.linalg.solve(covariance[own, own], mean[own]))
-        return square > float(chi2.ppf(_SURE, 3))
+        return square > float(chdtri(3, 1.0 - _SURE))
 
     return Traits(
         mean[:3],
