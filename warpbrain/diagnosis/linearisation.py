@@ -76,31 +76,32 @@ class Linearisation:
         other = copy.copy(self)
         other.sensors = sensors
         other._of_surfaces = {}
-        other.__dict__.pop("compliance", None)
+        for made in ("compliance", "_rows"):
+            other.__dict__.pop(made, None)
         return other
 
     @cached_property
     def compliance(self) -> Floats:
         """`A` (n, 3 N): made when it is needed, since few forces are answered sooner without it."""
-        return self.compliance_of(self.sensors.by_displacement, self.sensors.by_reactions)
+        rows, which = self._rows
+        return np.asarray(rows[which])
 
-    def compliance_of(self, by_displacement: Any, by_reactions: Any) -> Floats:
-        """`A` (n, 3 N) of sensors with these derivatives, SciPy CSR (n, 3 N)."""
-        free = self._free
-        by_R = by_reactions[:, ~free]
-        rows = by_displacement[:, free] + by_R @ self._held_free
-        dense = np.asarray(rows.todense())
-        # what was recorded at several times is the same right-hand side
-        mark = dense @ np.random.default_rng(0).normal(size=dense.shape[1])
+    @cached_property
+    def _rows(self) -> tuple[Floats, NDArray[np.intp]]:
+        """Rows of `A` that differ, and which of them (n,) is whose: what was recorded at several times is one row."""
+        free, sensors = self._free, self.sensors
+        by_R = sensors.by_reactions[:, ~free]
+        moved = np.asarray((sensors.by_displacement[:, free] + by_R @ self._held_free).todense())
+        held = -np.asarray(by_R.todense())
+        rng = np.random.default_rng(0)
+        mark = moved @ rng.normal(size=moved.shape[1]) + held @ rng.normal(size=held.shape[1])
         _, different, which = np.unique(mark, return_index=True, return_inverse=True)
-        A = np.zeros((by_displacement.shape[0], len(free)))
-        solved = np.empty((len(different), dense.shape[1]))
+        A = np.empty((len(different), len(free)))
         for first in range(0, len(different), TOGETHER):
             part = slice(first, first + TOGETHER)
-            solved[part] = self._factors.solve(np.ascontiguousarray(dense[different[part]].T)).T
-        A[:, free] = solved[which.ravel()]
-        A[:, ~free] = -np.asarray(by_R.todense())
-        return A
+            A[part, free] = self._factors.solve(np.ascontiguousarray(moved[different[part]].T)).T
+        A[:, ~free] = held[different]
+        return A, which.ravel()
 
     def released(self, patch: NDArray[np.bool_], held: NDArray[np.bool_], lifts: bool) -> Floats:
         """What is recorded where held nodes let go, to first order: (n,).
@@ -153,8 +154,9 @@ class Linearisation:
         from scipy.sparse import issparse
 
         count = forces.shape[1]
-        if "compliance" in self.__dict__ or count >= len(self.sensors):
-            return np.asarray(self.compliance @ forces)
+        if "_rows" in self.__dict__ or count >= len(self.sensors):
+            rows, which = self._rows
+            return np.asarray((rows @ forces)[which])
         forces = forces.toarray() if issparse(forces) else forces
         du = np.zeros((len(self._free), count))
         du[self._free] = self._factors.solve(np.ascontiguousarray(forces[self._free]))
