@@ -38,10 +38,19 @@ def test_what_moves_a_few_points_far_is_a_gain_and_noise_is_none(held_out: HeldO
     noise = held_out.sigma * rng.normal(size=N)
     moved = noise + 6.0 * few[:, 0]
     wide, nothing = 5.0 * few, np.zeros((N, 0))
-    gain, error = held_out.predict(moved, wide).gain(held_out.predict(moved, nothing))
-    assert gain > 2.0 * error > 0.0
-    gain, error = held_out.predict(noise, wide).gain(held_out.predict(noise, nothing))
-    assert gain < 2.0 * error
+    gain, sure = held_out.predict(moved, wide).gain(held_out.predict(moved, nothing))
+    assert gain > sure > 10.0
+    gain, sure = held_out.predict(noise, wide).gain(held_out.predict(noise, nothing))
+    assert sure <= gain < 1.0
+
+
+def test_what_one_block_gains_is_not_sure(held_out: HeldOut) -> None:
+    noise = held_out.sigma * np.random.default_rng(4).normal(size=N)
+    one = np.where(held_out.blocks == 2, 6.0, 0.0)[:, None]
+    moved = noise + one[:, 0]
+    gain, sure = held_out.predict(moved, one).gain(held_out.predict(moved, np.zeros((N, 0))))
+    assert gain > 10.0
+    assert sure < 0.1
 
 
 def test_patterns_that_mean_nothing_do_not_predict(held_out: HeldOut) -> None:

@@ -77,6 +77,12 @@ class Effect:
         """The proposal's own coefficients."""
         return self.proposed.mean + self.proposed.sd * z
 
+    def away(self, z: Floats) -> Floats:
+        """How far (k,) [standard deviations] coefficients are from doing nothing; zero where they say a place."""
+        proposed = self.proposed
+        has_size = np.arange(len(z)) < len(z) - proposed.placing
+        return np.asarray(has_size * (self.coefficients(z) - proposed.without) / proposed.sd)
+
 
 class Effects:
     """Makes the columns of proposals at one state.

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.averaging import averaged_values
 from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.calibration import probabilities
-from warpbrain.diagnosis.evidence import Inner
+from warpbrain.diagnosis.calibration import BODIES, probabilities
+from warpbrain.diagnosis.evidence import Explanation, Inner, log_mean
 from warpbrain.diagnosis.flexible import SCALES
 from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo, scattered_blocks, spatial_blocks
 from warpbrain.diagnosis.letting_go import where_it_lets_go
@@ -21,7 +21,7 @@ from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.result import Ranked
 from warpbrain.diagnosis.screening import UNKNOWN
 from warpbrain.diagnosis.stage import Stage
-from warpbrain.diagnosis.verdict import ADEQUATE, ERRORS, Evidence, Verdict, decide
+from warpbrain.diagnosis.verdict import ADEQUATE, Evidence, Verdict, decide
 
 Floats = NDArray[np.float64]
 
@@ -100,7 +100,7 @@ class Judge:
             [other] = [one for one in without if one is not way]
             elsewise = other.predict(own.linear, own.columns, own.kappa)
             gain = predicted[best].gain(without[way])[0]
-            sure = max(_sure(predicted[best], without[way]), _sure(elsewise, without[other]))
+            sure = max(predicted[best].gain(without[way])[1], elsewise.gain(without[other])[1])
             patterns = self._placebo(stage, way, best)
             errors = [one.rmse for one in patterns]
             band = (float(np.quantile(errors, 0.05)), float(np.quantile(errors, 0.95)))
@@ -108,17 +108,19 @@ class Judge:
             dense = way.predict(own.linear, own.columns, plain[2]).log_density
             placebo_p = float((1 + sum(one.log_density >= dense for one in patterns)) / (1 + len(patterns)))
             adequacy_p = self._adequacy(own)
+            needed = _acts(log_evidence[best])
             if adequacy_p <= ADEQUATE:
-                needed = probabilities({best: stage.beside_unknown(best), "without": 0.0}, frozenset())[best]
+                needed = min(needed, _acts(stage.beside_unknown(best)))
             size = float(np.abs(own.coefficients[-1]).max())
         forces = [np.column_stack([plain[1], force]) for force in self.base.smooth_forces]
         loose = {one: [one.predict(plain[0], columns, plain[2]) for columns in forces] for one in without}
-        unknown_sure = max(_sure(predicted, without[one]) for one, each in loose.items() for predicted in each)
+        unknown_sure = max(predicted.gain(without[one])[1] for one, each in loose.items() for predicted in each)
         groups = self.base.at.sensors.groups
         aside = len(np.unique(groups[self.base.aside])) / len(np.unique(groups))
         evidence = Evidence(
             self.options.alpha,
             stage.p_value,
+            min(stage.p_value, float(np.exp(-log_mean(np.array(list(log_evidence.values()))) / BODIES.temperature))),
             ranking,
             gain,
             sure,
@@ -165,14 +167,14 @@ class Judge:
         fit = stage.fits.get(kind)
         if fit is not None:
             z, covariance, kappa = fit.coefficients[-1], fit.covariances[-1], fit.kappa
-            own = explanation.stack(fit.effects[-1:]).of(0)
+            d = _detectability(fit, explanation.factor)
         else:
-            own = stage.screening.stack.of(number)
             # where physics is missing, the noise that the stage needs is no noise
             kappa = 1.0
             whitened = explanation.whitened(stage.residual)[:, None]
             z, covariance = Inner(explanation, stage.screening.stack, whitened).coefficients(kappa, number)
-        d = explanation.detectability(own[:, 0] + own[:, 1:] @ z, kappa)
+            own = stage.screening.stack.of(number)
+            d = explanation.detectability(own[:, 0] + own[:, 1:] @ z, kappa)
         if fit is None:
             (centre, radius), values = _place(stage, kind), values_of(effect, z, covariance)
         elif effect.proposed.of_patch is not None:
@@ -204,10 +206,20 @@ class Judge:
         return float((1 + np.sum(null >= own)) / (1 + len(null)))
 
 
-def _sure(predicted: Predicted, over: Predicted) -> float:
-    """Gain [nats] less so many standard errors that nine of ten draws are above it."""
-    gain, error = predicted.gain(over)
-    return gain - ERRORS * error
+def _acts(log_evidence: float) -> float:
+    """Probability of what has this log evidence against the same without it."""
+    return probabilities({"with": log_evidence, "without": 0.0}, frozenset())["with"]
+
+
+def _detectability(fit: Refit, factor: Floats) -> float:
+    """Of what was added last, as it acts at the best point, beside everything else there."""
+    effect, z = fit.effects[-1], fit.coefficients[-1]
+    own = fit.columns[:, fit.columns.shape[1] - len(z) :]
+    without = Explanation(factor, fit.columns[:, : fit.columns.shape[1] - len(z)])
+    # what is there or not, or takes its time, is solved as a whole: it has no line from nothing to where it is
+    whole = effect.proposed.is_there_or_not or effect.proposed.changes_in_time
+    change = effect.mean + effect.columns @ z if whole else own @ effect.away(z)
+    return without.detectability(without.whitened(change), fit.kappa)
 
 
 def _place(stage: Stage, kind: str) -> tuple[Floats | None, float | None]:

@@ -248,11 +248,11 @@ class Refitting:
         assert self._mesh is not None
         away, middle, at = [], [], self._U.shape[1]
         for effect in effects:
-            proposed, size = effect.proposed, effect.columns.shape[1]
-            has_size = (np.arange(size) < size - proposed.placing) & (not proposed.is_there_or_not)
+            size = effect.columns.shape[1]
+            has_size = not effect.proposed.is_there_or_not
             # along what it is: its coefficients, each in standard deviations
-            away.append(has_size * (effect.coefficients(z[at : at + size]) - proposed.without) / proposed.sd)
-            middle.append(has_size * (proposed.mean - proposed.without) / proposed.sd)
+            away.append(has_size * effect.away(z[at : at + size]))
+            middle.append(has_size * effect.away(np.zeros(size)))
             at += size
         scaled, mean = np.concatenate(away), np.concatenate(middle)
         length = float(scaled @ scaled)

@@ -45,8 +45,8 @@ VISIBLE = 2.5
 CLAIM = 0.2
 #: Part of the recorded points that may be gross errors: of more it is the pairing that is in doubt, not single points.
 CONTRADICTED = 0.1
-#: Standard errors by which a gain must be above zero: nine of ten draws are above it.
-ERRORS = 1.28
+#: How much more probable [nats] held-out points must be without the block that gains most: ten times.
+TENFOLD = float(np.log(10.0))
 
 
 @dataclass(frozen=True)
@@ -56,18 +56,21 @@ class Evidence:
     Attributes
     ----------
     alpha, p_value : float
+    chance : float
+        Of an alarm as strong as this one where nothing is missing, refits included: `p_value`, or one over the Bayes
+        factor of anything against nothing, which is exceeded no more often than that (Markov's inequality).
     ranking : tuple of Ranked
         The most probable first.
     gain : float
         By how much [nats] the most probable one makes held-out points more probable, of regions where it acts in more
         than one place.
     sure : float
-        The same less as many standard errors that nine of ten are above it, of regions or of points here and there:
-        what acts in few places is in few regions, and what a neighbour tells is no gain here and there.
+        The same without the block that gains most, of regions or of points here and there: what acts in few places is
+        in few regions, and what a neighbour tells is no gain here and there.
     placebo_p, adequacy_p : float
         Of it.
     needed : float
-        Probability that it acts beside any smooth force, against that force alone, where something is left.
+        Probability that it acts, against nothing more, and where something is left against any smooth force alone.
     size : float
         Its largest coefficient in standard deviations of the prior.
     unknown_sure : float
@@ -78,6 +81,7 @@ class Evidence:
 
     alpha: float
     p_value: float
+    chance: float
     ranking: Sequence[Ranked]
     gain: float
     sure: float
@@ -155,12 +159,12 @@ def decide(found: Evidence) -> Verdict:
         return Verdict(NAMED if found.adequacy_p > ADEQUATE else NAMED_AND_REST, (best.kind,))
     label_set = _label_set(found.ranking)
     physics = all(ranked.physics for ranked in found.ranking if ranked.kind in label_set)
-    claims = found.p_value <= CLAIM * found.alpha and found.aside <= CONTRADICTED
+    claims = found.chance <= CLAIM * found.alpha and found.aside <= CONTRADICTED
     if claims and 1 < len(label_set) <= MEMBERS and physics and found.gain > 0.0:
         return Verdict(GROUP, label_set, "; ".join(vetoes))
     left = best.physics and UNKNOWN_KIND in label_set and found.adequacy_p <= ADEQUATE
     if claims and (left or (best.kind == UNKNOWN_KIND and best.probability >= 0.5)):
-        if found.unknown_sure > 0.0:
+        if found.unknown_sure > TENFOLD:
             return Verdict(UNKNOWN, (best.kind,) if left else ())
         vetoes = ["any smooth force fits better than a mechanism, but does not predict points that were held out"]
     return Verdict(CANNOT_SAY, label_set, "; ".join(vetoes))
@@ -168,11 +172,11 @@ def decide(found: Evidence) -> Verdict:
 
 def _vetoes(found: Evidence) -> list[str]:
     vetoes = []
-    if found.p_value > CLAIM * found.alpha:
+    if found.chance > CLAIM * found.alpha:
         vetoes.append("the alarm is too weak to claim more")
     if found.aside > CONTRADICTED:
         vetoes.append("so many recorded points contradict those around them that they may be paired wrongly")
-    if found.gain <= 0.0 or found.sure <= 0.0:
+    if found.gain <= 0.0 or found.sure <= TENFOLD:
         vetoes.append("points that were held out are not predicted better with it")
     if found.placebo_p > PLACEBO:
         vetoes.append("patterns that mean nothing predict as well")
@@ -181,7 +185,7 @@ def _vetoes(found: Evidence) -> list[str]:
     if found.size > LARGEST:
         vetoes.append("its size would be implausible")
     if found.needed < SURE:
-        vetoes.append("beside any smooth force, which has to act anyway, it adds little")
+        vetoes.append("beside nothing, or any smooth force that has to act anyway, it adds little")
     return vetoes
 
 

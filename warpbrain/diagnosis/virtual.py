@@ -120,7 +120,7 @@ class VirtualCases:
 
     def _verdict(self, cause: str, screen: Screen, chances: Floats, p_value: float) -> str:
         ranking = [self._ranked(screen.kinds[k], float(chances[k])) for k in np.argsort(-chances).tolist()]
-        passed = Evidence(self._alpha, p_value, ranking, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0)
+        passed = Evidence(self._alpha, p_value, p_value, ranking, np.inf, np.inf, 0.0, 1.0, 1.0, 0.0, np.inf, 0.0)
         verdict = decide(passed)
         if verdict.verdict == NAMED:
             return verdict.kinds[0]
