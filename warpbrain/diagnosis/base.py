@@ -20,6 +20,7 @@ from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.diagnosis.nuisances import REGISTRATION_SD, Nuisances, nuisances_at, other_volume
 from warpbrain.diagnosis.options import Listener
+from warpbrain.diagnosis.pairs import Pairs, pairs_at
 from warpbrain.diagnosis.sensing import explanation_of, known_sigma
 from warpbrain.diagnosis.sensors import Sensors, tracked_points
 from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
@@ -61,6 +62,8 @@ class Base:
     nuisances : Nuisances
     flexible : tuple of (n, k) arrays
         Columns of smooth forces of each length, of 1 m.
+    pairs : Pairs
+        Of places that draw each other.
     sigma : (n,) array
         Noise of each row, very large where a row is set aside.
     noise : (n,) array
@@ -84,6 +87,7 @@ class Base:
     known: Known
     nuisances: Nuisances
     flexible: tuple[Floats, ...]
+    pairs: Pairs
     sigma: Floats
     noise: Floats
     aside: NDArray[np.bool_]
@@ -279,6 +283,7 @@ class BaseFinder:
             known,
             nuisances,
             flexible,
+            pairs_at(at, self._spacing),
             sigma,
             noise,
             aside,

@@ -114,7 +114,9 @@ class Judge:
             size = float(np.abs(own.coefficients[-1]).max())
         forces = [np.column_stack([plain[1], force]) for force in self.base.smooth_forces]
         loose = {one: [one.predict(plain[0], columns, plain[2]) for columns in forces] for one in without}
-        unknown_sure = max(predicted.gain(without[one])[1] for one, each in loose.items() for predicted in each)
+        drawn = np.column_stack([plain[1], stage.best_pair])
+        nameless = {one: [*each, one.predict(plain[0], drawn, plain[2])] for one, each in loose.items()}
+        unknown_sure = max(predicted.gain(without[one])[1] for one, each in nameless.items() for predicted in each)
         groups = self.base.at.sensors.groups
         aside = len(np.unique(groups[self.base.aside])) / len(np.unique(groups))
         evidence = Evidence(

@@ -1,8 +1,8 @@
 """Which kind of mechanism explains residuals best, to first order: evidence of every proposal, averaged over a kind.
 
 Averaging over places, levels and sets is the correction for having looked in many of them. Beside named kinds stands
-the unknown: any smooth force. What changes in time is credited only with what changes: it is compared with what it is
-at first, if that were for ever (`Effect.lasting`).
+the unknown: any smooth force, or two places that draw each other. What changes in time is credited only with what
+changes: it is compared with what it is at first, if that were for ever (`Effect.lasting`).
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Stack, kappa_log_prior, log_mean
+from warpbrain.diagnosis.pairs import PairEvidence
 
 Floats = NDArray[np.float64]
 
@@ -66,10 +67,17 @@ class Screening:
         Columns of any smooth force, each with a length and a size.
     kappas : (k,) array
         Factors on the noise that are averaged over.
+    pairs : PairEvidence, optional
+        Of two places that draw each other, beside the explanation; without it the unknown is a smooth force.
     """
 
     def __init__(
-        self, explanation: Explanation, candidates: Candidates, flexible: list[Floats], kappas: Floats = KAPPAS
+        self,
+        explanation: Explanation,
+        candidates: Candidates,
+        flexible: list[Floats],
+        kappas: Floats = KAPPAS,
+        pairs: PairEvidence | None = None,
     ) -> None:
         self.explanation = explanation
         self.candidates = candidates
@@ -78,6 +86,7 @@ class Screening:
         lasting = {kind: candidates.effects[own[0]].lasting for kind, own in candidates.of_kind.items()}
         self._lasting = {kind: explanation.with_more(own) for kind, own in lasting.items() if own is not None}
         self._kappas = kappas
+        self.pairs = pairs
 
     def standardised(self, kappa: float) -> Screening:
         """The same for residuals `S^-1/2 r`, in which noise and nuisances are of variance one: the factor is known."""
@@ -91,6 +100,9 @@ class Screening:
             for kind, own in lasting.items()
         }
         found._kappas = np.ones(1)
+        if self.pairs is not None:
+            seen = self.pairs.pairs.seen(lambda rows: known.standardised(known.whitened(rows), kappa))
+            found.pairs = PairEvidence(found.explanation, seen, self.pairs.noise)
         return found
 
     def with_noise(self, rows: NDArray[np.bool_], times: float) -> Screening:
@@ -100,6 +112,8 @@ class Screening:
         found.stack = Stack(known.whitened_anew(self.stack.columns, rows, times), self.stack.first)
         found.forces = Stack(known.whitened_anew(self.forces.columns, rows, times), self.forces.first)
         found._lasting = {kind: lasting.with_noise(rows, times) for kind, lasting in self._lasting.items()}
+        if self.pairs is not None:
+            found.pairs = PairEvidence(found.explanation, self.pairs.pairs, self.pairs.noise)
         return found
 
     def run(self, residuals: Floats) -> Screen:
@@ -111,8 +125,15 @@ class Screening:
             alike = lasting.log_marginal(residuals, self._kappas)
             places[own] = log_places(lasting, self.stack.some(own), residuals, self._kappas) - alike
         by_kind = self._by_kind(places)
-        unknown = log_mean(log_places(self.explanation, self.forces, residuals, self._kappas)) - none
+        unknown = self._log_unknown(residuals) - none
         return Screen((*self.candidates.kinds, UNKNOWN), none, np.vstack([by_kind, unknown]), places)
+
+    def _log_unknown(self, residuals: Floats) -> Floats:
+        """With what has no name: a smooth force, or as likely two places that draw each other."""
+        smooth = log_mean(log_places(self.explanation, self.forces, residuals, self._kappas))
+        if self.pairs is None:
+            return smooth
+        return log_mean(np.array([smooth, self.pairs.log_marginal(residuals, self._kappas)]))
 
     def _by_kind(self, places: Floats) -> Floats:
         rows = [log_mean(places[own]) for own in self.candidates.of_kind.values()]

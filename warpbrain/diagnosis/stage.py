@@ -16,6 +16,7 @@ from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.evidence import Explanation, log_mean
 from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.diagnosis.pairs import PairEvidence
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening
 from warpbrain.diagnosis.single_points import log_evidence_and_odds
@@ -154,12 +155,20 @@ class Stage:
             return proposal.log_covered - float(np.log(len(own)))
         return float(log_mean(own)) - float(own.max())
 
+    @property
+    def best_pair(self) -> Floats:
+        """What the most probable two places that draw each other (n, 1) do beside the fit without anything more."""
+        linear, columns, _ = self.without
+        explanation = Explanation(self.explanation.factor, columns)
+        pairs = PairEvidence(explanation, self.base.pairs, self.base.typical_noise)
+        return pairs.best(explanation.whitened(linear))
+
     def beside_unknown(self, kind: str) -> float:
-        """Log evidence of the refit of a kind beside any smooth force, against that force without it."""
+        """Log evidence of the refit of a kind beside a force without a name, against that force without it."""
         return self._unknown(self.fits[kind]) + self.over_places(kind) - self._unknown(self.fits["none"])
 
     def _unknown(self, fit: Refit) -> float:
-        """Log evidence of any smooth force beside a fit, where single points may be gross errors."""
+        """Log evidence of a force without a name beside a fit, where single points may be gross errors."""
         # as above
         if fit not in self._unknowns:
             self._unknowns[fit] = self._with_any_force(fit)
@@ -171,9 +180,13 @@ class Stage:
         loose = [explanation.with_more(force) for force in forces]
         white = explanation.whitened(fit.linear)[:, None]
         plain = np.array([one.log_marginal(white)[0] for one in loose])
-        best = int(np.argmax(plain))
-        gross = log_evidence_and_odds(fit.state.sensors, loose[best], fit.linear)[0] - float(plain[best])
-        return float(log_mean(plain)) + gross
+        pairs = PairEvidence(explanation, self.base.pairs, self.base.typical_noise)
+        either = np.array([log_mean(plain), pairs.log_marginal(white)[0]])
+        best = loose[int(np.argmax(plain))]
+        if either[1] > either[0]:
+            best = explanation.with_more(pairs.best(white[:, 0]))
+        gross = log_evidence_and_odds(fit.state.sensors, best, fit.linear)[0] - float(best.log_marginal(white)[0])
+        return float(log_mean(either)) + gross
 
 
 def compared(
@@ -187,7 +200,8 @@ def compared(
     rng: np.random.Generator,
 ) -> Stage:
     """A stage that has been screened; nothing is refitted yet."""
-    screening = Screening(explanation, candidates, base.smooth_forces)
+    pairs = PairEvidence(explanation, base.pairs, base.typical_noise)
+    screening = Screening(explanation, candidates, base.smooth_forces, pairs=pairs)
     screen = screening.run(explanation.whitened(residual)[:, None])
     null = explanation.draws(draws, kappa, rng)
     alarms = screening.run(null).alarm

@@ -3,7 +3,7 @@
 1. No alarm if the global test is not significant: nothing missing, with what would have been seen.
 2. Named if one mechanism is probable enough, predicts points that it was not fitted to better than without it and than
    patterns that mean nothing, has a plausible size, and leaves nothing significant. Named + rest if something is left.
-   That may be all of it: then the name must be probable enough beside any smooth force, too.
+   That may be all of it: then the name must be probable enough beside any force without a name, too.
 3. Not physics if a nuisance far larger than it should be explains the residuals better than any mechanism.
 4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is, and predicts points
    that it was not fitted to better; or if it may be, and the best mechanism leaves something significant: then a force
@@ -70,11 +70,11 @@ class Evidence:
     placebo_p, adequacy_p : float
         Of it.
     needed : float
-        Probability that it acts, against nothing more, and where something is left against any smooth force alone.
+        Probability that it acts, against nothing more; where something is left, against a force without a name, too.
     size : float
         Its largest coefficient in standard deviations of the prior.
     unknown_sure : float
-        What `sure` is, of any smooth force.
+        What `sure` is, of a force without a name.
     aside : float
         Part of the recorded points that were set aside as gross errors.
     """
@@ -166,7 +166,7 @@ def decide(found: Evidence) -> Verdict:
     if claims and (left or (best.kind == UNKNOWN_KIND and best.probability >= 0.5)):
         if found.unknown_sure > TENFOLD:
             return Verdict(UNKNOWN, (best.kind,) if left else ())
-        vetoes = ["any smooth force fits better than a mechanism, but does not predict points that were held out"]
+        vetoes = ["a force without a name fits better than a mechanism, but does not predict points that were held out"]
     return Verdict(CANNOT_SAY, label_set, "; ".join(vetoes))
 
 
@@ -185,7 +185,7 @@ def _vetoes(found: Evidence) -> list[str]:
     if found.size > LARGEST:
         vetoes.append("its size would be implausible")
     if found.needed < SURE:
-        vetoes.append("beside nothing, or any smooth force that has to act anyway, it adds little")
+        vetoes.append("beside nothing, or a force without a name that has to act anyway, it adds little")
     return vetoes
 
 

@@ -75,10 +75,16 @@ class VirtualCases:
     def drawn(self, cause: str, count: int) -> Floats:
         """What a cause changes of what is recorded (n, count), standardised, as it is expected beforehand."""
         if cause == UNKNOWN:
-            forces = self.screening.forces
-            each = [forces.of(int(self._rng.integers(len(forces))))[:, 1:] for _ in range(count)]
+            each = [self._nameless() for _ in range(count)]
             return np.column_stack([columns @ self._rng.normal(size=columns.shape[1]) for columns in each])
         return np.column_stack([self._one(number)[0] for number in self._members(cause, count)])
+
+    def _nameless(self) -> Floats:
+        """Columns (n, k) of something without a name, each kind of it as often."""
+        forces, pairs = self.screening.forces, self.screening.pairs
+        if pairs is not None and self._rng.random() < 0.5:
+            return pairs.drawn(self._rng)
+        return forces.of(int(self._rng.integers(len(forces))))[:, 1:]
 
     def _members(self, kind: str, count: int) -> list[int]:
         return self._rng.choice(self.candidates.of_kind[kind], count).tolist()
