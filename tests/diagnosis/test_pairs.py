@@ -1,5 +1,7 @@
 """Two places that draw each other: their evidence is that of every pair, and they are no smooth force."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -63,6 +65,19 @@ def test_a_pair_is_scaled_and_is_two_opposite_forces(small_diagnosis: Diagnosis)
     ends = own.sites[[own.ends[0][5], own.ends[1][5]]]
     np.testing.assert_allclose(np.cross(ends, forces).sum(axis=0), 0.0, atol=1e-15)
     assert np.isin(own.sites[:, 0], mesh.points[:, 0]).all()
+
+
+def test_a_body_that_is_held_all_around_has_places_inside(small_diagnosis: Diagnosis) -> None:
+    at = small_diagnosis.base.at
+    mesh = at.system.model.mesh
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[mesh.boundary.ravel()] = True
+    model = SimpleNamespace(mesh=mesh, constrained=held.ravel())
+    given = SimpleNamespace(system=SimpleNamespace(model=model), compliance=at.compliance, sensors=at.sensors)
+    inside = ~held.all(axis=1)
+    found = pairs_at(given, 0.012)
+    assert 1 < len(found.sites) <= inside.sum()
+    assert np.isin(found.sites[:, 0], mesh.points[inside, 0]).all()
 
 
 def test_two_places_that_draw_each_other_are_no_smooth_force(small_diagnosis: Diagnosis) -> None:

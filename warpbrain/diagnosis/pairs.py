@@ -98,7 +98,7 @@ class Pairs:
 
 
 def pairs_at(at: Linearisation, spacing: float) -> Pairs:
-    """Pairs of places on what of the surface can move.
+    """Pairs of places on what of the surface can move; of a body that is held all around, of places in it.
 
     Parameters
     ----------
@@ -108,11 +108,13 @@ def pairs_at(at: Linearisation, spacing: float) -> Pairs:
     """
     model = at.system.model
     mesh = model.mesh
-    areas = node_areas(mesh.points, mesh.boundary)
-    free = np.flatnonzero((areas > 0.0) & ~model.constrained.reshape(-1, 3).all(axis=1))
+    shares, movable = node_areas(mesh.points, mesh.boundary), ~model.constrained.reshape(-1, 3).all(axis=1)
+    if not (movable & (shares > 0.0)).any():
+        shares = mesh.node_volumes
+    free = np.flatnonzero(movable & (shares > 0.0))
     sites = mesh.points[free[spread_points(mesh.points[free], 0.0, PLACES)]]
     apart = np.linalg.norm(mesh.points[:, None] - sites[None], axis=2)
-    weights = areas[:, None] * np.exp(-0.5 * (apart / (LENGTH * spacing)) ** 2)
+    weights = shares[:, None] * np.exp(-0.5 * (apart / (LENGTH * spacing)) ** 2)
     weights /= weights.sum(axis=0)
     by_axis = at.compliance.reshape(len(at.sensors), -1, 3)
     columns = np.einsum("nac,as->nsc", by_axis, weights, optimize=True).reshape(len(at.sensors), -1)
