@@ -17,6 +17,8 @@ def test_one_is_found_with_its_size(small_diagnosis: Diagnosis) -> None:
     assert [one.kind for one in small_diagnosis.named] == ["gravity"]
     level = next(value for value in small_diagnosis.named[0].values if value.name == "csf_level")
     assert abs(level.value - 30.0) < 3.0 * level.sd
+    # tissue that is twice as soft does not hide it: 256 nats are a detectability of 23 at least
+    assert small_diagnosis.named[0].detectability > 20.0
 
 
 def test_what_no_mechanism_explains_gets_no_name_beside_one(pressed: Diagnosis) -> None:

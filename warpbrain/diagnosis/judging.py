@@ -169,7 +169,7 @@ class Judge:
         fit = stage.fits.get(kind)
         if fit is not None:
             z, covariance, kappa = fit.coefficients[-1], fit.covariances[-1], fit.kappa
-            d = _detectability(fit, explanation.factor)
+            d = _detectability(stage, fit)
         else:
             # where physics is missing, the noise that the stage needs is no noise
             kappa = 1.0
@@ -213,14 +213,16 @@ def _acts(log_evidence: float) -> float:
     return probabilities({"with": log_evidence, "without": 0.0}, frozenset())["with"]
 
 
-def _detectability(fit: Refit, factor: Floats) -> float:
-    """Of what was added last, as it acts at the best point, beside everything else there."""
+def _detectability(stage: Stage, fit: Refit) -> float:
+    """Of what was added last beside what acts without it: from nothing to the best point by the trapezium rule."""
     effect, z = fit.effects[-1], fit.coefficients[-1]
-    own = fit.columns[:, fit.columns.shape[1] - len(z) :]
-    without = Explanation(factor, fit.columns[:, : fit.columns.shape[1] - len(z)])
+    before = len(fit.nuisances) + sum(one.columns.shape[1] for one in fit.effects[:-1])
+    own = fit.columns[:, before : before + len(z)]
     # what is there or not, or takes its time, is solved as a whole: it has no line from nothing to where it is
     whole = effect.proposed.is_there_or_not or effect.proposed.changes_in_time
-    change = effect.mean + effect.columns @ z if whole else own @ effect.away(z)
+    change = effect.mean + effect.columns @ z if whole else 0.5 * (effect.columns + own) @ effect.away(z)
+    # at the best point tissue explains how large it is, which says nothing of whether it is seen
+    without = Explanation(stage.explanation.factor, stage.without[1])
     return without.detectability(without.whitened(change), fit.kappa)
 
 
