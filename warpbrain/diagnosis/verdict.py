@@ -38,8 +38,6 @@ Floats = NDArray[np.float64]
 SURE, TOGETHER, ADEQUATE = 0.9, 0.9, 0.01
 #: Largest size [standard deviations of its prior] and placebo probability of a name, and members of a group.
 LARGEST, PLACEBO, MEMBERS = 4.0, 0.05, 4
-#: Least detectability of a name: what would hardly be seen is not what was seen.
-VISIBLE = 2.5
 #: Part of the probability of a false alarm up to which more is claimed than that something is missing: wrong alarms,
 #: in calibration cases without an effect and in traps, are weak ones.
 CLAIM = 0.2
@@ -180,8 +178,6 @@ def _vetoes(found: Evidence) -> list[str]:
         vetoes.append("points that were held out are not predicted better with it")
     if found.placebo_p > PLACEBO:
         vetoes.append("patterns that mean nothing predict as well")
-    if found.ranking[0].detectability < VISIBLE:
-        vetoes.append("an effect of that size would hardly be seen")
     if found.size > LARGEST:
         vetoes.append("its size would be implausible")
     if found.needed < SURE:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.calibration import weighed
 from warpbrain.diagnosis.result import GROUP, NAMED, NOTHING, WITH_IT, WITHOUT_IT, Confusion, Ranked
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening
-from warpbrain.diagnosis.verdict import LARGEST, VISIBLE, Evidence, decide
+from warpbrain.diagnosis.verdict import LARGEST, Evidence, decide
 
 Floats = NDArray[np.float64]
 
@@ -135,7 +135,7 @@ class VirtualCases:
         return verdict.verdict
 
     def _ranked(self, kind: str, chance: float) -> Ranked:
-        return Ranked(kind, kind in self._mechanisms, 0.0, chance, VISIBLE, None, (), None, None, "")
+        return Ranked(kind, kind in self._mechanisms, 0.0, chance, 0.0, None, (), None, None, "")
 
 
 def _shares(said: list[str]) -> dict[str, float]:
