@@ -111,7 +111,8 @@ def test_while_benching(tmp_path):
     file = tmp_path / "bench.json"
     with started("-m", "warpbrain.bench", "--rows", "mt/fine", "--device", "cpu", "--json", str(file)) as process:
         wait_for("mean (sd) ms", process)
-        assert "warpbrain.bench: interrupted" in interrupt(process)
+        # who says it, the command or what watches calls that do not return, depends on where it is
+        assert interrupt(process).startswith(("warpbrain.bench: interrupted", "warpbrain: interrupted"))
     assert files(tmp_path) == []
 
 
