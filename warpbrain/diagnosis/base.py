@@ -20,7 +20,7 @@ from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.diagnosis.nuisances import REGISTRATION_SD, Nuisances, nuisances_at, other_volume
 from warpbrain.diagnosis.options import Listener
-from warpbrain.diagnosis.pairs import Pairs, pairs_at
+from warpbrain.diagnosis.pairs import PairEvidence, Pairs, pairs_at
 from warpbrain.diagnosis.sensing import explanation_of, known_sigma
 from warpbrain.diagnosis.sensors import Sensors, tracked_points
 from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
@@ -110,6 +110,10 @@ class Base:
     def constant_forces(self) -> list[Floats]:
         """Columns of smooth forces of each length and size that are always there."""
         return smooth_forces(self.flexible, self.typical_noise)
+
+    def pair_evidence(self, explanation: Explanation) -> PairEvidence:
+        """Of two places that draw each other, beside an explanation."""
+        return PairEvidence(explanation, self.pairs, self.typical_noise)
 
     @property
     def smooth_forces(self) -> list[Floats]:

@@ -99,8 +99,8 @@ class Judge:
             improvement = predicted[best].improvement(without[way], self._rng)
             [other] = [one for one in without if one is not way]
             elsewise = other.predict(own.linear, own.columns, own.kappa)
-            gain = predicted[best].gain(without[way])[0]
-            sure = max(predicted[best].gain(without[way])[1], elsewise.gain(without[other])[1])
+            gain, sure = predicted[best].gain(without[way])
+            sure = max(sure, elsewise.gain(without[other])[1])
             patterns = self._placebo(stage, way, best)
             errors = [one.rmse for one in patterns]
             band = (float(np.quantile(errors, 0.05)), float(np.quantile(errors, 0.95)))
@@ -216,8 +216,7 @@ def _acts(log_evidence: float) -> float:
 def _detectability(stage: Stage, fit: Refit) -> float:
     """Of what was added last beside what acts without it: from nothing to the best point by the trapezium rule."""
     effect, z = fit.effects[-1], fit.coefficients[-1]
-    before = len(fit.nuisances) + sum(one.columns.shape[1] for one in fit.effects[:-1])
-    own = fit.columns[:, before : before + len(z)]
+    own = fit.with_own_columns[-1].columns
     # what is there or not, or takes its time, is solved as a whole: it has no line from nothing to where it is
     whole = effect.proposed.is_there_or_not or effect.proposed.changes_in_time
     change = effect.mean + effect.columns @ z if whole else 0.5 * (effect.columns + own) @ effect.away(z)

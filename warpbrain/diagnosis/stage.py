@@ -16,7 +16,6 @@ from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.evidence import Explanation, log_mean
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.pairs import PairEvidence
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening
 from warpbrain.diagnosis.single_points import log_evidence_and_odds
@@ -160,8 +159,7 @@ class Stage:
         """What the most probable two places that draw each other (n, 1) do beside the fit without anything more."""
         linear, columns, _ = self.without
         explanation = Explanation(self.explanation.factor, columns)
-        pairs = PairEvidence(explanation, self.base.pairs, self.base.typical_noise)
-        return pairs.best(explanation.whitened(linear))
+        return self.base.pair_evidence(explanation).best(explanation.whitened(linear))
 
     def beside_unknown(self, kind: str) -> float:
         """Log evidence of the refit of a kind beside a force without a name, against that force without it."""
@@ -180,7 +178,7 @@ class Stage:
         loose = [explanation.with_more(force) for force in forces]
         white = explanation.whitened(fit.linear)[:, None]
         plain = np.array([one.log_marginal(white)[0] for one in loose])
-        pairs = PairEvidence(explanation, self.base.pairs, self.base.typical_noise)
+        pairs = self.base.pair_evidence(explanation)
         either = np.array([log_mean(plain), pairs.log_marginal(white)[0]])
         best = loose[int(np.argmax(plain))]
         if either[1] > either[0]:
@@ -200,8 +198,7 @@ def compared(
     rng: np.random.Generator,
 ) -> Stage:
     """A stage that has been screened; nothing is refitted yet."""
-    pairs = PairEvidence(explanation, base.pairs, base.typical_noise)
-    screening = Screening(explanation, candidates, base.smooth_forces, pairs=pairs)
+    screening = Screening(explanation, candidates, base.smooth_forces, pairs=base.pair_evidence(explanation))
     screen = screening.run(explanation.whitened(residual)[:, None])
     null = explanation.draws(draws, kappa, rng)
     alarms = screening.run(null).alarm
