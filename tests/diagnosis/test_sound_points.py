@@ -33,6 +33,23 @@ def test_the_point_that_a_local_cause_moves_most_comes_back(setting):
     assert np.array_equal(sound_points(changed, candidates), rows)
 
 
+def test_so_does_one_between_the_places_of_the_scan(setting, monkeypatch):
+    base, candidates, noise = setting
+    local = [effect.proposed for effect in candidates.effects if effect.proposed.elsewhere is not None]
+    sensors = base.at.sensors
+    each = np.unique(sensors.groups[sensors.is_displacement])
+    points = np.array([sensors.positions[sensors.groups == group][0] for group in each])
+    # near an edge of the block, 10 mm from the nearest place of the scan
+    near = int(np.argmin(np.linalg.norm(points - [0.052, 0.011, 0.050], axis=1)))
+    beside = local[0].elsewhere(0.9 * points[near], min(one.radius for one in local))
+    [effect] = candidates.makes.of([beside])
+    changed, rows = aside(base, 3.0 * effect.columns[:, 0] + noise, each[near])
+    assert np.array_equal(sound_points(changed, candidates), rows)
+    # by the places of the scan alone it is a gross error
+    monkeypatch.setattr("warpbrain.diagnosis.sound_points._OPEN", 0.0)
+    assert not sound_points(changed, candidates).any()
+
+
 def test_a_gross_error_does_not(setting):
     base, candidates, noise = setting
     group = base.at.sensors.groups[np.flatnonzero(base.at.sensors.is_displacement)[0]]

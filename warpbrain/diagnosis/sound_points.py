@@ -8,6 +8,8 @@ and every hypothesis `H` that is looked for,
     odds = (1 - e) sum_H p(H) p(r | H) / (e sum_H p(H) p(r, its noise q | H)),
 
 with half of `p(H)` for nothing missing. A gross error alone is no reason for a mechanism: its neighbours have to agree.
+What acts in one place is asked at places of the scan at first. Where that leaves it open, so near to a point that a
+step of the scan matters, the best of them are moved between places (`placed`), in numerator and denominator alike.
 """
 
 from __future__ import annotations
@@ -17,12 +19,20 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.dictionary import Candidates
+from warpbrain.diagnosis.evidence import log_mean
 from warpbrain.diagnosis.gross_errors import ASIDE
-from warpbrain.diagnosis.screening import Screening
+from warpbrain.diagnosis.placing import placed
+from warpbrain.diagnosis.screening import Screen, Screening, log_places
 from warpbrain.diagnosis.single_points import LARGE, OFTEN
+from warpbrain.diagnosis.stage import Stage
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+
+
+#: Logarithm of the odds from which on places between those of the scan may turn them, and how far [nats] behind the
+#: best kind they are asked for.
+_OPEN, _BEHIND = -8.0, 8.0
 
 
 def sound_points(base: Base, candidates: Candidates) -> Bools:
@@ -37,12 +47,12 @@ def sound_points(base: Base, candidates: Candidates) -> Bools:
     sound = np.zeros(len(base.aside), dtype=bool)
     if not base.aside.any():
         return sound
-    kappa = np.array([base.explanation.best_kappa(base.whitened)])
-    screening = Screening(base.explanation, candidates, base.smooth_forces, kappa)
+    kappa = base.explanation.best_kappa(base.whitened)
+    screening = Screening(base.explanation, candidates, base.smooth_forces, np.array([kappa]))
     while True:
         points = np.unique(base.at.sensors.groups[base.aside & ~sound]).tolist()
         each = [base.at.sensors.groups == point for point in points]
-        odds = [_log_odds(screening, base.residual, rows) for rows in each]
+        odds = [_log_odds(base, screening, rows, kappa) for rows in each]
         if not odds or max(odds) <= 0.0:
             return sound
         soundest = each[int(np.argmax(odds))]
@@ -50,11 +60,41 @@ def sound_points(base: Base, candidates: Candidates) -> Bools:
         screening = screening.with_noise(soundest, 1.0 / ASIDE)
 
 
-def _log_odds(screening: Screening, residual: Floats, rows: Bools) -> float:
+def _log_odds(base: Base, screening: Screening, rows: Bools, kappa: float) -> float:
     """Logarithm of the odds that a point, whose rows are set aside in a screening, is no gross error."""
-    densities = []
-    for times in (1.0, LARGE):
-        asked = screening.with_noise(rows, times / ASIDE)
-        screen = asked.run(asked.explanation.whitened(residual)[:, None])
-        densities.append(float(screen.none[0] + np.logaddexp(0.0, screen.alarm[0])))
-    return float(np.log1p(-OFTEN) - np.log(OFTEN)) + densities[0] - densities[1]
+    asked = [screening.with_noise(rows, times / ASIDE) for times in (1.0, LARGE)]
+    screens = [one.run(one.explanation.whitened(base.residual)[:, None]) for one in asked]
+    before = float(np.log1p(-OFTEN) - np.log(OFTEN))
+    sound, gross = (_log_density(screen, screen.log_factors[:, 0]) for screen in screens)
+    if not _OPEN < before + sound - gross <= 0.0:
+        return before + sound - gross
+    sound, gross = (
+        _log_density(screen, _between_places(base, one, screen, kappa))
+        for one, screen in zip(asked, screens, strict=True)
+    )
+    return before + sound - gross
+
+
+def _log_density(screen: Screen, log_factors: Floats) -> float:
+    """Of a residual, where as often nothing is missing as anything of these Bayes factors (kinds,)."""
+    return float(screen.none[0] + np.logaddexp(0.0, log_mean(log_factors[:, None])[0]))
+
+
+def _between_places(base: Base, screening: Screening, screen: Screen, kappa: float) -> Floats:
+    """Log Bayes factors (kinds,) with what acts in one place between the places of its scan, where that is better."""
+    candidates, explanation = screening.candidates, screening.explanation
+    nothing = np.empty((explanation.size, 0))
+    stage = Stage(base, (), candidates, screening, base.residual, screen, nothing, 1.0, kappa, {})
+    white = explanation.whitened(base.residual)[:, None]
+    found = screen.log_factors[:, 0].copy()
+    least = found.max() - _BEHIND
+    for k, (kind, own) in enumerate(candidates.of_kind.items()):
+        number = screen.best_effect(candidates, kind)
+        proposal = candidates.effects[number].proposal
+        if proposal is None or proposal.elsewhere is None or found[k] < least:
+            continue
+        effect = placed(stage, number).effect
+        value = log_places(explanation, explanation.stack([effect]), white, np.array([kappa]))[0, 0] - screen.none[0]
+        # its prior covers as many places of the scan as its evidence is averaged over
+        found[k] = max(found[k], value + effect.proposed.log_covered - np.log(len(own)))
+    return found
