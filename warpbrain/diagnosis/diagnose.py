@@ -23,6 +23,7 @@ from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.judging import Judge, Judgement
 from warpbrain.diagnosis.locating import ScoreMap, score_map
 from warpbrain.diagnosis.measuring import next_measurements
+from warpbrain.diagnosis.naming import named_in_turn
 from warpbrain.diagnosis.observable import require_observable
 from warpbrain.diagnosis.onset import onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions, Listener
@@ -60,8 +61,6 @@ Floats = NDArray[np.float64]
 _REFITTED, _REFITTED_BESIDE, _BEHIND, _WORTH = 3, 2, 12.0, 2.0
 #: By how much [nats] the fit of nothing may be better than what is linear about the base, until that is moved there.
 _FAR = 3.0
-#: Mechanisms that are named at most.
-_MOST = 3
 
 
 class Diagnosing:
@@ -129,16 +128,19 @@ class Diagnosing:
             )
         with self._timed("held out"):
             judge = Judge(base, options, rng)
-            stages, judged = [first], [judge.judge(first)]
+            at_first = judge.judge(first)
         with self._timed("beside"):
-            while len(stages) < _MOST and judged[-1].verdict.adds:
-                stages.append(self._beside(refitting, stages[-1], judged[-1], rng))
-                judged.append(judge.judge(stages[-1]))
+
+            def beside(before: Stage, kind: str) -> tuple[Stage, Judgement]:
+                stage = self._beside(refitting, before, kind, rng)
+                return stage, judge.judge(stage)
+
+            stages, judged = named_in_turn(first, at_first, beside)
         self.listener.stage("virtual cases")
         with self._timed("virtual cases"):
             draws_of_cases = np.random.default_rng([options.seed, 11])
             confusion = VirtualCases(first.screening, first.kappa, options.alpha, draws_of_cases).confusion()
-        return self._conclude(stages, judged, judge, where, rng, confusion)
+        return self._conclude(stages, at_first, judged, judge, where, rng, confusion)
 
     def _first(self, base: Base, candidates: Candidates, rng: np.random.Generator) -> tuple[Stage, Refitting]:
         """What acts at all: screened, and refitted where something does."""
@@ -164,9 +166,8 @@ class Diagnosing:
         with self._timed("screening"):
             return base.with_back(sound_points(base, candidates)), candidates
 
-    def _beside(self, refitting: Refitting, before: Stage, judged: Judgement, rng: np.random.Generator) -> Stage:
-        """The next stage: what acts beside the kind that was named last."""
-        kind = judged.verdict.kinds[0]
+    def _beside(self, refitting: Refitting, before: Stage, kind: str, rng: np.random.Generator) -> Stage:
+        """The next stage: what acts beside a kind that the last one refitted."""
         fit = before.fits[kind]
         known = (*before.known, kind)
         self.listener.stage(f"what acts beside {' and '.join(known)}")
@@ -232,13 +233,14 @@ class Diagnosing:
     def _conclude(
         self,
         stages: list[Stage],
+        at_first: Judgement,
         judged: list[Judgement],
         judge: Judge,
         where: ScoreMap,
         rng: np.random.Generator,
         confusion: Confusion,
     ) -> Diagnosis:
-        first, at_first = stages[0], judged[0]
+        first = stages[0]
         base, candidates, fits = first.base, first.candidates, first.fits
         named = named_together(stages, judged)
         conclusion = overall([one.verdict for one in judged])
@@ -258,7 +260,7 @@ class Diagnosing:
         if conclusion.verdict not in (NOTHING, NOT_PHYSICS):
             most = at_first.ranking[0]
             when = onset_of(most.kind if most.physics else UNKNOWN_KIND, base, candidates, first.screen)
-        fit = self._fit(base, fits, held_out, at_first, improvement)
+        fit = self._fit(base, fits, held_out, at_first, improvement, judged[0].placebo_p)
         smallest = self._smallest(base, candidates, first.screening.stack, first.kappa, confusion)
         physical = [r.kind for r in at_first.ranking if r.physics and r.kind in candidates.of_kind][:2]
         measurements = next_measurements(base, candidates, first.screen, physical, fits, first.kappa)
@@ -310,6 +312,7 @@ class Diagnosing:
         held_out: dict[str, Predicted],
         judged: Judgement,
         improvement: tuple[float, float, float],
+        placebo_p: float,
     ) -> Fit:
         rows = base.at.sensors.is_displacement & ~base.aside
         raw = float(np.sqrt(np.mean(base.declared.sensors.residual[rows] ** 2)))
@@ -318,7 +321,7 @@ class Diagnosing:
         explained = gone = chance = None
         if EXPLAINED in fits:
             explained = (float(np.sqrt(np.mean(fits[EXPLAINED].residual[rows] ** 2))), held_out[EXPLAINED].rmse)
-            gone, chance = improvement, judged.placebo_p
+            gone, chance = improvement, placebo_p
         return Fit(
             (raw, raw),
             (inside, held_out["none"].rmse),
