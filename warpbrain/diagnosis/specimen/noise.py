@@ -5,7 +5,8 @@ measured. Taking them for independent makes any difference significant. Its scal
 
 How alike two rows are is Matern's function of order 5/2: such errors have a slope and a curvature, but not every
 derivative, as a Gaussian function would have it (Stein 1999, Interpolation of Spatial Data, section 1.7). With a
-Gaussian one a misfit of a fifth of a curve is no surprise as long as it is smooth, and one of a twentieth with a bend is.
+Gaussian one a misfit of a fifth of a curve is no surprise as long as it is smooth, and one of a twentieth with a bend
+is.
 """
 
 from __future__ import annotations
