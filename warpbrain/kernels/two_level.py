@@ -3,10 +3,10 @@
 What block-Jacobi leaves for hundreds of iterations is smooth, and the coarser mesh knows it. The preconditioner is a
 multigrid cycle of two levels (Hackbusch 1985, Multi-Grid Methods and Applications, section 2.4): smooth, put right on
 the coarser mesh, smooth again. Smoothing is a Chebyshev polynomial of the second degree in `D^-1 A`, `D` the diagonal
-blocks (Adams, Brezina, Hu and Tuminaro 2003, J. Comput. Phys. 188, 593), the same before and after, so that the cycle is
-symmetric. It is positive definite as long as no eigenvalue of `D^-1 A` is above nine eighths of what the polynomial is
-made for; that is a tenth above an estimate by power iterations. Where that fails, or factors of another state are of no
-help, the plain solver is asked.
+blocks (Adams, Brezina, Hu and Tuminaro 2003, J. Comput. Phys. 188, 593), the same before and after, so that the cycle
+is symmetric. It is positive definite as long as no eigenvalue of `D^-1 A` is above nine eighths of what the polynomial
+is made for; that is a tenth above an estimate by power iterations. Where that fails, or factors of another state are of
+no help, the plain solver is asked.
 
 A cycle multiplies four times with the matrix and solves once with the factors: worth it on one core, where an iteration
 takes as long as there are numbers in the matrix. A GPU has done its hundreds of iterations sooner.
