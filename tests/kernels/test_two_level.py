@@ -43,7 +43,9 @@ def two_levels(system: System, coarse, ends) -> TwoLevelGradient:
     prolong = kron(prolongation(ends, coarse.size), eye_array(3), format="csr")[:, free]
     plain = system.linear_solver(tolerance=1e-9, max_iterations=5000, watch_curvature=True)
     matrix = matrix_of(coarse).tocsr()[free][:, free].toarray()
-    return TwoLevelGradient(plain, system.load, system.solution, Dense(matrix), (moves @ prolong).tocsr())
+    return TwoLevelGradient(
+        plain, system.load, system.solution, Dense(matrix), (moves @ prolong).tocsr(), tolerance=1e-9
+    )
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +58,7 @@ def test_solution_in_a_tenth_of_the_iterations(meshes):
     system = assembled(finer)
     solver = two_levels(system, assembled(coarse), ends)
     solver.prepare()
-    solver.solve(1e-9)
+    solver.solve()
     result, found = solver.result(), system.solution.numpy().ravel().copy()
     A, b = matrix_of(system).tocsc(), system.load.numpy().ravel()
     assert result.converged
@@ -104,7 +106,7 @@ def test_an_indefinite_matrix_is_said(meshes):
     system = assembled(finer, m=-1e6)
     solver = two_levels(system, assembled(coarse), ends)
     solver.prepare()
-    solver.solve(1e-9)
+    solver.solve()
     assert solver.result().indefinite
 
 
@@ -115,7 +117,7 @@ def test_factors_that_are_of_no_help_leave_it_to_the_plain_solver(meshes):
     # what no stable body would answer
     solver._coarse.inverse *= -1.0
     solver.prepare()
-    solver.solve(1e-9)
+    solver.solve()
     assert solver.slow
     assert solver.result().converged
     A, b = matrix_of(system), system.load.numpy().ravel()

@@ -172,7 +172,9 @@ class FinerStates:
         factors, free = self._factors
         by_component = kron(prolongation, eye_array(3), format="csr")[:, free]
         moves = diags_array(1.0 - system.model.constrained.ravel().astype(np.float64))
-        return TwoLevelGradient(plain, system.load, system.solution, factors, (moves @ by_component).tocsr())
+        return TwoLevelGradient(
+            plain, system.load, system.solution, factors, (moves @ by_component).tocsr(), tolerance=_ROUGH
+        )
 
     def _system_of(self, model: Model) -> System:
         """The system of the last state with other numbers, or another one where numbers are not all that changed."""

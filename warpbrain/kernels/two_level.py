@@ -52,6 +52,8 @@ class TwoLevelGradient:
     coarse : CoarseSolver
     prolongation : SciPy CSR (3 n, k)
         From free components of the coarser mesh to those of the finer one; rows of constrained ones are zero.
+    tolerance : float
+        Relative. What `solve` takes if it is given no other.
 
     Attributes
     ----------
@@ -66,8 +68,11 @@ class TwoLevelGradient:
         solution: wp.array,
         coarse: CoarseSolver,
         prolongation: Any,
+        *,
+        tolerance: float,
     ) -> None:
         self.slow = False
+        self._tolerance = tolerance
         self._plain = plain
         self._coarse = coarse
         self._prolong, self._restrict = prolongation, prolongation.T.tocsr()
@@ -95,8 +100,9 @@ class TwoLevelGradient:
             self._largest = float(np.linalg.norm(left))
             self._power[:] = left
 
-    def solve(self, tolerance: float) -> None:
+    def solve(self, tolerance: float | None = None) -> None:
         """Solve from the present content of the solution array, until ``|b - A x| <= tolerance |b|``."""
+        tolerance = self._tolerance if tolerance is None else tolerance
         start = self._flat["x"].copy()
         self._result = self._iterate(tolerance)
         if self._result is None:

@@ -69,7 +69,7 @@ def placed_mesh(mesh: TetMesh, device: wp.Device, precision: Precision) -> Place
     if key not in known:
         tetrahedra = np.sort(mesh.tetrahedra, axis=1)
         edges = mesh.points[tetrahedra[:, 1:]] - mesh.points[tetrahedra[:, :1]]
-        gradients = np.linalg.inv(edges.transpose(0, 2, 1))
+        gradients: Floats = np.linalg.inv(edges.transpose(0, 2, 1)).astype(np.float64, copy=False)
         nodes = wp.array(tetrahedra, dtype=wp.vec4i, device=device)
         known[key] = PlacedMesh(tetrahedra, gradients, nodes, wp.array(gradients, dtype=precision.mat33, device=device))
     return known[key]
