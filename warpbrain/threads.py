@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from contextlib import AbstractContextManager
+from functools import cache
+from typing import Any, TypeVar
 
 Part = TypeVar("Part")
 Made = TypeVar("Made")
@@ -33,10 +35,30 @@ def in_threads(work: Callable[[Part], Made], parts: Sequence[Part]) -> list[Made
     """What a function makes of each part, in their order.
 
     It gains where the function leaves Python's lock alone for most of its time. What comes out does not depend on the
-    number of threads: each part is worked on by itself.
+    number of threads: each part is worked on by itself, with one thread of BLAS.
     """
     count = min(thread_count(), len(parts))
-    if count < 2:
-        return [work(part) for part in parts]
-    with ThreadPoolExecutor(count) as pool:
-        return list(pool.map(work, parts))
+    with one_thread_of_blas():
+        if count < 2:
+            return [work(part) for part in parts]
+        with ThreadPoolExecutor(count) as pool:
+            return list(pool.map(work, parts))
+
+
+def one_thread_of_blas() -> AbstractContextManager[Any]:
+    """While it lasts, products of matrices stay in the thread that asks for them.
+
+    Threads of BLAS wait for each other in a loop: for thousands of small products on processors that have other work
+    too that takes many times as long as the products.
+    """
+    limited: AbstractContextManager[Any] = _libraries().limit(limits=1, user_api="blas")
+    return limited
+
+
+@cache
+def _libraries() -> Any:
+    """Libraries with threads of their own; SciPy has another BLAS than NumPy, once it is loaded."""
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.multifrontal import Cholesky
 from warpbrain.errors import SolveError
-from warpbrain.threads import in_threads
+from warpbrain.threads import in_threads, one_thread_of_blas
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +40,8 @@ class Factors:
 
     def __init__(self, matrix: Any, places: Floats) -> None:
         try:
-            self._factors: Any = Cholesky(matrix, places)
+            with one_thread_of_blas():
+                self._factors: Any = Cholesky(matrix, places)
         except np.linalg.LinAlgError:
             self._factors = _lower_and_upper(matrix)
 
