@@ -40,3 +40,16 @@ def test_what_goes_wrong_in_a_thread_is_raised(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     with pytest.raises(ZeroDivisionError):
         in_threads(lambda part: 1 / part, [1, 0, 2])
+
+
+def test_blas_has_one_thread_in_each(monkeypatch):
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    def threads() -> set[int]:
+        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    with threadpool_limits(2, user_api="blas"):
+        assert in_threads(lambda part: threads(), range(2)) == [{1}, {1}]
+        assert threads() == {2}

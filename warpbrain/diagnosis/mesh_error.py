@@ -159,8 +159,10 @@ class FinerStates:
         """
         from scipy.sparse import diags_array, eye_array, kron
 
+        if not system.device.is_cpu or system.quadratic is not None:
+            return None
         plain = system.linear_solver(tolerance=_ROUGH, max_iterations=_MOST, watch_curvature=True)
-        if not (system.device.is_cpu and system.quadratic is None and isinstance(plain, ConjugateGradient)):
+        if not isinstance(plain, ConjugateGradient):
             return None
         if self._factors is None:
             coarse.system.u.assign(coarse.u)
