@@ -24,9 +24,7 @@ def problem():
 
 def surface_of(K, normals, held, reactions, size=100.0) -> HeldSurface:
     free = ~np.repeat(held, 3)
-    places = np.repeat(np.random.default_rng(5).normal(size=(len(held), 3)), 3, axis=0)
-    factors = Factors(csr_matrix(K[free][:, free]), places[free])
-    return HeldSurface(csr_matrix(K), free, factors, held, normals, reactions, size)
+    return HeldSurface(csr_matrix(K), free, Factors(csr_matrix(K[free][:, free])), held, normals, reactions, size)
 
 
 def test_what_lifts_off_is_not_pulled_and_what_stays_is_not_drawn_in(problem):

@@ -5,9 +5,9 @@ At an equilibrium `u` with tangent stiffness `K`, a nodal force `g` beside the l
 
     A = [ (H_u + H_R K_cf) K_ff^-1 ,  -H_R ]
 
-is needed, one right-hand side a sensor; whatever is looked for costs a product with `A` after that. The factors of
-5,000 nodes take less than a second, and 100 right-hand sides a sixth of one (`warpbrain.diagnosis.multifrontal`); block
-conjugate gradients take far longer for as many as there are sensors.
+is needed, one right-hand side a sensor; whatever is looked for costs a product with `A` after that. SciPy's LU has
+the factors of 5,000 nodes in a second, and 100 right-hand sides in another; block conjugate gradients take ten times
+as long for as many as there are sensors.
 """
 
 from __future__ import annotations
@@ -61,8 +61,7 @@ class Linearisation:
         #: `K` [N/m] on every component, SciPy CSR (3 N, 3 N).
         self.stiffness: Any = K
         self._free, self._held_free = free, K[~free][:, free]
-        places = np.repeat(system.node_mesh.points, 3, axis=0)
-        self._factors = Factors(K[free][:, free], places[free])
+        self._factors = Factors(K[free][:, free])
 
     def with_sensors(self, sensors: Sensors) -> Linearisation:
         """The same state with other sensors; nothing is factorised again."""

@@ -167,9 +167,8 @@ class FinerStates:
         if self._factors is None:
             coarse.system.u.assign(coarse.u)
             free = ~coarse.system.model.constrained.ravel()
-            places = np.repeat(coarse.system.node_mesh.points, 3, axis=0)
             try:
-                self._factors = Factors(coarse.system.stiffness().tocsr()[free][:, free], places[free]), free
+                self._factors = Factors(coarse.system.stiffness().tocsr()[free][:, free]), free
             except SolveError:
                 return None
         factors, free = self._factors
