@@ -13,7 +13,7 @@ FLOORS = [
     *("report", "terminal", "bench", "cli"),
 ]
 #: Modules that any floor may use, and that use none.
-LEAVES = ["errors", "atomic", "frame", "problems", "values"]
+LEAVES = ["errors", "atomic", "frame", "problems", "threads", "values"]
 
 
 def room(module: str) -> str:

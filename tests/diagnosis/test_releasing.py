@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
-from scipy.sparse.linalg import splu
 
+from warpbrain.diagnosis.factors import Factors
 from warpbrain.diagnosis.releasing import HeldSurface
 from warpbrain.errors import SolveError
 
@@ -24,7 +24,7 @@ def problem():
 
 def surface_of(K, normals, held, reactions, size=100.0) -> HeldSurface:
     free = ~np.repeat(held, 3)
-    return HeldSurface(csr_matrix(K), free, splu(csr_matrix(K[free][:, free]).tocsc()), held, normals, reactions, size)
+    return HeldSurface(csr_matrix(K), free, Factors(csr_matrix(K[free][:, free])), held, normals, reactions, size)
 
 
 def test_what_lifts_off_is_not_pulled_and_what_stays_is_not_drawn_in(problem):

@@ -53,3 +53,16 @@ def test_an_edge_through_the_body_is_not_on_its_surface() -> None:
     centre = np.linalg.norm(finer.points - 0.5, axis=1) < 1e-9
     assert centre.sum() == 1
     np.testing.assert_array_equal(finer.node_sets["all"], ~centre)
+
+
+def test_other_sets_of_nodes_are_inherited_on_the_same_elements() -> None:
+    mesh = box((2, 2, 2))
+    finer, _ = mesh.finer
+    x, z = mesh.points[:, 0], mesh.points[:, 2]
+    for sets in ({"bottom": z < 1e-9}, {"ends": (x < 1e-9) | (x > 1 - 1e-9), "half": z < 0.6}):
+        shared, _ = mesh.with_node_sets(sets).finer
+        anew, _ = TetMesh(mesh.points, mesh.tetrahedra, mesh.tissue, sets).finer
+        assert shared.tetrahedra is finer.tetrahedra
+        assert set(shared.node_sets) == set(sets)
+        for name in sets:
+            np.testing.assert_array_equal(shared.node_sets[name], anew.node_sets[name])

@@ -111,3 +111,32 @@ def test_import_is_cheap():
     code = "import sys, warpbrain.mesh; print([m for m in ('meshio', 'pyvista', 'scipy', 'warp') if m in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert found.strip() == "[]"
+
+
+def test_other_node_sets_share_what_is_known():
+    mesh = two()
+    volumes, boundary = mesh.volumes, mesh.boundary
+    other = mesh.with_node_sets({"high": TWO[:, 2] > 0.5})
+    assert list(other.node_sets) == ["high"]
+    assert list(mesh.node_sets) == ["low", "far"]
+    assert other.volumes is volumes
+    assert other.boundary is boundary
+    with pytest.raises(MeshError, match="node set 'high' has shape"):
+        mesh.with_node_sets({"high": np.ones(3, dtype=bool)})
+    with pytest.raises(ValueError, match="read-only"):
+        other.node_sets["high"][0] = True
+
+
+def test_the_same_part_is_taken_out_once():
+    mesh = two()
+    first, second = np.array([True, False]), np.array([False, True])
+    left = mesh.without(first)
+    assert mesh.without(first.copy())[0] is left[0]
+    assert mesh.without(second)[0].node_sets["far"].tolist() == [False, False, False, False]
+    assert mesh.without(first)[0].node_sets["far"].tolist() == [False, False, False, True]
+    # sets of nodes are those of whoever asks
+    other = mesh.with_node_sets({"high": TWO[:, 2] > 0.5})
+    assert {name: own.tolist() for name, own in other.without(first)[0].node_sets.items()} == {
+        "high": [False, False, True, True]
+    }
+    assert set(mesh.without(first)[0].node_sets) == {"low", "far"}

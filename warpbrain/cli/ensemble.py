@@ -211,8 +211,9 @@ def _job(options: argparse.Namespace, model: Any, samples: list[Sample]) -> Job:
 @contextmanager
 def _workers(options: argparse.Namespace) -> Iterator[Workers]:
     """Who computes, as the arguments say."""
-    from warpbrain.ensemble.workers import Here, Processes, kind_of, processors
+    from warpbrain.ensemble.workers import Here, Processes, kind_of
     from warpbrain.terminal.quiet import start_warp_quietly
+    from warpbrain.threads import processors
 
     if options.dask is not None:
         from warpbrain.ensemble.cluster import Cluster

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.releasing import TOGETHER, HeldSurface
+from warpbrain.diagnosis.factors import Factors
+from warpbrain.diagnosis.releasing import HeldSurface
 from warpbrain.diagnosis.sensors import Sensors
-from warpbrain.errors import SolveError
 from warpbrain.mesh import vertex_normals
 from warpbrain.simulation.system import System
 
@@ -54,8 +54,6 @@ class Linearisation:
         self._factorise()
 
     def _factorise(self) -> None:
-        from scipy.sparse.linalg import splu
-
         system = self.system
         system.u.assign(self.u)
         K = system.stiffness().tocsr()
@@ -63,13 +61,7 @@ class Linearisation:
         #: `K` [N/m] on every component, SciPy CSR (3 N, 3 N).
         self.stiffness: Any = K
         self._free, self._held_free = free, K[~free][:, free]
-        options = {"SymmetricMode": True}
-        try:
-            self._factors: Any = splu(
-                K[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
-            )
-        except RuntimeError as error:
-            raise SolveError(f"the state is unstable: its tangent stiffness cannot be factorised ({error})") from None
+        self._factors = Factors(K[free][:, free])
 
     def with_sensors(self, sensors: Sensors) -> Linearisation:
         """The same state with other sensors; nothing is factorised again."""
@@ -91,15 +83,13 @@ class Linearisation:
         """Rows of `A` that differ, and which of them (n,) is whose: what was recorded at several times is one row."""
         free, sensors = self._free, self.sensors
         by_R = sensors.by_reactions[:, ~free]
-        moved = np.asarray((sensors.by_displacement[:, free] + by_R @ self._held_free).todense())
+        moved = (sensors.by_displacement[:, free] + by_R @ self._held_free).tocsr()
         held = -np.asarray(by_R.todense())
         rng = np.random.default_rng(0)
         mark = moved @ rng.normal(size=moved.shape[1]) + held @ rng.normal(size=held.shape[1])
         _, different, which = np.unique(mark, return_index=True, return_inverse=True)
         A = np.empty((len(different), len(free)))
-        for first in range(0, len(different), TOGETHER):
-            part = slice(first, first + TOGETHER)
-            A[part, free] = self._factors.solve(np.ascontiguousarray(moved[different[part]].T)).T
+        A[:, free] = self._factors.solve(moved[different].T).T
         A[:, ~free] = held[different]
         return A, which.ravel()
 
@@ -159,7 +149,7 @@ class Linearisation:
             return np.asarray((rows @ forces)[which])
         forces = forces.toarray() if issparse(forces) else forces
         du = np.zeros((len(self._free), count))
-        du[self._free] = self._factors.solve(np.ascontiguousarray(forces[self._free]))
+        du[self._free] = self._factors.solve(forces[self._free])
         dR = np.where(self._free[:, None], 0.0, self.stiffness @ du - forces)
         return np.asarray(self.sensors.by_displacement @ du + self.sensors.by_reactions @ dR)
 

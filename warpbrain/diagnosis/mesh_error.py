@@ -10,15 +10,19 @@ compressibility may explain has these changes, or a tenth more stiffness would b
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.diagnosis.factors import Factors
 from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.diagnosis.states import TOLERANCE, Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference, Discretisation
 from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.kernels.linear import ConjugateGradient
+from warpbrain.kernels.two_level import TwoLevelGradient
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.finer import FinerCase, restricted
@@ -29,6 +33,8 @@ Floats = NDArray[np.float64]
 
 #: Out-of-balance force of the finer state, relative: far below the error that is looked for.
 _ROUGH = 10.0 * TOLERANCE
+#: Iterations of conjugate gradients at most, where the two levels are of no help.
+_MOST = 10_000
 #: Change of the tissue [standard deviations] whose error is compared: far more than rounding, little beside the error.
 _STEP = 0.2
 
@@ -75,6 +81,9 @@ def expected_answer(sensors: Sensors, known: Difference) -> Floats:
 class FinerStates:
     """Solves hypotheses on elements of half the size, each from what the last was beyond its mesh.
 
+    On the CPU the mesh that there was, factorised at the first of them, preconditions all of them: see
+    `warpbrain.kernels.two_level`. It is factorised anew when it helps less.
+
     Parameters
     ----------
     states : States
@@ -84,6 +93,7 @@ class FinerStates:
         self.states = states
         self._beyond: Floats | float = 0.0
         self._system: System | None = None
+        self._factors: tuple[Factors, NDArray[np.bool_]] | None = None
 
     def errors(self, state: SolvedState, less_compressible: Mechanism, prior: Gaussian) -> MeshErrors:
         """The error of a state, and what it is beside that with other tissue.
@@ -128,15 +138,45 @@ class FinerStates:
         finer = FinerCase(self.states.case_of(even))
         model = finer.model(coarse.system.model)
         external = model.external_forces()
-        solver = EquilibriumSolver(self._system_of(model), EquilibriumOptions(tolerance=_ROUGH))
+        system = self._system_of(model)
+        linear = self._two_level(system, coarse, finer.prolongation)
+        solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=_ROUGH), linear=linear)
         flat = finer.prolongation @ coarse.u
         try:
             found = solver.solve(external, flat + self._beyond)
         except SolveError:
             found = solver.solve(external, flat)
+        if linear is not None and linear.slow:
+            self._factors = None
         self._beyond = found.u - flat
         u, reactions = restricted(finer.prolongation, found.u, model.reactions(found.internal, external))
         return Difference(u - coarse.u, reactions - coarse.reactions, hypothesis.theta)
+
+    def _two_level(self, system: System, coarse: SolvedState, prolongation: Any) -> TwoLevelGradient | None:
+        """What solves the finer system's linear systems with the factors of the coarse one; None for what does always.
+
+        Terms with unknowns of their own, and midside nodes, which are not on the mesh of corners, are for that one.
+        """
+        from scipy.sparse import diags_array, eye_array, kron
+
+        if not system.device.is_cpu or system.quadratic is not None:
+            return None
+        plain = system.linear_solver(tolerance=_ROUGH, max_iterations=_MOST, watch_curvature=True)
+        if not isinstance(plain, ConjugateGradient):
+            return None
+        if self._factors is None:
+            coarse.system.u.assign(coarse.u)
+            free = ~coarse.system.model.constrained.ravel()
+            try:
+                self._factors = Factors(coarse.system.stiffness().tocsr()[free][:, free]), free
+            except SolveError:
+                return None
+        factors, free = self._factors
+        by_component = kron(prolongation, eye_array(3), format="csr")[:, free]
+        moves = diags_array(1.0 - system.model.constrained.ravel().astype(np.float64))
+        return TwoLevelGradient(
+            plain, system.load, system.solution, factors, (moves @ by_component).tocsr(), tolerance=_ROUGH
+        )
 
     def _system_of(self, model: Model) -> System:
         """The system of the last state with other numbers, or another one where numbers are not all that changed."""

@@ -16,14 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.diagnosis.factors import Factors
 from warpbrain.errors import SolveError
 from warpbrain.mesh import tangents
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-#: Right-hand sides that are solved together: more do not stay in the cache.
-TOGETHER = 32
 #: Changes of what is lifted off at most.
 _CHANGES = 20
 #: Part of the size of the body farther than which nothing goes to first order: then little holds it any more.
@@ -39,7 +38,7 @@ class HeldSurface:
         `K` [N/m].
     free : (3 N,) bool array
         Components that nothing holds.
-    factors : SciPy SuperLU
+    factors : Factors
         Of the free part of `K`.
     members : (N,) bool array
         Nodes, all of whose components are held.
@@ -53,7 +52,7 @@ class HeldSurface:
         self,
         stiffness: Any,
         free: Bools,
-        factors: Any,
+        factors: Factors,
         members: Bools,
         normals: Floats,
         reactions: Floats,
@@ -65,9 +64,7 @@ class HeldSurface:
         own = np.repeat(members, 3)
         towards = stiffness[free][:, own].tocsc()
         whole = np.asarray(stiffness[own][:, own].todense())
-        for first in range(0, 3 * count, TOGETHER):
-            part = slice(first, first + TOGETHER)
-            whole[:, part] -= towards.T @ factors.solve(np.asarray(towards[:, part].todense()))
+        whole -= factors.between(towards.T, towards)
         self._towards = towards
         # two tangents and the normal
         along = tangents(normals[self.members])

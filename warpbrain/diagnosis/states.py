@@ -256,7 +256,7 @@ def _released(case: Case, patches: tuple[Patch, ...]) -> tuple[TetMesh, tuple[Bo
         sets[still] = sets[boundary.nodes] & ~loose
         if sets[still].any():
             boundaries.append(replace(boundary, nodes=still))
-    return replace(case.mesh, node_sets=sets), tuple(boundaries)
+    return case.mesh.with_node_sets(sets), tuple(boundaries)
 
 
 def recorded_times(case: Case) -> tuple[float, ...]:

@@ -108,11 +108,6 @@ class Processes:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def processors() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def kind_of(device: str | None) -> str:
     """``"cpu"`` or ``"cuda"``."""
     return "cuda" if find_device(device).is_cuda else "cpu"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.mesh.quality import EDGES
-from warpbrain.mesh.surface import boundary_faces
+from warpbrain.mesh.surface import nodes_of
 from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
 
 #: Corners 0 to 3 and the midpoints of edges 01, 02, 03, 12, 13, 23 as 4 to 9: what is cut off at each corner.
@@ -37,12 +39,17 @@ def refined(mesh: TetMesh) -> tuple[TetMesh, Ints]:
     nodes = np.concatenate([mesh.tetrahedra, count + number.reshape(-1, 6)], axis=1)
     children = np.concatenate([nodes[:, _CORNERS], _octahedra(points, nodes)], axis=1).reshape(-1, 4)
     ends = np.concatenate([np.repeat(np.arange(count)[:, None], 2, axis=1), edges]).astype(np.int32)
-    surface = np.concatenate(_on_surface(mesh, edges))
-    node_sets = {name: inherited(members, ends, surface) for name, members in mesh.node_sets.items()}
     element_sets = {name: np.repeat(members, 8) for name, members in mesh.element_sets.items()}
     element_vectors = {name: np.repeat(vectors, 8, axis=0) for name, vectors in mesh.element_vectors.items()}
     tissue = np.repeat(mesh.tissue, 8)
-    return TetMesh(points, children, tissue, node_sets, element_sets, element_vectors), ends
+    finer = TetMesh(points, children, tissue, {}, element_sets, element_vectors)
+    return finer.with_node_sets(inherited_sets(mesh.node_sets, ends, finer)), ends
+
+
+def inherited_sets(sets: Mapping[str, Bools], ends: Ints, finer: TetMesh) -> dict[str, Bools]:
+    """Sets of nodes of a mesh on the finer one, by the rule of `inherited`."""
+    surface = nodes_of(finer.boundary, len(ends))
+    return {name: inherited(members, ends, surface) for name, members in sets.items()}
 
 
 def inherited(members: Bools, ends: Ints, surface: Bools) -> Bools:
@@ -77,14 +84,3 @@ def _octahedra(points: Floats, nodes: NDArray[np.int64]) -> Ints:
     inverted = np.linalg.det(edges) < 0.0
     found[inverted] = found[inverted][:, [1, 0, 2, 3]]
     return np.asarray(found, dtype=np.int32)
-
-
-def _on_surface(mesh: TetMesh, edges: Ints) -> tuple[Bools, Bools]:
-    """Which nodes (n,) and which edges (k,) are of the boundary."""
-    faces = boundary_faces(mesh.tetrahedra)
-    nodes = np.zeros(len(mesh.points), dtype=bool)
-    nodes[faces] = True
-    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
-    count = len(mesh.points)
-    keys = edges.astype(np.int64) @ [count, 1]
-    return nodes, np.isin(keys, sides.astype(np.int64) @ [count, 1])

@@ -189,14 +189,37 @@ class TetMesh:
         return rule_on_boundary(self)
 
     @cached_property
+    def _made(self) -> dict[str, Any]:
+        """Meshes made of this one, which others share that differ in their node sets only."""
+        return {}
+
+    @cached_property
     def finer(self) -> tuple[TetMesh, Ints]:
         """The mesh with every tetrahedron cut into eight, and between which nodes its own lie; made once.
 
         See `warpbrain.mesh.refinement.refined`.
         """
-        from warpbrain.mesh.refinement import refined
+        from warpbrain.mesh.refinement import inherited_sets, refined
 
-        return refined(self)
+        if "finer" not in self._made:
+            self._made["finer"] = refined(self)
+            return self._made["finer"]
+        mesh, ends = self._made["finer"]
+        return mesh.with_node_sets(inherited_sets(self.node_sets, ends, mesh)), ends
+
+    def with_node_sets(self, sets: Mapping[str, ArrayLike]) -> TetMesh:
+        """The same mesh with other sets of nodes: only these are checked, and nothing that is known is made again.
+
+        Raises
+        ------
+        MeshError
+            If a set is not a boolean array of one value a node.
+        """
+        checked = _sets(sets, len(self.points), "node")
+        shared = {"_made": self._made, **{name: value for name, value in vars(self).items() if name != "finer"}}
+        other: TetMesh = object.__new__(TetMesh)
+        other.__dict__.update(shared, node_sets=checked)
+        return other
 
     @property
     def volume(self) -> float:
@@ -239,19 +262,32 @@ class TetMesh:
             )
         if removed.all():
             raise MeshError("removing every tetrahedron leaves no mesh")
-        element_ids = np.flatnonzero(~removed).astype(np.int32)
-        kept = self.tetrahedra[element_ids]
-        node_ids = np.unique(kept).astype(np.int32)
+        # hypotheses about one body take the same part out again and again
+        what = removed.tobytes()
+        if self._made.get("taken out") != what:
+            self._made["taken out"], self._made["left"] = what, (self.node_sets, *self._left(~removed))
+        sets, mesh, node_ids, element_ids = self._made["left"]
+        if self.node_sets is not sets:
+            mesh = mesh.with_node_sets({name: members[node_ids] for name, members in self.node_sets.items()})
+        return mesh, node_ids, element_ids
+
+    def _left(self, kept: Bools) -> tuple[TetMesh, Ints, Ints]:
+        element_ids = np.flatnonzero(kept).astype(np.int32)
+        tetrahedra = self.tetrahedra[element_ids]
+        node_ids = np.unique(tetrahedra).astype(np.int32)
         new_id = np.full(len(self.points), -1, dtype=np.int32)
         new_id[node_ids] = np.arange(len(node_ids), dtype=np.int32)
         mesh = TetMesh(
             self.points[node_ids],
-            new_id[kept],
+            new_id[tetrahedra],
             self.tissue[element_ids],
             {name: members[node_ids] for name, members in self.node_sets.items()},
             {name: members[element_ids] for name, members in self.element_sets.items()},
             {name: vectors[element_ids] for name, vectors in self.element_vectors.items()},
         )
+        # of all who ask
+        node_ids.setflags(write=False)
+        element_ids.setflags(write=False)
         return mesh, node_ids, element_ids
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.kernels.linear import LinearResult
+from warpbrain.simulation.coupled import LinearSolver
 from warpbrain.simulation.held import require_held
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
@@ -148,6 +149,8 @@ class EquilibriumSolver:
         Called with each `NewtonStep` as it is taken.
     clock : PhaseClock, optional
         Adds up the wall time by phase.
+    linear : LinearSolver, optional
+        Solves the system's linear systems; by default what `System.linear_solver` gives for the options.
 
     Attributes
     ----------
@@ -161,13 +164,14 @@ class EquilibriumSolver:
         options: EquilibriumOptions | None = None,
         on_step: Callable[[NewtonStep], None] | None = None,
         clock: PhaseClock | None = None,
+        linear: LinearSolver | None = None,
     ) -> None:
         self.system = system
         self.options = options or EquilibriumOptions()
         self._on_step = on_step
         self.clock = clock or PhaseClock(system.device)
         self._reference_shift: float | None = None
-        self._cg = system.linear_solver(
+        self._linear = linear or system.linear_solver(
             tolerance=self.options.cg_tolerance,
             max_iterations=self.options.max_cg,
             preconditioner=self.options.preconditioner,
@@ -402,9 +406,9 @@ class EquilibriumSolver:
                 system.subtract_constrained_load(system.increment, 1.0)
             system.solution.zero_()
         with self.clock.phase("solve system"):
-            self._cg.prepare()
-            self._cg.solve(eta)
-        linear = self._cg.result()
+            self._linear.prepare()
+            self._linear.solve(eta)
+        linear = self._linear.result()
         return system.solution.numpy().astype(np.float64) * self._free + prescribed, linear
 
     def _potential(self, u: Floats, external: Floats) -> tuple[float, float]:

@@ -29,7 +29,7 @@ from warpbrain.physics.term import Term
 from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, averaged_terms, own_modulus
 from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
 from warpbrain.simulation.model import Material, Model
-from warpbrain.simulation.pattern import build_pattern
+from warpbrain.simulation.placed import placed_mesh, placed_pattern
 
 Floats = NDArray[np.float64]
 
@@ -146,37 +146,27 @@ class System:
 
     def _place_mesh(self) -> None:
         mesh, p = self.model.mesh, self.precision
-        # Ascending node ids make every stored block belong to an upper block of the matrix. Odd permutations turn an
-        # element inside out, which nothing below notices: gradients do not depend on the order, volumes are taken
-        # before it.
-        self.tetrahedra = np.sort(mesh.tetrahedra, axis=1)
-        edges = mesh.points[self.tetrahedra[:, 1:]] - mesh.points[self.tetrahedra[:, :1]]
-        # rows of the inverse edge matrix: gradients of the shape functions of nodes 1 to 3
-        self.shape_gradients = np.linalg.inv(edges.transpose(0, 2, 1))
-        self.nodes = self._array(self.tetrahedra, wp.vec4i)
+        placed = placed_mesh(mesh, self.device, p)
+        self.tetrahedra, self.shape_gradients = placed.tetrahedra, placed.shape_gradients
+        self.nodes, self.inverse_edges = placed.nodes, placed.inverse_edges
         self.stencils, self.element_nodes = self.tetrahedra, self.nodes
         if self.quadratic is not None:
             self.stencils = self.quadratic.elements
             self.element_nodes = self._array(self.stencils, int)
-        self.inverse_edges = self._array(self.shape_gradients, p.mat33)
         self._volumes = mesh.volumes
         self.volume = self._array(self._volumes, p.scalar)
         self.mass = self._array(self.model.node_masses, p.scalar)
 
     def _place_pattern(self) -> None:
         p = self.precision
-        pattern = build_pattern([self.stencils, *(term.stencils for term in self.terms)], self.size)
-        self.pairs = self._array(pattern.pairs, wp.vec2i)
-        self.pair_positions = self._array(pattern.positions, wp.vec2i)
-        self.pair_first = self._array(pattern.first, int)
-        self.contributions = self._array(pattern.contributions, int)
-        self.corner_first = self._array(pattern.corner_first, int)
-        self.corners = self._array(pattern.corners, int)
-        self.diagonal = self._array(pattern.diagonal, int)
-        self.block_pairs = self._array(pattern.block_pairs, int)
+        stencils = [self.stencils, *(term.stencils for term in self.terms)]
+        pattern = placed_pattern(self.model.mesh, stencils, self.size, self.device)
+        self.pairs, self.pair_positions, self.pair_first = pattern.pairs, pattern.positions, pattern.first
+        self.contributions, self.block_pairs = pattern.contributions, pattern.block_pairs
+        self.corner_first, self.corners = pattern.corner_first, pattern.corners
+        self.diagonal = pattern.diagonal
         self.matrix: BsrMatrix = bsr_zeros(self.size, self.size, p.mat33, device=self.device)
-        self.matrix.offsets = self._array(pattern.offsets, int)
-        self.matrix.columns = self._array(pattern.columns, int)
+        self.matrix.offsets, self.matrix.columns = pattern.offsets, pattern.columns
         self.matrix.values = wp.zeros(len(pattern.columns), dtype=p.mat33, device=self.device)
         self.matrix.nnz = len(pattern.columns)
 

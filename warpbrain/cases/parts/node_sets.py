@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -70,7 +70,7 @@ class NodeSets:
         mesh = self.found.mesh
         if not self.added:
             return mesh
-        return replace(mesh, node_sets={**mesh.node_sets, **self.added})
+        return mesh.with_node_sets({**mesh.node_sets, **self.added})
 
 
 def _read_numbers(path: Path, found: MeshInFile, problems: Problems) -> Bools | None:

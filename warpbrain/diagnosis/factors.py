@@ -1,0 +1,70 @@
+"""The factors of a stiffness matrix, and equilibria under many forces by them.
+
+Forces are taken in blocks of columns: SuperLU passes its factors once a block, and a block has to stay in the cache.
+Blocks are solved in threads, since SciPy lets go of Python's lock for that; a block's answer is the same whoever solves
+it, so results do not depend on the number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import SolveError
+from warpbrain.threads import in_threads, one_thread_of_blas
+
+Floats = NDArray[np.float64]
+
+#: Columns that are solved together.
+_TOGETHER = 16
+
+
+class Factors:
+    """Factors of a symmetric positive definite matrix.
+
+    Parameters
+    ----------
+    matrix : SciPy sparse matrix (n, n)
+
+    Raises
+    ------
+    SolveError
+        If it is singular.
+    """
+
+    def __init__(self, matrix: Any) -> None:
+        from scipy.sparse.linalg import splu
+
+        options = {"SymmetricMode": True}
+        try:
+            with one_thread_of_blas():
+                ordered = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
+                self._factors: Any = splu(matrix.tocsc(), options=options, **ordered)
+        except RuntimeError as error:
+            raise SolveError(f"the state is unstable: its tangent stiffness cannot be factorised ({error})") from None
+
+    def solve(self, columns: Any) -> Floats:
+        """What answers to columns (n, k), an array or SciPy sparse: (n, k), column after column in memory."""
+        return self._filled(columns, columns.shape[0], lambda found: found)
+
+    def between(self, left: Any, columns: Any) -> Floats:
+        """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k), dense a block at a time only."""
+        return self._filled(columns, left.shape[0], lambda found: left @ found)
+
+    def _filled(self, columns: Any, rows: int, of: Callable[[Floats], Floats]) -> Floats:
+        """What is made of the answers to each block, beside each other."""
+        from scipy.sparse import issparse
+
+        columns = columns.tocsc() if issparse(columns) else columns
+        made = np.empty((rows, columns.shape[1]), order="F")
+
+        def solve_block(first: int) -> None:
+            block = columns[:, first : first + _TOGETHER]
+            block = block.toarray() if issparse(block) else block
+            made[:, first : first + _TOGETHER] = of(self._factors.solve(np.asfortranarray(block, dtype=np.float64)))
+
+        in_threads(solve_block, range(0, columns.shape[1], _TOGETHER))
+        return made

@@ -1,0 +1,64 @@
+"""How many processors there are for this process, and host work of independent parts in as many threads."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from functools import cache
+from typing import Any, TypeVar
+
+Part = TypeVar("Part")
+Made = TypeVar("Made")
+
+#: Threads at most: factors are read by all of them, and memory is no faster for more.
+MOST = 16
+
+
+def processors() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def thread_count() -> int:
+    """Threads for host work: what the environment variable ``OMP_NUM_THREADS`` says, else one a processor; at most 16.
+
+    Of a list of numbers, as OpenMP allows, the first counts; what is no number is taken for not said, as OpenMP does.
+    """
+    said = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
+    wanted = int(said) if said.isdecimal() and int(said) > 0 else processors()
+    return min(wanted, MOST)
+
+
+def in_threads(work: Callable[[Part], Made], parts: Sequence[Part]) -> list[Made]:
+    """What a function makes of each part, in their order.
+
+    It gains where the function leaves Python's lock alone for most of its time. What comes out does not depend on the
+    number of threads: each part is worked on by itself, with one thread of BLAS.
+    """
+    count = min(thread_count(), len(parts))
+    with one_thread_of_blas():
+        if count < 2:
+            return [work(part) for part in parts]
+        with ThreadPoolExecutor(count) as pool:
+            return list(pool.map(work, parts))
+
+
+def one_thread_of_blas() -> AbstractContextManager[Any]:
+    """While it lasts, products of matrices stay in the thread that asks for them.
+
+    Threads of BLAS wait for each other in a loop: for thousands of small products on processors that have other work
+    too that takes many times as long as the products.
+    """
+    limited: AbstractContextManager[Any] = _libraries().limit(limits=1, user_api="blas")
+    return limited
+
+
+@cache
+def _libraries() -> Any:
+    """Libraries with threads of their own; SciPy has another BLAS than NumPy, once it is loaded."""
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
