@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.kernels.linear import LinearResult
+from warpbrain.simulation.coupled import LinearSolver
+from warpbrain.simulation.factored import FactoredSolver
+from warpbrain.simulation.factors import Factors
 from warpbrain.simulation.held import require_held
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
@@ -148,6 +151,8 @@ class EquilibriumSolver:
         Called with each `NewtonStep` as it is taken.
     clock : PhaseClock, optional
         Adds up the wall time by phase.
+    factors : Factors, optional
+        Kept by who solves for many states that are near to each other; they serve on the CPU alone.
 
     Attributes
     ----------
@@ -161,18 +166,21 @@ class EquilibriumSolver:
         options: EquilibriumOptions | None = None,
         on_step: Callable[[NewtonStep], None] | None = None,
         clock: PhaseClock | None = None,
+        factors: Factors | None = None,
     ) -> None:
         self.system = system
         self.options = options or EquilibriumOptions()
         self._on_step = on_step
         self.clock = clock or PhaseClock(system.device)
         self._reference_shift: float | None = None
-        self._cg = system.linear_solver(
+        self._cg: LinearSolver = system.linear_solver(
             tolerance=self.options.cg_tolerance,
             max_iterations=self.options.max_cg,
             preconditioner=self.options.preconditioner,
             watch_curvature=True,
         )
+        if factors is not None and system.device.is_cpu:
+            self._cg = FactoredSolver(system, self._cg, factors, self.options.cg_tolerance)
         self._history: list[NewtonStep] = []
         self._free = 1.0 - system.model.constrained
         # residuals cannot fall below the rounding of the sums of element forces

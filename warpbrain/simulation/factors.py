@@ -1,0 +1,51 @@
+"""Factors of one stiffness, kept to precondition the systems of many states near to it.
+
+A step in time, another moment, a trial of a fit: each changes a tangent a little, and a factorisation of any of them
+nearly solves all. They are kept in single precision, which halves what a solve has to read: a preconditioner need not
+be more exact than the tangent is near.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class Factors:
+    """Of the stiffness of the last state that they were renewed at; of none at first."""
+
+    def __init__(self) -> None:
+        self._free: NDArray[np.bool_] | None = None
+        self._factors: Any = None
+
+    def serve(self, free: NDArray[np.bool_]) -> bool:
+        """Whether there are any, for these free components (3 n,)."""
+        return self._free is not None and np.array_equal(self._free, free)
+
+    def renew(self, stiffness: Any, free: NDArray[np.bool_]) -> bool:
+        """Factorise a stiffness [N/m], SciPy (3 n, 3 n), on its free components (3 n,); whether that went well."""
+        from scipy.sparse.linalg import splu
+
+        within = stiffness.tocsr()[free][:, free].tocsc().astype(np.float32)
+        self._free = None
+        try:
+            self._factors = splu(
+                within, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            )
+        except RuntimeError:
+            return False
+        self._free = free.copy()
+        return True
+
+    def solve(self, forces: Floats) -> Floats:
+        """What nodal forces (3 n,) [N] move: (3 n,) [m], zero where components are not free."""
+        assert self._free is not None
+        found = np.zeros(len(forces))
+        # as a number of the order of one: forces may be too small for single precision
+        scale = float(np.abs(forces).max()) or 1.0
+        found[self._free] = scale * self._factors.solve((forces[self._free] / scale).astype(np.float32))
+        return found
