@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-#: Iterations of a solve with factors that are near, and how many beyond these a factorisation takes as long as.
-_NEAR, _WORTH = 5, 60
 #: Iterations after which factors are of no use, and with new ones the captured loop takes over.
 _MOST = 60
 
@@ -57,7 +55,6 @@ class FactoredSolver:
         self._K: Any = None
         self._block: _Block | None = None
         self._result: LinearResult | None = None
-        self._wasted = 0
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
         """See `LinearSolver`."""
@@ -79,13 +76,11 @@ class FactoredSolver:
         """See `LinearSolver`; begins with zero."""
         wanted = self._tolerance if tolerance is None else tolerance
         for attempt in range(2):
-            renews = attempt == 1 or self._wasted > _WORTH or not self._factors.serve(self._free)
-            if renews:
-                self._wasted = 0
-                if not self._factors.renew(self._K, self._free):
-                    break
+            renews = attempt == 1 or not self._factors.serve(self._free)
+            if renews and not self._factors.renew(self._K, self._free):
+                break
             self._result = self._try(wanted)
-            self._wasted += max(self._result.iterations - _NEAR, 0)
+            self._factors.count(self._result.iterations)
             if self._result.converged or self._result.indefinite:
                 return
             if renews:

@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+#: Iterations of a solve with factors that are near, and how many beyond these a factorisation takes as long as.
+_NEAR, _WORTH = 5, 60
+
 
 class Factors:
     """Of the stiffness of the last state that they were renewed at; of none at first."""
@@ -21,24 +24,31 @@ class Factors:
     def __init__(self) -> None:
         self._free: NDArray[np.bool_] | None = None
         self._factors: Any = None
+        self._wasted = 0
 
     def serve(self, free: NDArray[np.bool_]) -> bool:
-        """Whether there are any, for these free components (3 n,)."""
-        return self._free is not None and np.array_equal(self._free, free)
+        """Whether there are any for these free components (3 n,), near enough to be worth keeping."""
+        return self._free is not None and np.array_equal(self._free, free) and self._wasted <= _WORTH
+
+    def count(self, iterations: int) -> None:
+        """Take notice of how many iterations a solve took with them."""
+        self._wasted += max(iterations - _NEAR, 0)
 
     def renew(self, stiffness: Any, free: NDArray[np.bool_]) -> bool:
-        """Factorise a stiffness [N/m], SciPy (3 n, 3 n), on its free components (3 n,); whether that went well."""
+        """Factorise a stiffness [N/m], SciPy (3 n, 3 n), on its free components (3 n,); whether it is positive definite."""
         from scipy.sparse.linalg import splu
 
         within = stiffness.tocsr()[free][:, free].tocsc().astype(np.float32)
-        self._free = None
+        self._free, self._wasted = None, 0
         try:
-            self._factors = splu(
-                within, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-            )
+            found = splu(within, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         except RuntimeError:
             return False
-        self._free = free.copy()
+        # with pivots on the diagonal their signs are those of the eigenvalues (Sylvester); with factors of an unstable
+        # state conjugate gradients could not tell that it is one
+        if not np.array_equal(found.perm_r, found.perm_c) or not found.U.diagonal().min() > 0.0:
+            return False
+        self._factors, self._free = found, free.copy()
         return True
 
     def solve(self, forces: Floats) -> Floats:
