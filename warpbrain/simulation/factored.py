@@ -75,9 +75,11 @@ class FactoredSolver:
     def solve(self, tolerance: float | None = None) -> None:
         """See `LinearSolver`; begins with zero."""
         wanted = self._tolerance if tolerance is None else tolerance
+        # fluid that is pressed at once lends tissue a stiffness that is none without it: then `K` alone is no sign
+        definite = self._block is None
         for attempt in range(2):
-            renews = attempt == 1 or not self._factors.serve(self._free)
-            if renews and not self._factors.renew(self._K, self._free):
+            renews = attempt == 1 or not self._factors.serve(self._free, definite)
+            if renews and not self._factors.renew(self._K, self._free, definite):
                 break
             self._result = self._try(wanted)
             self._factors.count(self._result.iterations)

@@ -24,32 +24,38 @@ class Factors:
     def __init__(self) -> None:
         self._free: NDArray[np.bool_] | None = None
         self._factors: Any = None
+        self._definite = False
         self._wasted = 0
 
-    def serve(self, free: NDArray[np.bool_]) -> bool:
-        """Whether there are any for these free components (3 n,), near enough to be worth keeping."""
-        return self._free is not None and np.array_equal(self._free, free) and self._wasted <= _WORTH
+    def serve(self, free: NDArray[np.bool_], definite: bool) -> bool:
+        """Whether there are any for these free components (3 n,), near enough to be worth keeping.
+
+        And positive definite, if they have to be.
+        """
+        if self._free is None or self._wasted > _WORTH or (definite and not self._definite):
+            return False
+        return np.array_equal(self._free, free)
 
     def count(self, iterations: int) -> None:
         """Take notice of how many iterations a solve took with them."""
         self._wasted += max(iterations - _NEAR, 0)
 
-    def renew(self, stiffness: Any, free: NDArray[np.bool_]) -> bool:
-        """Factorise a stiffness [N/m], SciPy (3 n, 3 n), on its free components (3 n,); whether it is positive definite."""
+    def renew(self, stiffness: Any, free: NDArray[np.bool_], definite: bool) -> bool:
+        """Factorise a stiffness [N/m], SciPy (3 n, 3 n), on its free components (3 n,); whether the factors serve."""
         from scipy.sparse.linalg import splu
 
         within = stiffness.tocsr()[free][:, free].tocsc().astype(np.float32)
         self._free, self._wasted = None, 0
         try:
-            found = splu(within, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+            self._factors = splu(within, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         except RuntimeError:
             return False
         # with pivots on the diagonal their signs are those of the eigenvalues (Sylvester); with factors of an unstable
         # state conjugate gradients could not tell that it is one
-        if not np.array_equal(found.perm_r, found.perm_c) or not found.U.diagonal().min() > 0.0:
-            return False
-        self._factors, self._free = found, free.copy()
-        return True
+        on_diagonal = np.array_equal(self._factors.perm_r, self._factors.perm_c)
+        self._definite = on_diagonal and float(self._factors.U.diagonal().min()) > 0.0
+        self._free = free.copy()
+        return self.serve(free, definite)
 
     def solve(self, forces: Floats) -> Floats:
         """What nodal forces (3 n,) [N] move: (3 n,) [m], zero where components are not free."""
