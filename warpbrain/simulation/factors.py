@@ -47,7 +47,9 @@ class Factors:
         within = stiffness.tocsr()[free][:, free].tocsc().astype(np.float32)
         self._free, self._wasted = None, 0
         try:
-            self._factors = splu(within, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+            self._factors = splu(
+                within, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            )
         except RuntimeError:
             return False
         # with pivots on the diagonal their signs are those of the eigenvalues (Sylvester); with factors of an unstable
