@@ -1,16 +1,16 @@
 """Linear systems solved on the host, preconditioned by the factors of a state that is near.
 
-On the CPU a solve with kept factors takes as long as ten to fifteen iterations of the captured loops of
-`warpbrain.kernels`, and saves hundreds of them where many states follow each other: conjugate gradients take three to
-six iterations. With pressures of fluid beside the displacement (`warpbrain.simulation.coupled`) the matrix is
-indefinite, and generalised minimal residuals (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., algorithm
-9.5) are preconditioned by the block triangle
+On the CPU one solve with factors takes as long as some ten iterations of the captured loops of `warpbrain.kernels`.
+Where many states follow each other three to six of them do what takes conjugate gradients 50 to 200 iterations, and
+MINRES 50 to 1,500. With pressures of fluid beside the displacement (`warpbrain.simulation.coupled`) the matrix is
+indefinite, and flexible generalised minimal residuals (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed.,
+section 9.4) are preconditioned by the block triangle
 
     [      K0        0  ]
     [ -sqrt(w) B    -S0 ],    S0 = A + w Y,
 
-`Y` what the term says that the solid gives way to its unknowns (`Coupling.yielding`). On a GPU the captured loops are
-faster, and stay.
+`Y` what the term says that the solid gives way to its unknowns (`Coupling.yielding`). On a GPU the captured loops stay,
+which never leave it.
 """
 
 from __future__ import annotations
