@@ -21,6 +21,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import Patch
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
+from warpbrain.simulation.kept_factors import KeptFactors
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
@@ -108,6 +109,7 @@ class States:
         self.realign(self.motion)
         self.modes = stiffness_modes(case.remaining[0])
         self.solves = 0
+        self._factors: dict[tuple[str, ...], KeptFactors] = {}
 
     def realign(self, motion: Floats) -> None:
         """Take recordings for moved by a rigid motion (6,); see `realigned`."""
@@ -158,7 +160,7 @@ class States:
         in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
         if in_time and np.isfinite(self.times[0]):
             near = course or (() if start is None else (start,))
-            moments = follow_slowly(system, steps_to(self.times), options, near=near)
+            moments = follow_slowly(system, steps_to(self.times), options, near=near, factors=self._factors_of(system))
             found = {moment.time: moment.state for moment in moments}
             course = tuple(state.u for state in found.values())
             states = [found[time] for time in self.times]
@@ -203,7 +205,7 @@ class States:
         self.solves += 1
         system = self._system(hypothesis)
         external = system.model.external_forces()
-        solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=_COURSE))
+        solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=_COURSE), factors=self._factors_of(system))
         system.forget()
         u, now, found = start, 0.0, []
         for time in (*(times[0] * part for part in _SHORT), *times):
@@ -211,6 +213,13 @@ class States:
             u, now = state.u, time
             found.append((u, system.model.reactions(state.internal, external)))
         return found[len(_SHORT) :]
+
+    def _factors_of(self, system: System) -> KeptFactors:
+        """Kept while the same mechanisms act: a fit has many states of those, one after the other."""
+        acting = tuple(type(mechanism).__name__ for mechanism in system.model.mechanisms)
+        if acting not in self._factors:
+            self._factors = {acting: KeptFactors()}
+        return self._factors[acting]
 
     def _system(self, hypothesis: Hypothesis) -> System:
         model, _ = model_of(self.case_of(hypothesis))

@@ -14,13 +14,13 @@ takes as long as there are numbers in the matrix. A GPU has done its hundreds of
 
 from __future__ import annotations
 
-import math
 from typing import Any, Protocol
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.kernels.host_gradients import host_gradients
 from warpbrain.kernels.linear import ConjugateGradient, LinearResult
 
 Floats = NDArray[np.float64]
@@ -118,46 +118,33 @@ class TwoLevelGradient:
 
     def _iterate(self, tolerance: float) -> LinearResult | None:
         """Conjugate gradients; None where the plain solver should be asked."""
-        x, r, z, p, Ap = (self._flat[name] for name in ("x", "r", "z", "p", "Ap"))
+        x, r = self._flat["x"], self._flat["r"]
         r[:] = self._flat["b"]
         goal = tolerance * float(np.linalg.norm(r))
         if x.any():
             self._product("x", "Ap")
-            r -= Ap
-        p[:] = 0.0
-        before, least = math.inf, math.inf
-        for iteration in range(_MOST):
-            residual = float(np.linalg.norm(r))
-            if residual <= goal:
-                return LinearResult(iteration, residual, goal, least)
-            self._cycle()
-            now = float(r @ z)
-            if not 0.0 < now < math.inf:
-                return None
-            p *= now / before
-            p += z
-            self._product("p", "Ap")
-            curvature = float(p @ Ap)
-            least = min(least, curvature / float(p @ p))
-            # written so that what is not a number ends here, too
-            if not curvature > 0.0:
-                return LinearResult(iteration + 1, residual, goal, least)
-            x += (now / curvature) * p
-            r -= (now / curvature) * Ap
-            before = now
-        return None
+            r -= self._flat["Ap"]
 
-    def _cycle(self) -> None:
-        """`z`, what the two levels make of the residual `r`."""
+        def multiply(p: Floats) -> Floats:
+            self._flat["p"][:] = p
+            self._product("p", "Ap")
+            return self._flat["Ap"]
+
+        result = host_gradients(multiply, self._cycle, x, r, goal, _MOST)
+        return result if result.converged or result.indefinite else None
+
+    def _cycle(self, r: Floats) -> Floats:
+        """What the two levels make of a residual."""
         z, left, step = self._flat["z"], self._flat["left"], self._flat["step"]
         z[:] = 0.0
-        left[:] = self._flat["r"]
+        left[:] = r
         self._smooth()
         self._go()
         step[:] = self._prolong @ self._coarse.solve((self._restrict @ left)[:, None])[:, 0]
         self._go()
         self._smooth()
         z += step
+        return z
 
     def _smooth(self) -> None:
         """Two terms of Chebyshev's iteration (Saad 2003, Iterative Methods for Sparse Linear Systems, algorithm 12.1).

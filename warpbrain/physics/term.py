@@ -92,6 +92,9 @@ class Coupling:
         Sparse rows; a node without unknown has none.
     compliance : wp.array
         `A_ij`, positive definite.
+    yielding : wp.array
+        About `(db/du) K^-1 (db/du)^T`: how the solid gives way to `p`, in the same rows. Of a preconditioner, which no
+        solution depends on.
     own, others : wp.array of vec3
         `db_i/du_j` and `db_j/du_i`.
     """
@@ -99,6 +102,7 @@ class Coupling:
     offsets: wp.array
     columns: wp.array
     compliance: wp.array
+    yielding: wp.array
     own: wp.array
     others: wp.array
 

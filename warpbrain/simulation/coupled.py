@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from warpbrain.kernels.coupled import coupled_kernels
 from warpbrain.kernels.linear import ConjugateGradient, LinearResult
 from warpbrain.kernels.minimal_residual import MinimalResidual, four_vector
-from warpbrain.physics.term import Term
+from warpbrain.physics.term import Coupling, Term
 
 if TYPE_CHECKING:
     from warpbrain.simulation.system import System
 
 #: What MINRES is asked for, relative to what is asked of the solve, in the first place; and how often it may go on.
-_FIRST, _ROUNDS = 0.3, 6
+FIRST, ROUNDS = 0.3, 6
 
 
 class LinearSolver(Protocol):
@@ -128,8 +128,7 @@ class CoupledSolver:
         wp.launch(kernel, dim=self._system.size, inputs=list(inputs), device=self._system.device)
 
     def _multiply(self, x: wp.array, y: wp.array) -> None:
-        s, c = self._system, self._term.coupling
-        assert c is not None
+        s, c = self._system, self.coupling
         self._launch(
             self._kernels.multiply, s.matrix.offsets, s.matrix.columns, s.matrix.values, c.offsets, c.columns,
             c.compliance, c.own, c.others, s.free, s.coupling_root, x, y,
@@ -137,6 +136,12 @@ class CoupledSolver:
 
     def _precondition(self, x: wp.array, y: wp.array) -> None:
         self._launch(self._kernels.apply_diagonal, self._inverse, self._diagonal, x, y)
+
+    @property
+    def coupling(self) -> Coupling:
+        """Of the term with unknowns of its own."""
+        assert self._term.coupling is not None
+        return self._term.coupling
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
         """See `LinearSolver`."""
@@ -147,8 +152,7 @@ class CoupledSolver:
         if not self._term.coupled:
             self._plain.prepare()
             return
-        s, c = self._system, self._term.coupling
-        assert c is not None
+        s, c = self._system, self.coupling
         self._launch(self._kernels.invert_diagonal, s.diagonal, s.matrix.values, self._inverse)
         self._launch(
             self._kernels.invert_coupled_diagonal, c.offsets, c.columns, c.compliance, c.own, s.free, s.coupling_root,
@@ -165,21 +169,21 @@ class CoupledSolver:
         wanted = self._tolerance if tolerance is None else tolerance
         self._launch(self._kernels.pack, s.load, self._solver.b)
         self._solver.x.zero_()
-        tighter, iterations = _FIRST, 0
-        for _ in range(1 if s.device.is_capturing else _ROUNDS):
+        tighter, iterations = FIRST, 0
+        for _ in range(1 if s.device.is_capturing else ROUNDS):
             self._solver.solve(tighter * wanted)
             self._launch(self._kernels.unpack, self._solver.x, s.solution)
             if s.device.is_capturing:
                 return
             steps, _, _ = self._solver.result()
             iterations += steps
-            self._result = self._look(iterations, wanted)
+            self._result = self.look(iterations, wanted)
             if self._result.converged or steps == 0 or not np.isfinite(self._result.residual):
                 break
             tighter *= 0.3 * self._result.tolerance / self._result.residual
 
-    def _look(self, iterations: int, wanted: float) -> LinearResult:
-        """The residual of the eliminated system, and the curvature along the solution."""
+    def look(self, iterations: int, wanted: float) -> LinearResult:
+        """The residual of the eliminated system with what is in the solution array, and the curvature along that."""
         s = self._system
         self._plain.multiply(s.solution, self._product)
         root = float(s.coupling_root.numpy()[0])
@@ -196,4 +200,4 @@ class CoupledSolver:
         if not self._term.coupled:
             return self._plain.result()
         # of a captured solve there is nothing but what it left
-        return self._result or self._look(self._solver.result()[0], self._tolerance)
+        return self._result or self.look(self._solver.result()[0], self._tolerance)

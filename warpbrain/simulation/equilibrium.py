@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from warpbrain.errors import InputError, SolveError
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.coupled import LinearSolver
+from warpbrain.simulation.factored import FactoredSolver
 from warpbrain.simulation.held import require_held
+from warpbrain.simulation.kept_factors import KeptFactors
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 
@@ -151,6 +153,8 @@ class EquilibriumSolver:
         Adds up the wall time by phase.
     linear : LinearSolver, optional
         Solves the system's linear systems; by default what `System.linear_solver` gives for the options.
+    factors : KeptFactors, optional
+        Kept by who solves for many states that are near to each other; they serve on the CPU alone.
 
     Attributes
     ----------
@@ -165,18 +169,21 @@ class EquilibriumSolver:
         on_step: Callable[[NewtonStep], None] | None = None,
         clock: PhaseClock | None = None,
         linear: LinearSolver | None = None,
+        factors: KeptFactors | None = None,
     ) -> None:
         self.system = system
         self.options = options or EquilibriumOptions()
         self._on_step = on_step
         self.clock = clock or PhaseClock(system.device)
         self._reference_shift: float | None = None
-        self._linear = linear or system.linear_solver(
+        self._linear: LinearSolver = linear or system.linear_solver(
             tolerance=self.options.cg_tolerance,
             max_iterations=self.options.max_cg,
             preconditioner=self.options.preconditioner,
             watch_curvature=True,
         )
+        if factors is not None and system.device.is_cpu:
+            self._linear = FactoredSolver(system, self._linear, factors, self.options.cg_tolerance)
         self._history: list[NewtonStep] = []
         self._free = 1.0 - system.model.constrained
         # residuals cannot fall below the rounding of the sums of element forces

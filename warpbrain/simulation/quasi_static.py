@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from warpbrain.errors import InputError, SolveError
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver, NewtonStep
 from warpbrain.simulation.held import require_held
+from warpbrain.simulation.kept_factors import KeptFactors
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 
@@ -66,6 +67,7 @@ def follow_slowly(
     on_step: Callable[[NewtonStep], None] | None = None,
     clock: PhaseClock | None = None,
     near: Sequence[Floats] = (),
+    factors: KeptFactors | None = None,
 ) -> Iterator[Moment]:
     """Equilibria at a series of times, from rest at the time 0.
 
@@ -85,6 +87,8 @@ def follow_slowly(
         Adds up the wall time by phase.
     near : sequence of (n, 3) arrays, optional
         Displacement [m] at each of the times in a course that is near to this one; its first alone will do.
+    factors : KeptFactors, optional
+        See `EquilibriumSolver`.
 
     Yields
     ------
@@ -107,7 +111,7 @@ def follow_slowly(
     ):
         raise InputError(f"times = {list(times)} s: expected positive numbers that increase")
     require_held(system.model)
-    solver = EquilibriumSolver(system, options, on_step, clock)
+    solver = EquilibriumSolver(system, options, on_step, clock, factors=factors)
     system.forget()
     u, now, pending = np.zeros(system.model.mesh.points.shape), 0.0, False
     for number, time in enumerate(series.tolist()):

@@ -216,8 +216,9 @@ class DrainageTerm(Term):
         self._shape = zeros(size, dtype=vec3)
         entries = len(self._rows)
         self.coupling = Coupling(
-            self._offsets, self._columns, zeros(entries), zeros(entries, dtype=vec3), zeros(entries, dtype=vec3)
-        )
+            self._offsets, self._columns, zeros(entries), zeros(entries), zeros(entries, dtype=vec3),
+            zeros(entries, dtype=vec3),
+        )  # fmt: skip
         self._h = np.inf
         solvers = (
             MinimalResidual(
@@ -275,6 +276,8 @@ class DrainageTerm(Term):
     def take_moduli(self) -> None:
         self.softness.assign(0.5 / self.body.shear_moduli[self._elements.numpy()])
         self._element_compliance(self.mechanism.storage, 1.0, 0.0, self._storage)
+        self._entries.assign(self._yielding())
+        self._gather(self.coupling.yielding)
         self._renew()
 
     def _renew(self) -> None:
@@ -285,12 +288,26 @@ class DrainageTerm(Term):
         self._numbers.assign([m.pressure, source, 0.0 if steady else 1.0])
         mass = m.exchange if steady else m.storage + self._h * m.exchange
         self._element_compliance(mass, 0.0 if steady else 1.0, 1.0 if steady else self._h, self._entries)
-        self._launch(
-            self._kernels.gather_compliance, len(self._rows), self._rows, self._columns, self._first,
-            self._contributions, self._entries, self._closed, self.coupling.compliance,
-        )  # fmt: skip
+        self._gather(self.coupling.compliance)
         inputs = (self.coupling.offsets, self.coupling.columns, self.coupling.compliance)
         self._launch(self._kernels.invert_diagonal, len(self._diagonal), *inputs, self._diagonal)
+
+    def _gather(self, out: wp.array) -> None:
+        """Sum entries of elements into sparse rows."""
+        self._launch(
+            self._kernels.gather_compliance, len(self._rows), self._rows, self._columns, self._first,
+            self._contributions, self._entries, self._closed, out,
+        )  # fmt: skip
+
+    def _yielding(self) -> NDArray[np.float64]:
+        """How the solid gives way to the pressure, element by element (k, 10): mass over `lam + 2 mu`.
+
+        So much it does to a pressure that varies over a length that is short beside the body.
+        """
+        elements = self._elements.numpy()
+        modulus = (self.body.volumetric_moduli + 2.0 * self.body.shear_moduli)[elements]
+        pairs = [2.0 if a == b else 1.0 for a in range(4) for b in range(a, 4)]
+        return np.outer(self._volume.numpy().astype(np.float64) / (20.0 * modulus), pairs)
 
     def _solve(self, u: wp.array) -> None:
         """The pressure at a displacement."""
