@@ -57,7 +57,7 @@ def main() -> None:
             axis.set_title(f"{region.replace('_', ' ')}: {axis.get_title()} from the others", fontsize=8)
     # what was added is not in every panel
     lines = {line.get_label(): line for axis in axes.flat for line in axis.get_legend_handles_labels()[0]}
-    axes[0, 0].legend(handles=list(lines.values()), frameon=False, fontsize=8)
+    axes[0, 1].legend(handles=list(lines.values()), frameon=False, fontsize=8, loc="lower right")
     write_results("real_brain_regions", rows)
     figure.savefig(FIGURES / "real-brain-regions.png", dpi=150)
 
