@@ -88,7 +88,8 @@ class Linearisation:
         rng = np.random.default_rng(0)
         mark = moved @ rng.normal(size=moved.shape[1]) + held @ rng.normal(size=held.shape[1])
         _, different, which = np.unique(mark, return_index=True, return_inverse=True)
-        A = np.empty((len(different), len(free)))
+        # by columns: products with sparse forces then need no copy of it
+        A = np.empty((len(different), len(free)), order="F")
         A[:, free] = self._factors.solve(moved[different].T).T
         A[:, ~free] = held[different]
         return A, which.ravel()
