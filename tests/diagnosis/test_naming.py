@@ -5,16 +5,18 @@ from types import SimpleNamespace
 import pytest
 
 from warpbrain.diagnosis.naming import named_in_turn
-from warpbrain.diagnosis.result import CANNOT_SAY, GROUP, NAMED, NOTHING
+from warpbrain.diagnosis.result import CANNOT_SAY, GROUP, NAMED, NOTHING, UNKNOWN
 from warpbrain.diagnosis.verdict import Verdict
 
 
 def stage(*known):
-    return SimpleNamespace(known=known, fits=dict.fromkeys(("none", "gravity", "pressure", "contact")))
+    return SimpleNamespace(known=known, fits=dict.fromkeys(("none", "gravity", "pressure")))
 
 
 def judged(verdict, *kinds):
-    return SimpleNamespace(verdict=Verdict(verdict, kinds))
+    log_evidence = {"unknown": 14.0, "gravity": 10.0, "pressure": 9.0, "contact": 1.0}
+    ranking = [SimpleNamespace(kind=k, physics=k != "unknown", log_evidence=v) for k, v in log_evidence.items()]
+    return SimpleNamespace(verdict=Verdict(verdict, kinds), ranking=ranking)
 
 
 def turns(at_first, says):
@@ -64,6 +66,35 @@ def test_both_of_two_are_named_if_each_is_beside_the_other(verdict):
 def test_else_it_stays_a_group(says):
     stages, kinds, _ = turns(judged(GROUP, "gravity", "pressure"), says)
     assert stages == [()] and kinds == [("gravity", "pressure")]
+
+
+@pytest.mark.parametrize("kinds", [(), ("gravity",)])
+def test_so_are_two_where_a_force_without_a_name_fits_better_than_each(kinds):
+    says = {("gravity",): judged(NAMED, "pressure"), ("pressure",): judged(NAMED, "gravity")}
+    stages, found, _ = turns(judged(UNKNOWN, *kinds), says)
+    assert found == [("gravity",), ("pressure",), ()]
+    assert stages == [(), ("gravity",), ("gravity", "pressure")]
+
+
+def test_both_have_to_beat_a_force_without_a_name():
+    first = judged(UNKNOWN)
+    first.ranking[0].log_evidence = 18.0
+    says = {("gravity",): judged(NAMED, "pressure"), ("pressure",): judged(NAMED, "gravity")}
+    stages, found, _ = turns(first, says)
+    assert stages == [()] and found == [()]
+
+
+def test_the_second_may_have_had_no_fit_alone():
+    says = {("gravity",): judged(NAMED, "contact"), ("contact",): judged(NAMED, "gravity")}
+    first = judged(UNKNOWN)
+    first.ranking[0].log_evidence = 8.0
+    assert turns(first, says)[1] == [("gravity",), ("contact",), ()]
+
+
+@pytest.mark.parametrize("second", ["pressure", "contact"])
+def test_it_stays_without_a_name_if_not_both_are(second):
+    stages, found, _ = turns(judged(UNKNOWN), {("gravity",): judged(NAMED, second)})
+    assert stages == [()] and found == [()]
 
 
 @pytest.mark.parametrize("kinds", [("gravity", "pressure", "contact"), ("gravity", "unknown"), ("gravity",)])

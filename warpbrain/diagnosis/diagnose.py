@@ -131,8 +131,11 @@ class Diagnosing:
             at_first = judge.judge(first)
         with self._timed("beside"):
 
-            def beside(before: Stage, kind: str) -> tuple[Stage, Judgement]:
-                stage = self._beside(refitting, before, kind, rng)
+            def beside(before: Stage, kind: str) -> tuple[Stage, Judgement] | None:
+                fit = before.fits.get(kind) or self._refit(refitting, before, kind, None, before.fits.get("none"))
+                if fit is None:
+                    return None
+                stage = self._beside(refitting, before, kind, fit, rng)
                 return stage, judge.judge(stage)
 
             stages, judged = named_in_turn(first, at_first, beside)
@@ -166,9 +169,8 @@ class Diagnosing:
         with self._timed("screening"):
             return base.with_back(sound_points(base, candidates)), candidates
 
-    def _beside(self, refitting: Refitting, before: Stage, kind: str, rng: np.random.Generator) -> Stage:
-        """The next stage: what acts beside a kind that the last one refitted."""
-        fit = before.fits[kind]
+    def _beside(self, refitting: Refitting, before: Stage, kind: str, fit: Refit, rng: np.random.Generator) -> Stage:
+        """The next stage: what acts beside a kind, as it was refitted."""
         known = (*before.known, kind)
         self.listener.stage(f"what acts beside {' and '.join(known)}")
         candidates = candidates_beside(fit, before.candidates)
@@ -190,29 +192,35 @@ class Diagnosing:
         in_time = [kinds[k] for k in order if factors[k] > least and stage.candidates.changes_in_time(kinds[k])]
         if not set(in_time).isdisjoint(chosen):
             chosen += [kind for kind in in_time if kind not in chosen]
-        there = () if known is None else known.with_own_columns
-        near = None if known is None else known.state
         fits: dict[str, Refit] = {}
         for kind in chosen if known is not None else ["none", *chosen]:
-            effect, between = None if kind == "none" else stage.best_effect(kind), None
-            if effect is not None and effect.proposal is None:
-                continue
-            self.listener.stage(f"refit without linearising: {' and '.join((*stage.known, kind))}")
-            if effect is not None:
-                effect, between = self._between_places(stage, kind)
-            begin = linear_point(stage.explanation, stage.residual, stage.explanation.nuisances, effect, stage.kappa)
-            begins = [begin]
-            if known is None and "none" in fits:
-                none = fits["none"]
-                begins.append(linear_point(stage.explanation, none.linear, none.columns, effect, none.kappa))
-            effects = there if effect is None else (*there, effect)
-            if effect is not None and between is None:
-                between = self._between(stage, kind, begin)
-            try:
-                fits[kind] = refitting.fit(effects, begins, stage.kappa, near, between)
-            except (SolveError, InputError):
-                continue
+            fit = self._refit(refitting, stage, kind, known, fits.get("none"))
+            if fit is not None:
+                fits[kind] = fit
         return fits
+
+    def _refit(
+        self, refitting: Refitting, stage: Stage, kind: str, known: Refit | None, none: Refit | None
+    ) -> Refit | None:
+        """Fit of one kind beside what is known, begun also at the fit of nothing; None if there is none to be had."""
+        effect, between = None if kind == "none" else stage.best_effect(kind), None
+        if effect is not None and effect.proposal is None:
+            return None
+        self.listener.stage(f"refit without linearising: {' and '.join((*stage.known, kind))}")
+        if effect is not None:
+            effect, between = self._between_places(stage, kind)
+        begin = linear_point(stage.explanation, stage.residual, stage.explanation.nuisances, effect, stage.kappa)
+        begins = [begin]
+        if known is None and none is not None:
+            begins.append(linear_point(stage.explanation, none.linear, none.columns, effect, none.kappa))
+        there = () if known is None else known.with_own_columns
+        effects = there if effect is None else (*there, effect)
+        if effect is not None and between is None:
+            between = self._between(stage, kind, begin)
+        try:
+            return refitting.fit(effects, begins, stage.kappa, None if known is None else known.state, between)
+        except (SolveError, InputError):
+            return None
 
     @staticmethod
     def _between_places(stage: Stage, kind: str) -> tuple[Effect, Floats | None]:

@@ -10,9 +10,15 @@ and every hypothesis `H` that is looked for,
 with half of `p(H)` for nothing missing. A gross error alone is no reason for a mechanism: its neighbours have to agree.
 What acts in one place is asked at places of the scan at first. Where that leaves it open, so near to a point that a
 step of the scan matters, the best of them are moved between places (`placed`), in numerator and denominator alike.
+
+Two points beside one cause may both have been set aside, and neither has the other for a neighbour then. So where no
+point comes back alone, those near each other are asked two at a time: both sound against both gross errors.
 """
 
 from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +39,8 @@ Bools = NDArray[np.bool_]
 #: Logarithm of the odds from which on places between those of the scan may turn them, and how far [nats] behind the
 #: best kind they are asked for.
 _OPEN, _BEHIND = -8.0, 8.0
+#: How far from each other [m] two points are that one local cause moves, at most.
+_NEAR = 0.03
 
 
 def sound_points(base: Base, candidates: Candidates) -> Bools:
@@ -49,22 +57,35 @@ def sound_points(base: Base, candidates: Candidates) -> Bools:
         return sound
     kappa = base.explanation.best_kappa(base.whitened)
     screening = Screening(base.explanation, candidates, base.smooth_forces, np.array([kappa]))
+    groups = base.at.sensors.groups
     while True:
-        points = np.unique(base.at.sensors.groups[base.aside & ~sound]).tolist()
-        each = [base.at.sensors.groups == point for point in points]
-        odds = [_log_odds(base, screening, rows, kappa) for rows in each]
-        if not odds or max(odds) <= 0.0:
+        points = np.unique(groups[base.aside & ~sound]).tolist()
+        for several in ([[point] for point in points], _near_each_other(base, points)):
+            each = [np.isin(groups, together) for together in several]
+            odds = [_log_odds(base, screening, rows, kappa) for rows in each]
+            if odds and max(odds) > 0.0:
+                break
+        else:
             return sound
         soundest = each[int(np.argmax(odds))]
         sound |= soundest
         screening = screening.with_noise(soundest, 1.0 / ASIDE)
 
 
+def _near_each_other(base: Base, points: Sequence[int]) -> list[list[int]]:
+    """Two points each, of those that have a place."""
+    sensors = base.at.sensors
+    at = {point: sensors.positions[sensors.groups == point][0] for point in points}
+    return [
+        [one, other] for one, other in itertools.combinations(points, 2) if np.linalg.norm(at[one] - at[other]) < _NEAR
+    ]
+
+
 def _log_odds(base: Base, screening: Screening, rows: Bools, kappa: float) -> float:
-    """Logarithm of the odds that a point, whose rows are set aside in a screening, is no gross error."""
+    """Logarithm of the odds that points, whose rows are set aside in a screening, are no gross errors."""
     asked = [screening.with_noise(rows, times / ASIDE) for times in (1.0, LARGE)]
     screens = [one.run(one.explanation.whitened(base.residual)[:, None]) for one in asked]
-    before = float(np.log1p(-OFTEN) - np.log(OFTEN))
+    before = len(np.unique(base.at.sensors.groups[rows])) * float(np.log1p(-OFTEN) - np.log(OFTEN))
     sound, gross = (_log_density(screen, screen.log_factors[:, 0]) for screen in screens)
     if not _OPEN < before + sound - gross <= 0.0:
         return before + sound - gross
