@@ -91,7 +91,7 @@ def test_the_second_may_have_had_no_fit_alone():
     assert turns(first, says)[1] == [("gravity",), ("contact",), ()]
 
 
-@pytest.mark.parametrize("second", ["pressure", "contact"])
+@pytest.mark.parametrize("second", ["pressure", "contact", "gravity"])
 def test_it_stays_without_a_name_if_not_both_are(second):
     stages, found, _ = turns(judged(UNKNOWN), {("gravity",): judged(NAMED, second)})
     assert stages == [()] and found == [()]

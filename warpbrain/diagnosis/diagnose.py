@@ -53,6 +53,7 @@ from warpbrain.diagnosis.verdict import CLAIM, overall
 from warpbrain.diagnosis.virtual import VirtualCases
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
+from warpbrain.threads import one_thread_of_blas
 
 Floats = NDArray[np.float64]
 
@@ -104,6 +105,10 @@ class Diagnosing:
         SolveError
             If the case as declared has no equilibrium.
         """
+        with one_thread_of_blas():
+            return self._run()
+
+    def _run(self) -> Diagnosis:
         options = self.options
         rng = np.random.default_rng([options.seed, 7])
         spacing = self.dictionary.situation.spacing

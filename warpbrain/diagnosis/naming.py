@@ -67,7 +67,8 @@ def _both(first: Stage, at_first: Judgement, beside: Beside) -> tuple[Stage, Jud
         return None
     stage, second = found
     [other] = second.verdict.kinds
-    if (group and other not in verdict.kinds) or not _beat_the_unknown(at_first, best, second):
+    # one kind twice is beside itself whatever acts: two tractions are what a wire between two places comes to
+    if other == best or (group and other not in verdict.kinds) or not _beat_the_unknown(at_first, best, second):
         return None
     turned = beside(first, other)
     if turned is None or not turned[1].verdict.adds or turned[1].verdict.kinds != (best,):

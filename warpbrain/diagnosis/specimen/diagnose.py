@@ -29,6 +29,7 @@ from warpbrain.diagnosis.specimen.verdict import conclude
 from warpbrain.errors import InputError
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.specimen import specimen_of
+from warpbrain.threads import one_thread_of_blas
 
 Floats = NDArray[np.float64]
 
@@ -91,6 +92,10 @@ class DiagnosingSpecimen:
         InputError
             If the declared law finds no state in the tests.
         """
+        with one_thread_of_blas():
+            return self._run()
+
+    def _run(self) -> SpecimenDiagnosis:
         options, protocol = self.options, self.protocol
         rng = np.random.default_rng([options.seed, 11])
         self.listener.stage("base: the case as declared, its tissue refitted")
