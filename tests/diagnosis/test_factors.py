@@ -31,6 +31,6 @@ def test_equilibria_are_the_same_in_any_number_of_threads(monkeypatch):
     assert factors.solve(columns[:, :0]).shape == (60, 0)
 
 
-def test_a_singular_matrix_is_said(monkeypatch):
+def test_a_singular_matrix_is_said():
     with pytest.raises(SolveError, match="unstable"):
         Factors(csr_array(np.ones((3, 3))))

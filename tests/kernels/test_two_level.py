@@ -5,11 +5,10 @@ import pytest
 import scipy.sparse.linalg as sparse_linalg
 from bodies import matrix_of, model_of
 from material_point import LAWS
-from scipy.sparse import diags_array, eye_array, kron
 from shapes import cube, distorted
 
 from warpbrain.kernels.two_level import TwoLevelGradient
-from warpbrain.simulation.finer import prolongation
+from warpbrain.simulation.finer import free_prolongation, prolongation
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
 
@@ -39,13 +38,10 @@ def assembled(mesh, k: float = 1.0, m: float = 0.0) -> System:
 
 def two_levels(system: System, coarse, ends) -> TwoLevelGradient:
     free = ~coarse.model.constrained.ravel()
-    moves = diags_array(1.0 - system.model.constrained.ravel().astype(float))
-    prolong = kron(prolongation(ends, coarse.size), eye_array(3), format="csr")[:, free]
+    prolong = free_prolongation(prolongation(ends, coarse.size), free, system.model.constrained)
     plain = system.linear_solver(tolerance=1e-9, max_iterations=5000, watch_curvature=True)
     matrix = matrix_of(coarse).tocsr()[free][:, free].toarray()
-    return TwoLevelGradient(
-        plain, system.load, system.solution, Dense(matrix), (moves @ prolong).tocsr(), tolerance=1e-9
-    )
+    return TwoLevelGradient(plain, system.load, system.solution, Dense(matrix), prolong, tolerance=1e-9)
 
 
 @pytest.fixture(scope="module")

@@ -208,12 +208,10 @@ class Diagnosing:
         self, refitting: Refitting, stage: Stage, kind: str, known: Refit | None, none: Refit | None
     ) -> Refit | None:
         """Fit of one kind beside what is known, begun also at the fit of nothing; None if there is none to be had."""
-        effect, between = None if kind == "none" else stage.best_effect(kind), None
-        if effect is not None and effect.proposal is None:
+        if kind != "none" and stage.best_effect(kind).proposal is None:
             return None
         self.listener.stage(f"refit without linearising: {' and '.join((*stage.known, kind))}")
-        if effect is not None:
-            effect, between = self._between_places(stage, kind)
+        effect, between = (None, None) if kind == "none" else self._between_places(stage, kind)
         begin = linear_point(stage.explanation, stage.residual, stage.explanation.nuisances, effect, stage.kappa)
         begins = [begin]
         if known is None and none is not None:

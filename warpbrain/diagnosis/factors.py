@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import SolveError
-from warpbrain.threads import in_threads, one_thread_of_blas
+from warpbrain.simulation.symmetric_factors import symmetric_factors
+from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]
 
@@ -36,13 +37,8 @@ class Factors:
     """
 
     def __init__(self, matrix: Any) -> None:
-        from scipy.sparse.linalg import splu
-
-        options = {"SymmetricMode": True}
         try:
-            with one_thread_of_blas():
-                ordered = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
-                self._factors: Any = splu(matrix.tocsc(), options=options, **ordered)
+            self._factors: Any = symmetric_factors(matrix)
         except RuntimeError as error:
             raise SolveError(f"the state is unstable: its tangent stiffness cannot be factorised ({error})") from None
 

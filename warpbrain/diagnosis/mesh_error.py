@@ -25,7 +25,7 @@ from warpbrain.kernels.linear import ConjugateGradient
 from warpbrain.kernels.two_level import TwoLevelGradient
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.finer import FinerCase, restricted
+from warpbrain.simulation.finer import FinerCase, free_prolongation, restricted
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.system import System
 
@@ -157,8 +157,6 @@ class FinerStates:
 
         Terms with unknowns of their own, and midside nodes, which are not on the mesh of corners, are for that one.
         """
-        from scipy.sparse import diags_array, eye_array, kron
-
         if not system.device.is_cpu or system.quadratic is not None:
             return None
         plain = system.linear_solver(tolerance=_ROUGH, max_iterations=_MOST, watch_curvature=True)
@@ -172,11 +170,8 @@ class FinerStates:
             except SolveError:
                 return None
         factors, free = self._factors
-        by_component = kron(prolongation, eye_array(3), format="csr")[:, free]
-        moves = diags_array(1.0 - system.model.constrained.ravel().astype(np.float64))
-        return TwoLevelGradient(
-            plain, system.load, system.solution, factors, (moves @ by_component).tocsr(), tolerance=_ROUGH
-        )
+        prolong = free_prolongation(prolongation, free, system.model.constrained)
+        return TwoLevelGradient(plain, system.load, system.solution, factors, prolong, tolerance=_ROUGH)
 
     def _system_of(self, model: Model) -> System:
         """The system of the last state with other numbers, or another one where numbers are not all that changed."""

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.coupled import FIRST, ROUNDS, CoupledSolver
 from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.symmetric_factors import symmetric_factors
 
 if TYPE_CHECKING:
     from warpbrain.simulation.system import System
@@ -45,7 +46,6 @@ class CoupledBlock:
         self, system: System, captured: CoupledSolver, K: Any, free: NDArray[np.bool_], before: CoupledBlock | None
     ) -> None:
         from scipy.sparse import csr_matrix, diags
-        from scipy.sparse.linalg import splu
 
         self._system, self._captured, self._K = system, captured, K
         self._root = float(system.coupling_root.numpy()[0])
@@ -64,8 +64,7 @@ class CoupledBlock:
         if before is not None and np.array_equal(before._S.data, self._S.data):
             self._schur: Any = before._schur
         else:
-            options = {"SymmetricMode": True}
-            self._schur = splu(self._S, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+            self._schur = symmetric_factors(self._S)
 
     def solve(self, load: Floats, wanted: float, factors: KeptFactors, most: int) -> LinearResult:
         """Leave the displacement under a load (3 n,) in the system's solution; how that ended.

@@ -18,6 +18,7 @@ from warpbrain.simulation.model import Model
 from warpbrain.simulation.of_case import model_of
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,6 +94,24 @@ def prolongation(ends: NDArray[np.integer], count: int) -> Any:
 
     rows = np.repeat(np.arange(len(ends)), 2)
     return csr_matrix((np.full(2 * len(ends), 0.5), (rows, ends.ravel())), shape=(len(ends), count))
+
+
+def free_prolongation(prolong: Any, free: Bools, constrained: Bools) -> Any:
+    """From free components of a mesh to all of the finer one: SciPy CSR (3 n', k), zero where these are constrained.
+
+    Parameters
+    ----------
+    prolong : SciPy sparse matrix (n', n)
+        See `prolongation`.
+    free : (3 n,) bool array
+        Components of the mesh.
+    constrained : (n', 3) bool array
+        Those of the finer one.
+    """
+    from scipy.sparse import diags_array, eye_array, kron
+
+    by_component = kron(prolong, eye_array(3), format="csr")[:, free]
+    return (diags_array((~constrained.ravel()).astype(np.float64)) @ by_component).tocsr()
 
 
 def restricted(prolong: Any, u: Floats, reactions: Floats) -> tuple[Floats, Floats]:

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.simulation.symmetric_factors import symmetric_factors
+
 Floats = NDArray[np.float64]
 
 #: Iterations of a solve with factors that are near, and how many beyond these a factorisation takes as long as.
@@ -42,14 +44,9 @@ class KeptFactors:
 
     def renew(self, stiffness: Any, free: NDArray[np.bool_], definite: bool) -> bool:
         """Factorise a stiffness [N/m], SciPy (3 n, 3 n), on its free components (3 n,); whether the factors serve."""
-        from scipy.sparse.linalg import splu
-
-        within = stiffness.tocsr()[free][:, free].tocsc().astype(np.float32)
         self._free, self._wasted = None, 0
         try:
-            self._factors = splu(
-                within, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-            )
+            self._factors = symmetric_factors(stiffness.tocsr()[free][:, free].astype(np.float32))
         except RuntimeError:
             return False
         # with pivots on the diagonal their signs are those of the eigenvalues (Sylvester); with factors of an unstable
