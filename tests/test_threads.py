@@ -36,6 +36,15 @@ def test_parts_come_back_in_their_order_from_several_threads(monkeypatch):
     assert in_threads(lambda part: threading.get_ident(), range(3)) == [threading.get_ident()] * 3
 
 
+def test_parts_of_a_part_stay_in_its_thread(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+
+    def work(part: int) -> bool:
+        return set(in_threads(lambda _: threading.get_ident(), range(3))) == {threading.get_ident()}
+
+    assert in_threads(work, range(2)) == [True, True]
+
+
 def test_what_goes_wrong_in_a_thread_is_raised(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     with pytest.raises(ZeroDivisionError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
@@ -14,6 +15,9 @@ Made = TypeVar("Made")
 
 #: Threads at most: factors are read by all of them, and memory is no faster for more.
 MOST = 16
+
+#: Of each thread, whether it is one of those below.
+_here = threading.local()
 
 
 def processors() -> int:
@@ -35,14 +39,21 @@ def in_threads(work: Callable[[Part], Made], parts: Sequence[Part]) -> list[Made
     """What a function makes of each part, in their order.
 
     It gains where the function leaves Python's lock alone for most of its time. What comes out does not depend on the
-    number of threads: each part is worked on by itself, with one thread of BLAS.
+    number of threads: each part is worked on by itself, with one thread of BLAS. Parts that ask for threads themselves
+    stay in their own.
     """
     count = min(thread_count(), len(parts))
+    if getattr(_here, "is_part", False):
+        return [work(part) for part in parts]
     with one_thread_of_blas():
         if count < 2:
             return [work(part) for part in parts]
-        with ThreadPoolExecutor(count) as pool:
+        with ThreadPoolExecutor(count, initializer=_become_part) as pool:
             return list(pool.map(work, parts))
+
+
+def _become_part() -> None:
+    _here.is_part = True
 
 
 def one_thread_of_blas() -> AbstractContextManager[Any]:

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import kstest, multivariate_normal
 
 from warpbrain.diagnosis.effects import Effect
-from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Inner, kappa_log_prior
-from warpbrain.diagnosis.screening import log_places
+from warpbrain.diagnosis.evidence import KAPPAS, Explanation, kappa_log_prior
+from warpbrain.diagnosis.stack_evidence import StackEvidence
 
 N = 40
 
@@ -40,7 +40,7 @@ def test_it_is_the_density_of_a_normal_distribution(example: Example, kappa: flo
     explanation = example.explanation
     white = explanation.whitened(residuals)
     none = explanation.log_none(white, np.array([kappa]))[0]
-    factors = explanation.log_factors(explanation.stack(example.effects), white, np.array([kappa]))[0]
+    factors = StackEvidence(explanation, explanation.stack(example.effects)).log_factors(white, np.array([kappa]))[0]
     S = kappa**2 * example.noise + example.nuisances @ example.nuisances.T
     for b in range(3):
         assert none[b] == pytest.approx(multivariate_normal(np.zeros(N), S).logpdf(residuals[:, b]), rel=1e-9)
@@ -56,7 +56,7 @@ def test_coefficients_are_the_posterior_mean(example: Example) -> None:
     stack = explanation.stack(example.effects)
     S = example.noise + example.nuisances @ example.nuisances.T
     for v, effect in enumerate(example.effects):
-        z, covariance = Inner(explanation, stack, explanation.whitened(residual)).coefficients(1.0, v)
+        z, covariance = StackEvidence(explanation, stack).coefficients(explanation.whitened(residual)[:, 0], 1.0, v)
         precision = np.eye(effect.columns.shape[1]) + effect.columns.T @ np.linalg.solve(S, effect.columns)
         expected = np.linalg.solve(precision, effect.columns.T @ np.linalg.solve(S, residual[:, 0] - effect.mean))
         np.testing.assert_allclose(z, expected, rtol=1e-8)
@@ -69,19 +69,19 @@ def test_what_a_nuisance_can_do_is_worth_nothing(example: Example) -> None:
     rng = np.random.default_rng(4)
     residual = rng.normal(size=(N, 1))
     moved = residual + example.nuisances @ rng.normal(size=(5, 1))
-    stack = free.stack(example.effects)
-    before, after = (free.log_factors(stack, free.whitened(r)) for r in (residual, moved))
+    evidence = StackEvidence(free, free.stack(example.effects))
+    before, after = (evidence.log_factors(free.whitened(r)) for r in (residual, moved))
     np.testing.assert_allclose(after, before, atol=1e-3)
 
 
 def test_p_values_of_draws_are_uniform(example: Example) -> None:
     explanation = example.explanation
-    stack = explanation.stack(example.effects)
+    evidence = StackEvidence(explanation, explanation.stack(example.effects))
 
     def statistic(count: int, seed: int) -> np.ndarray:
         draws = explanation.draws(count, 1.0, np.random.default_rng(seed))
         weights = kappa_log_prior()[:, None, None]
-        return np.asarray((explanation.log_factors(stack, draws, KAPPAS) + weights).max(axis=(0, 1)))
+        return np.asarray((evidence.log_factors(draws, KAPPAS) + weights).max(axis=(0, 1)))
 
     null, own = np.sort(statistic(2000, 5)), statistic(500, 6)
     p = 1.0 - np.searchsorted(null, own) / len(null)
@@ -97,7 +97,9 @@ def test_the_evidence_of_a_pair_is_that_of_quadrature() -> None:
     white = explanation.whitened(residual)
     stack = explanation.stack([Effect(None, np.zeros(6), second)])
     kappa = np.array([1.0])
-    pair = explanation.log_none(white, kappa)[0, 0] + explanation.log_factors(stack, white, kappa)[0, 0, 0]
+    pair = (
+        explanation.log_none(white, kappa)[0, 0] + StackEvidence(explanation, stack).log_factors(white, kappa)[0, 0, 0]
+    )
     z = np.linspace(-8.0, 8.0, 321)
     a, b = (grid.ravel() for grid in np.meshgrid(z, z))
     left = np.linalg.solve(factor, residual - first * a - second * b)
@@ -135,5 +137,5 @@ def test_a_stack_of_forces_has_the_evidence_of_more_nuisances() -> None:
     rng = np.random.default_rng(13)
     known = Explanation(np.diag(rng.uniform(0.5, 2.0, 20)), rng.normal(size=(20, 4)))
     force, residuals = rng.normal(size=(20, 6)), rng.normal(size=(20, 3))
-    found = log_places(known, known.stack_of_forces([force]), residuals)[0]
+    found = StackEvidence(known, known.stack_of_forces([force])).log_places(residuals)[0]
     assert np.allclose(found, known.with_more(force).log_marginal(residuals), rtol=1e-10)

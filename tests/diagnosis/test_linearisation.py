@@ -23,6 +23,18 @@ def test_few_forces_are_answered_without_the_compliance(at):
     np.testing.assert_allclose(few, np.tensordot(at.compliance, forces.reshape(3, -1), (1, 1)), atol=1e-9 * few.max())
 
 
+def test_patches_are_forces_at_their_nodes(at, monkeypatch):
+    weights = np.random.default_rng(2).random((len(at.u), 150))
+    found = at.answers_of_patches(weights)
+    assert found.shape == (len(at.sensors), 150, 3)
+    some = np.zeros((3, *at.u.shape))
+    for axis in range(3):
+        some[axis, :, axis] = weights[:, 70]
+    np.testing.assert_allclose(found[:, 70], at.answers(some), rtol=1e-9, atol=1e-12 * np.abs(found).max())
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    np.testing.assert_array_equal(at.answers_of_patches(weights), found)
+
+
 def test_what_lets_go_is_what_a_dense_solution_says(at):
     mesh = at.system.model.mesh
     held = at.system.model.constrained.all(axis=1)

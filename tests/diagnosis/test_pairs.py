@@ -73,7 +73,8 @@ def test_a_body_that_is_held_all_around_has_places_inside(small_diagnosis: Diagn
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[mesh.boundary.ravel()] = True
     model = SimpleNamespace(mesh=mesh, constrained=held.ravel())
-    given = SimpleNamespace(system=SimpleNamespace(model=model), compliance=at.compliance, sensors=at.sensors)
+    system = SimpleNamespace(model=model)
+    given = SimpleNamespace(system=system, answers_of_patches=at.answers_of_patches, sensors=at.sensors)
     inside = ~held.all(axis=1)
     found = pairs_at(given, 0.012)
     assert 1 < len(found.sites) <= inside.sum()

@@ -8,7 +8,7 @@ import pytest
 from warpbrain.diagnosis.dictionary import candidates_at, dictionary_of
 from warpbrain.diagnosis.parameters import values_of
 from warpbrain.diagnosis.placing import placed
-from warpbrain.diagnosis.screening import log_places
+from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage, compared, linear_point
 
 
@@ -65,7 +65,7 @@ def test_a_place_is_found_between_sites(refit):
 def test_it_is_worth_more_than_the_best_site_and_pays_for_its_place(refit):
     stage, _, best, effect = refit
     white = stage.explanation.whitened(stage.residual)[:, None]
-    site, between = log_places(stage.explanation, stage.explanation.stack([best, effect]), white)[:, 0]
+    site, between = StackEvidence(stage.explanation, stage.explanation.stack([best, effect])).log_places(white)[:, 0]
     assert between > site - 3.0
 
 

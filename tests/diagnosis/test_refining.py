@@ -7,7 +7,7 @@ from loosened_block import loosened
 from warpbrain.diagnosis.dictionary import BETWEEN, RADII
 from warpbrain.diagnosis.parameters import values_of
 from warpbrain.diagnosis.refining import refined
-from warpbrain.diagnosis.screening import log_places
+from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage, linear_point
 
 CENTRE, RADIUS = np.array([0.036, 0.024, 0.0]), 0.027
@@ -31,7 +31,7 @@ def test_a_patch_is_found_between_places(stage):
     assert radius == pytest.approx(RADIUS, rel=0.25)
     scanned = stage.screen.places[number, 0] + stage.screen.none[0]
     white = stage.explanation.whitened(stage.residual)[:, None]
-    assert log_places(stage.explanation, stage.explanation.stack([effect]), white)[0, 0] > scanned - 1.0
+    assert StackEvidence(stage.explanation, stage.explanation.stack([effect])).log_places(white)[0, 0] > scanned - 1.0
 
 
 def test_what_is_said_of_it_are_its_centre_and_radius(stage):

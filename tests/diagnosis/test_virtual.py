@@ -58,7 +58,7 @@ def test_standardised_rows_have_the_length_that_detectability_counts(virtual, ka
 def test_evidence_is_that_of_screening_at_one_factor(virtual):
     cases, screening = virtual
     residuals = np.random.default_rng(5).normal(size=(N, 3))
-    whole = screening.explanation.log_factors(screening.stack, residuals, np.array([1.1]))[0]
+    whole = screening.of_effects.log_factors(residuals, np.array([1.1]))[0]
     known = cases.screening.run(screening.explanation.standardised(residuals, 1.1)).places
     np.testing.assert_allclose(known, whole, rtol=1e-7, atol=1e-7)
 

@@ -16,18 +16,20 @@ import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effect
+from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]
 
 #: Factors on the noise, and the scale of their logarithm.
 KAPPAS = np.array([0.65, 0.78, 0.9, 1.0, 1.12, 1.28, 1.5, 1.9, 2.5, 3.5])
 KAPPA_SD = 0.2
+#: Columns that one thread whitens.
+_TOGETHER = 256
 
 
 def kappa_log_prior(kappas: Floats = KAPPAS, sd: float = KAPPA_SD) -> Floats:
@@ -100,10 +102,19 @@ class Explanation:
         self.__dict__.pop("_of_inverse", None)
 
     def whitened(self, rows: Floats) -> Floats:
-        """`L^-1` of rows."""
+        """`L^-1` of rows (n,) or (n, k): of many some at a time, in threads."""
         from scipy.linalg import solve_triangular
 
-        return np.asarray(solve_triangular(self.factor, rows, lower=True))
+        if rows.ndim == 1 or rows.shape[1] <= _TOGETHER:
+            return np.asarray(solve_triangular(self.factor, rows, lower=True))
+        found = np.empty(rows.shape, order="F")
+
+        def fill(first: int) -> None:
+            some = slice(first, first + _TOGETHER)
+            found[:, some] = solve_triangular(self.factor, rows[:, some], lower=True)
+
+        in_threads(fill, range(0, rows.shape[1], _TOGETHER))
+        return found
 
     def with_more(self, nuisances: Floats) -> Explanation:
         """The same with more nuisances (n, p)."""
@@ -150,7 +161,7 @@ class Explanation:
 
     def log_none(self, residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
         """Log density of whitened residuals (n, b) without any cause: (kappas, b)."""
-        rr, Vr = np.sum(residuals**2, axis=0), self._WV.T @ residuals
+        rr, Vr = np.sum(residuals**2, axis=0), self.seen_by_nuisances(residuals)
         return np.array([self._log_base(rr, Vr, k) for k in kappas])
 
     def log_marginal(self, residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
@@ -165,15 +176,19 @@ class Explanation:
         log_det = self.size * np.log(k2) + float(np.log1p(self._D / k2).sum()) + self._log_det
         return np.asarray(-0.5 * (quadratic + log_det + self.size * np.log(2.0 * np.pi)))
 
-    def log_factors(self, stack: Stack, residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
-        """Log Bayes factor of each effect against none, for whitened residuals (n, b): (kappas, v, b)."""
-        inner = Inner(self, stack, residuals)
-        return np.array([inner.log_factors(kappa) for kappa in kappas])
+    @property
+    def sizes(self) -> Floats:
+        """`D` (q,): variances of what nuisances do, along orthogonal directions."""
+        return self._D
+
+    def seen_by_nuisances(self, rows: Floats) -> Floats:
+        """Products (q, b) of whitened rows (n, b) with what nuisances do along each of these directions."""
+        return np.asarray(self._WV.T @ rows)
 
     def precision_times(self, rows: Floats, kappa: float = 1.0) -> Floats:
         """`S^-1` of whitened rows (n, b): what is left of them after noise and nuisances, whitened."""
         k2 = kappa**2
-        return np.asarray((rows - self._WV @ ((self._WV.T @ rows) / (k2 + self._D)[:, None])) / k2)
+        return np.asarray((rows - self._WV @ (self.seen_by_nuisances(rows) / (k2 + self._D)[:, None])) / k2)
 
     def inverse_times(self, residual: Floats, kappa: float) -> Floats:
         """`C^-1 r` of a residual (n,) that is not whitened, with `C = kappa^2 L L^T + U U^T`."""
@@ -191,12 +206,12 @@ class Explanation:
 
     @cached_property
     def _of_inverse(self) -> Floats:
-        return np.asarray(self._WV.T @ self._inverse_factor)
+        return self.seen_by_nuisances(self._inverse_factor)
 
     def standardised(self, rows: Floats, kappa: float) -> Floats:
         """`S^-1/2` of whitened rows (n, b): independent and of variance one where nothing is missing."""
         root = np.sqrt(kappa**2 + self._D)
-        return np.asarray((rows - self._WV @ ((self._WV.T @ rows) / (root * (root + kappa))[:, None])) / kappa)
+        return np.asarray((rows - self._WV @ (self.seen_by_nuisances(rows) / (root * (root + kappa))[:, None])) / kappa)
 
     def detectability(self, whitened: Floats, kappa: float = 1.0) -> float:
         """`d = sqrt(delta^T S^-1 delta)` of a change of the sensors (n,), whitened."""
@@ -218,64 +233,3 @@ class Explanation:
         """Whitened residuals (n, count) of which nothing but noise and nuisances is the cause."""
         noise = kappa * rng.normal(size=(self.size, count))
         return np.asarray(noise + self._W @ rng.normal(size=(self._W.shape[1], count)))
-
-
-class Inner:
-    """Products of effects with each other and with residuals, from which the evidence at every `kappa` follows."""
-
-    def __init__(self, explanation: Explanation, stack: Stack, residuals: Floats) -> None:
-        self.explanation, self.stack = explanation, stack
-        WV = explanation._WV
-        self._D = explanation._D
-        self._VG, self._Vr = WV.T @ stack.columns, WV.T @ residuals
-        self._Gr = stack.columns.T @ residuals
-        self._residuals = residuals
-        widths = np.diff(stack.first)
-        self._families = [(int(width), np.flatnonzero(widths == width)) for width in np.unique(widths)]
-
-    def _gram(self, members: Any, width: int) -> Floats:
-        """`G^T G` (v, w, w) of whitened columns."""
-        own = self._columns(self.stack.columns, members, width)
-        return np.asarray(np.einsum("nvi,nvj->vij", own, own, optimize=True))
-
-    @cached_property
-    def _grams(self) -> dict[int, Floats]:
-        """Of whole families."""
-        return {width: self._gram(members, width) for width, members in self._families}
-
-    def _columns(self, rows: Floats, members: Any, width: int) -> Floats:
-        at = self.stack.first[members][:, None] + np.arange(width)
-        return np.asarray(rows[:, at])
-
-    def _moments(self, kappa: float, members: Any, width: int, gram: Floats) -> tuple[Floats, Floats]:
-        """`G^T S^-1 G` (v, w, w) and `G^T S^-1 r` (v, w, b) of effects of one width."""
-        k2 = kappa**2
-        VG = self._columns(self._VG, members, width)
-        weighted = VG / (k2 + self._D)[:, None, None]
-        GSG = (gram - np.einsum("qvi,qvj->vij", VG, weighted, optimize=True)) / k2
-        at = self.stack.first[members][:, None] + np.arange(width)
-        GSr = (self._Gr[at] - np.einsum("qvi,qb->vib", weighted, self._Vr, optimize=True)) / k2
-        return GSG, GSr
-
-    def log_factors(self, kappa: float) -> Floats:
-        """Log Bayes factor of each effect, (v, b)."""
-        found = np.zeros((len(self.stack), self._residuals.shape[1]))
-        for width, members in self._families:
-            GSG, GSr = self._moments(kappa, members, width, self._grams[width])
-            hh, hr = GSG[:, 0, 0], GSr[:, 0]
-            log = hr - 0.5 * hh[:, None]
-            if width > 1:
-                M = np.eye(width - 1) + GSG[:, 1:, 1:]
-                b = GSr[:, 1:] - GSG[:, 1:, :1]
-                log = log + 0.5 * np.einsum("vib,vib->vb", b, np.linalg.solve(M, b))
-                log = log - 0.5 * np.linalg.slogdet(M)[1][:, None]
-            found[members] = log
-        return found
-
-    def coefficients(self, kappa: float, number: int) -> tuple[Floats, Floats]:
-        """Mean (k,) and covariance (k, k) of the `z` of an effect after the first of the residuals."""
-        width = int(self.stack.first[number + 1] - self.stack.first[number])
-        own = np.array([number])
-        GSG, GSr = self._moments(kappa, own, width, self._gram(own, width))
-        covariance = np.asarray(np.linalg.inv(np.eye(width - 1) + GSG[0, 1:, 1:]), dtype=np.float64)
-        return covariance @ (GSr[0, 1:, 0] - GSG[0, 1:, 0]), covariance

@@ -24,14 +24,15 @@ _CUT, _MOST = 1e-3, 150
 
 def force_patches(at: Linearisation, length: float, spacing: float | None = None) -> tuple[Floats, Floats]:
     """Sites (s, 3) [m], and answers (n, s, 3) to a force of 1 N in each direction, spread with a Gaussian."""
+    from scipy.spatial.distance import cdist
+
     mesh = at.system.model.mesh
     sites = mesh.points[spread_points(mesh.points, length if spacing is None else spacing, 700)]
-    apart = np.linalg.norm(mesh.points[:, None] - sites[None], axis=2)
+    apart = cdist(mesh.points, sites)
     weights = mesh.node_volumes[:, None] * np.exp(-0.5 * (apart / length) ** 2)
     # a share that falls on what is held moves nothing
     weights /= weights.sum(axis=0)
-    by_axis = at.compliance.reshape(len(at.sensors), -1, 3)
-    return sites, np.einsum("nac,as->nsc", by_axis, weights, optimize=True)
+    return sites, at.answers_of_patches(weights)
 
 
 def flexible_columns(at: Linearisation, length: float) -> Floats:

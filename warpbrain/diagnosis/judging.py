@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.averaging import averaged_values
 from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.calibration import BODIES, probabilities
-from warpbrain.diagnosis.evidence import Explanation, Inner, log_mean
+from warpbrain.diagnosis.evidence import Explanation, log_mean
 from warpbrain.diagnosis.flexible import SCALES
 from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo, scattered_blocks, spatial_blocks
 from warpbrain.diagnosis.letting_go import where_it_lets_go
@@ -173,8 +173,8 @@ class Judge:
         else:
             # where physics is missing, the noise that the stage needs is no noise
             kappa = 1.0
-            whitened = explanation.whitened(stage.residual)[:, None]
-            z, covariance = Inner(explanation, stage.screening.stack, whitened).coefficients(kappa, number)
+            whitened = explanation.whitened(stage.residual)
+            z, covariance = stage.screening.of_effects.coefficients(whitened, kappa, number)
             own = stage.screening.stack.of(number)
             d = explanation.detectability(own[:, 0] + own[:, 1:] @ z, kappa)
         if fit is None:

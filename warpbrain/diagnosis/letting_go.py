@@ -18,7 +18,7 @@ from warpbrain.diagnosis.calibration import BODIES
 from warpbrain.diagnosis.dictionary import BETWEEN, RADII, patch_of
 from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.result import Value
-from warpbrain.diagnosis.screening import log_places
+from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh
@@ -84,7 +84,7 @@ def where_it_lets_go(stage: Stage, kind: str) -> Placed:
         return _mean(np.array([one.centre for one in whole]), np.array([one.radius for one in whole]), weights)
     effects = list({id(one.effect): one.effect for one in tried}.values())
     residual = stage.explanation.whitened(stage.residual)[:, None]
-    places = log_places(stage.explanation, stage.explanation.stack(effects), residual)[:, 0]
+    places = StackEvidence(stage.explanation, stage.explanation.stack(effects)).log_places(residual)[:, 0]
     log = dict(zip(map(id, effects), places.tolist(), strict=True))
     weights = softmax([log[id(one.effect)] / BODIES.temperature for one in tried])
     return _mean(np.array([one.centre for one in tried]), np.array([one.radius for one in tried]), weights)

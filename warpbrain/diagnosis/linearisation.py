@@ -13,6 +13,7 @@ as long for as many as there are sensors.
 from __future__ import annotations
 
 import copy
+import itertools
 from functools import cached_property
 from typing import Any
 
@@ -24,11 +25,14 @@ from warpbrain.diagnosis.releasing import HeldSurface
 from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.mesh import vertex_normals
 from warpbrain.simulation.system import System
+from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]
 
 #: Growth by which the derivative of the forces of growing tissue is taken.
 _GROWTH = 1e-4
+#: Patches whose answers one thread makes.
+_TOGETHER = 64
 
 
 class Linearisation:
@@ -61,7 +65,7 @@ class Linearisation:
         #: `K` [N/m] on every component, SciPy CSR (3 N, 3 N).
         self.stiffness: Any = K
         self._free, self._held_free = free, K[~free][:, free]
-        self._factors = Factors(K[free][:, free])
+        self._factors = Factors(K[free][:, free], system.device)
 
     def with_sensors(self, sensors: Sensors) -> Linearisation:
         """The same state with other sensors; nothing is factorised again."""
@@ -135,6 +139,19 @@ class Linearisation:
         """What nodal forces (..., N, 3) [N] change of what is recorded: (n, ...)."""
         flat = np.asarray(forces).reshape(-1, len(self._free))
         return self._answers(flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
+
+    def answers_of_patches(self, weights: Floats) -> Floats:
+        """What forces of 1 N in each direction, spread over nodes with weights (N, s), change: (n, s, 3)."""
+        rows, which = self._rows
+        found = np.empty((3, weights.shape[1], len(rows)))
+
+        def fill(part: tuple[int, int]) -> None:
+            axis, first = part
+            some = slice(first, first + _TOGETHER)
+            found[axis, some] = (rows[:, axis::3] @ weights[:, some]).T
+
+        in_threads(fill, list(itertools.product(range(3), range(0, weights.shape[1], _TOGETHER))))
+        return np.asarray(found.transpose(2, 1, 0)[which])
 
     def answers_of_columns(self, forces: Any) -> Floats:
         """The same of forces that act here and there, SciPy CSC (3 N, k): (n, k)."""

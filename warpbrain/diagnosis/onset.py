@@ -18,7 +18,8 @@ from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import log_mean
-from warpbrain.diagnosis.screening import UNKNOWN, Screen, log_places, log_unknown
+from warpbrain.diagnosis.screening import UNKNOWN, Screen, log_unknown
+from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.time_courses import TimeCourse, time_courses
 
 Floats = NDArray[np.float64]
@@ -99,7 +100,7 @@ def _log_evidence(base: Base, effects: list[Effect], factor: Floats) -> float:
     scaled = [
         replace(effect, mean=factor * effect.mean, columns=factor[:, None] * effect.columns) for effect in effects
     ]
-    found = log_places(base.explanation, base.explanation.stack(scaled), whitened)[:, 0]
+    found = StackEvidence(base.explanation, base.explanation.stack(scaled)).log_places(whitened)[:, 0]
     return float(log_mean(found))
 
 

@@ -23,6 +23,7 @@ from warpbrain.diagnosis.evidence import KAPPAS, Explanation, kappa_log_prior
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.sensors import spread_points
 from warpbrain.mesh import node_areas
+from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]
 
@@ -106,6 +107,8 @@ def pairs_at(at: Linearisation, spacing: float) -> Pairs:
     spacing : float
         Of the sites of a scan [m].
     """
+    from scipy.spatial.distance import cdist
+
     model = at.system.model
     mesh = model.mesh
     shares, movable = node_areas(mesh.points, mesh.boundary), ~model.constrained.reshape(-1, 3).all(axis=1)
@@ -113,11 +116,10 @@ def pairs_at(at: Linearisation, spacing: float) -> Pairs:
         shares = mesh.node_volumes
     free = np.flatnonzero(movable & (shares > 0.0))
     sites = mesh.points[free[spread_points(mesh.points[free], 0.0, PLACES)]]
-    apart = np.linalg.norm(mesh.points[:, None] - sites[None], axis=2)
+    apart = cdist(mesh.points, sites)
     weights = shares[:, None] * np.exp(-0.5 * (apart / (LENGTH * spacing)) ** 2)
     weights /= weights.sum(axis=0)
-    by_axis = at.compliance.reshape(len(at.sensors), -1, 3)
-    columns = np.einsum("nac,as->nsc", by_axis, weights, optimize=True).reshape(len(at.sensors), -1)
+    columns = at.answers_of_patches(weights).reshape(len(at.sensors), -1)
     rows = at.sensors.is_displacement
     rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
     plain = Pairs(sites, columns, np.ones(len(sites) * (len(sites) - 1) // 2))
@@ -146,10 +148,16 @@ class PairEvidence:
         self._white = pairs.seen(explanation.whitened)
         self._moments: dict[float, tuple[Floats, Floats]] = {}
 
+    def prepare(self, kappas: Floats) -> None:
+        """Make what has no residual in it, for factors on the noise (k,): threads may ask for evidence then."""
+        missing = [kappa for kappa in kappas.tolist() if kappa not in self._moments]
+        self._moments.update(zip(missing, in_threads(self._made, missing), strict=True))
+
     def log_marginal(self, residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
         """Log density (b,) of whitened residuals (n, b), averaged over pairs, sizes and factors on the noise."""
         from scipy.special import logsumexp
 
+        self.prepare(kappas)
         logs = self.explanation.log_none(residuals, kappas) + kappa_log_prior(kappas)[:, None]
         for number, kappa in enumerate(kappas.tolist()):
             for low in range(0, residuals.shape[1], _AT_ONCE):
@@ -159,7 +167,9 @@ class PairEvidence:
 
     def best(self, residual: Floats) -> Floats:
         """What the most probable pair (n, 1) does, of one standard deviation; `residual` (n,) is whitened."""
-        exponents, weights = self._factors(residual[:, None], self.explanation.best_kappa(residual))
+        kappa = self.explanation.best_kappa(residual)
+        self.prepare(np.array([kappa]))
+        exponents, weights = self._factors(residual[:, None], kappa)
         factors = exponents[:, :, 0] + np.log(weights)
         size, number = np.unravel_index(int(np.argmax(factors)), factors.shape)
         return SIZES[int(size)] * self.noise * self.pairs.column(int(number))
@@ -178,17 +188,15 @@ class PairEvidence:
 
     def _factors(self, residuals: Floats, kappa: float) -> tuple[Floats, Floats]:
         """Bayes factors of pairs of each size: their exponents (sizes, p, b), and factors (sizes, p) on them."""
-        weighted, squares = self._of(kappa)
+        weighted, squares = self._moments[kappa]
         products = self._white.linear(weighted.T @ residuals)
         products *= products
         variances = (np.array(SIZES) * self.noise)[:, None] ** 2
         more = 1.0 + variances * squares
         return (0.5 * variances / more)[:, :, None] * products, 1.0 / np.sqrt(more)
 
-    def _of(self, kappa: float) -> tuple[Floats, Floats]:
+    def _made(self, kappa: float) -> tuple[Floats, Floats]:
         """`S^-1` of the places' columns, and `g^T S^-1 g` (p,) of the pairs."""
-        if kappa not in self._moments:
-            columns = self._white.columns
-            weighted = self.explanation.precision_times(columns, kappa)
-            self._moments[kappa] = weighted, self._white.quadratic(columns.T @ weighted)
-        return self._moments[kappa]
+        columns = self._white.columns
+        weighted = self.explanation.precision_times(columns, kappa)
+        return weighted, self._white.quadratic(columns.T @ weighted)

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effect
-from warpbrain.diagnosis.evidence import Inner
 from warpbrain.diagnosis.refining import Refined, spread_of_place
-from warpbrain.diagnosis.screening import log_places
+from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh, face_vectors, tangents
@@ -76,7 +75,7 @@ def _at(stage: Stage, proposal: Proposal) -> tuple[Effect, float]:
     except SolveError:
         return Effect(proposal, np.zeros(0), np.zeros((0, 0))), -np.inf
     white = stage.explanation.whitened(stage.residual)[:, None]
-    return effect, float(log_places(stage.explanation, stage.explanation.stack([effect]), white)[0, 0])
+    return effect, float(StackEvidence(stage.explanation, stage.explanation.stack([effect])).log_places(white)[0, 0])
 
 
 class _Scan:
@@ -173,7 +172,7 @@ def _wider(stage: Stage, best: Effect, scan: _Scan) -> Effect:
         return elsewhere(*place(c)).make(c[:count])
 
     white = stage.explanation.whitened(stage.residual)[:, None]
-    z, _ = Inner(stage.explanation, stage.explanation.stack([best]), white).coefficients(stage.kappa, 0)
+    z, _ = StackEvidence(stage.explanation, stage.explanation.stack([best])).coefficients(white[:, 0], stage.kappa, 0)
     here = proposal.mean + proposal.sd * np.clip(z, -_FARTHEST, _FARTHEST)
     nowhere = np.zeros(len(sd))
     wider = replace(

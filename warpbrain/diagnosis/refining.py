@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.dictionary import BETWEEN, RADII, patch_of
 from warpbrain.diagnosis.effects import Effect
-from warpbrain.diagnosis.screening import log_places
+from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh, face_vectors, tangents
@@ -64,7 +64,7 @@ def refined(stage: Stage, number: int) -> Refined:
     for _ in range(_MOVES):
         beside = _neighbours(stage, mesh, best.proposed)
         effects = [best, *beside]
-        places = log_places(stage.explanation, stage.explanation.stack(effects), residual)[:, 0]
+        places = StackEvidence(stage.explanation, stage.explanation.stack(effects)).log_places(residual)[:, 0]
         chosen = int(np.argmax(places))
         if chosen == 0 or _same(effects[chosen], best):
             break

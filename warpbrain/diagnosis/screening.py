@@ -15,12 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Stack, kappa_log_prior, log_mean
+from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Stack, log_mean
 from warpbrain.diagnosis.pairs import PairEvidence
+from warpbrain.diagnosis.stack_evidence import StackEvidence
+from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]
 
 UNKNOWN = "unknown"
+#: Residuals that one thread compares with everything.
+_AT_ONCE = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,24 +85,41 @@ class Screening:
     ) -> None:
         self.explanation = explanation
         self.candidates = candidates
-        self.stack: Stack = explanation.stack(candidates.effects)
-        self.forces: Stack = explanation.stack_of_forces(flexible)
         lasting = {kind: candidates.effects[own[0]].lasting for kind, own in candidates.of_kind.items()}
-        self._lasting = {kind: explanation.with_more(own) for kind, own in lasting.items() if own is not None}
+        beside = {kind: explanation.with_more(own) for kind, own in lasting.items() if own is not None}
+        self._ask(explanation.stack(candidates.effects), explanation.stack_of_forces(flexible), beside)
         self._kappas = kappas
         self.pairs = pairs
+
+    def _ask(self, stack: Stack, forces: Stack, lasting: dict[str, Explanation]) -> None:
+        """Take effects and smooth forces, whitened, and beside what kinds that change in time are compared."""
+        self.of_effects = StackEvidence(self.explanation, stack)
+        self._of_forces = StackEvidence(self.explanation, forces)
+        own = {kind: stack.some(self.candidates.of_kind[kind]) for kind in lasting}
+        self._lasting = {kind: StackEvidence(beside, own[kind]) for kind, beside in lasting.items()}
+
+    @property
+    def stack(self) -> Stack:
+        """Effects, whitened."""
+        return self.of_effects.stack
+
+    @property
+    def forces(self) -> Stack:
+        """Smooth forces, whitened."""
+        return self._of_forces.stack
 
     def standardised(self, kappa: float) -> Screening:
         """The same for residuals `S^-1/2 r`, in which noise and nuisances are of variance one: the factor is known."""
         found, known = copy.copy(self), self.explanation
         found.explanation = Explanation(np.eye(known.size), np.zeros((known.size, 0)))
-        found.stack = Stack(known.standardised(self.stack.columns, kappa), self.stack.first)
-        found.forces = Stack(known.standardised(self.forces.columns, kappa), self.forces.first)
+        stack = Stack(known.standardised(self.stack.columns, kappa), self.stack.first)
+        forces = Stack(known.standardised(self.forces.columns, kappa), self.forces.first)
         lasting = {kind: self.candidates.effects[self.candidates.of_kind[kind][0]].lasting for kind in self._lasting}
-        found._lasting = {
+        beside = {
             kind: found.explanation.with_more(known.standardised(known.whitened(own), kappa))
             for kind, own in lasting.items()
         }
+        found._ask(stack, forces, beside)
         found._kappas = np.ones(1)
         if self.pairs is not None:
             seen = self.pairs.pairs.seen(lambda rows: known.standardised(known.whitened(rows), kappa))
@@ -109,28 +130,42 @@ class Screening:
         """The same with the noise of some rows (n,) so many times as large; see `Explanation.with_noise`."""
         found, known = copy.copy(self), self.explanation
         found.explanation = known.with_noise(rows, times)
-        found.stack = Stack(known.whitened_anew(self.stack.columns, rows, times), self.stack.first)
-        found.forces = Stack(known.whitened_anew(self.forces.columns, rows, times), self.forces.first)
-        found._lasting = {kind: lasting.with_noise(rows, times) for kind, lasting in self._lasting.items()}
+        stack = Stack(known.whitened_anew(self.stack.columns, rows, times), self.stack.first)
+        forces = Stack(known.whitened_anew(self.forces.columns, rows, times), self.forces.first)
+        found._ask(
+            stack, forces, {kind: own.explanation.with_noise(rows, times) for kind, own in self._lasting.items()}
+        )
         if self.pairs is not None:
             found.pairs = PairEvidence(found.explanation, self.pairs.pairs, self.pairs.noise)
         return found
 
     def run(self, residuals: Floats) -> Screen:
-        """Evidence for whitened residuals (n, b)."""
+        """Evidence for whitened residuals (n, b): of many some at a time, in threads."""
+        for one in (self.of_effects, self._of_forces, *self._lasting.values()):
+            one.prepare(self._kappas)
+        if self.pairs is not None:
+            self.pairs.prepare(self._kappas)
+        each = [residuals[:, low : low + _AT_ONCE] for low in range(0, max(residuals.shape[1], 1), _AT_ONCE)]
+        screens = in_threads(self._screen, each)
+        return Screen(
+            (*self.candidates.kinds, UNKNOWN),
+            np.concatenate([one.none for one in screens]),
+            np.concatenate([one.log_factors for one in screens], axis=1),
+            np.concatenate([one.places for one in screens], axis=1),
+        )
+
+    def _screen(self, residuals: Floats) -> Screen:
         none = self.explanation.log_marginal(residuals, self._kappas)
-        places = log_places(self.explanation, self.stack, residuals, self._kappas) - none
+        places = self.of_effects.log_places(residuals, self._kappas) - none
         for kind, lasting in self._lasting.items():
-            own = self.candidates.of_kind[kind]
-            alike = lasting.log_marginal(residuals, self._kappas)
-            places[own] = log_places(lasting, self.stack.some(own), residuals, self._kappas) - alike
-        by_kind = self._by_kind(places)
+            alike = lasting.explanation.log_marginal(residuals, self._kappas)
+            places[self.candidates.of_kind[kind]] = lasting.log_places(residuals, self._kappas) - alike
         unknown = self._log_unknown(residuals) - none
-        return Screen((*self.candidates.kinds, UNKNOWN), none, np.vstack([by_kind, unknown]), places)
+        return Screen((*self.candidates.kinds, UNKNOWN), none, np.vstack([self._by_kind(places), unknown]), places)
 
     def _log_unknown(self, residuals: Floats) -> Floats:
         """With what has no name: a smooth force, or as likely two places that draw each other."""
-        smooth = log_mean(log_places(self.explanation, self.forces, residuals, self._kappas))
+        smooth = log_mean(self._of_forces.log_places(residuals, self._kappas))
         if self.pairs is None:
             return smooth
         return log_mean(np.array([smooth, self.pairs.log_marginal(residuals, self._kappas)]))
@@ -138,15 +173,6 @@ class Screening:
     def _by_kind(self, places: Floats) -> Floats:
         rows = [log_mean(places[own]) for own in self.candidates.of_kind.values()]
         return np.array(rows).reshape(len(rows), places.shape[1])
-
-
-def log_places(explanation: Explanation, stack: Stack, residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
-    """Log density (v, b) of whitened residuals with each effect."""
-    from scipy.special import logsumexp
-
-    base = explanation.log_none(residuals, kappas)[:, None, :]
-    factors = explanation.log_factors(stack, residuals, kappas)
-    return np.asarray(logsumexp(base + factors + kappa_log_prior(kappas)[:, None, None], axis=0))
 
 
 def log_unknown(flexible: Sequence[Explanation], residuals: Floats, kappas: Floats = KAPPAS) -> Floats:

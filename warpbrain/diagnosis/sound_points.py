@@ -28,8 +28,9 @@ from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.evidence import log_mean
 from warpbrain.diagnosis.gross_errors import ASIDE
 from warpbrain.diagnosis.placing import placed
-from warpbrain.diagnosis.screening import Screen, Screening, log_places
+from warpbrain.diagnosis.screening import Screen, Screening
 from warpbrain.diagnosis.single_points import LARGE, OFTEN
+from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage
 
 Floats = NDArray[np.float64]
@@ -115,7 +116,8 @@ def _between_places(base: Base, screening: Screening, screen: Screen, kappa: flo
         if proposal is None or proposal.elsewhere is None or found[k] < least:
             continue
         effect = placed(stage, number).effect
-        value = log_places(explanation, explanation.stack([effect]), white, np.array([kappa]))[0, 0] - screen.none[0]
+        beside = StackEvidence(explanation, explanation.stack([effect]))
+        value = beside.log_places(white, np.array([kappa]))[0, 0] - screen.none[0]
         # its prior covers as many places of the scan as its evidence is averaged over
         found[k] = max(found[k], value + effect.proposed.log_covered - np.log(len(own)))
     return found

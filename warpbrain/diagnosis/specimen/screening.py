@@ -20,6 +20,7 @@ from warpbrain.diagnosis.specimen.fitting import SpecimenFit
 from warpbrain.diagnosis.specimen.forward import Forward
 from warpbrain.diagnosis.specimen.material import NoStateError
 from warpbrain.diagnosis.specimen.noise import smooth_patterns
+from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -86,7 +87,7 @@ def _alarm(explanation: Explanation, stack: Stack, kinds: Sequence[str], residua
     from scipy.special import logsumexp
 
     none = explanation.log_none(residuals) + kappa_log_prior()[:, None]
-    factors = explanation.log_factors(stack, residuals)
+    factors = StackEvidence(explanation, stack).log_factors(residuals)
     of_ways = logsumexp(none[:, None] + factors, axis=0) - logsumexp(none, axis=0)
     names = list(dict.fromkeys(kinds))
     of_kinds = [logsumexp(of_ways[[k == name for k in kinds]], axis=0) - np.log(kinds.count(name)) for name in names]
