@@ -16,6 +16,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh, face_vectors, nodes_of
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
+from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]
 
@@ -176,12 +177,12 @@ def candidates_at(
             own.extend(effects.of(smooth))
         except SolveError as error:
             rejected[kind] = f"{smooth[0].region}: cannot be simulated here: {error}"
-        for proposal in proposals:
-            if proposal.is_there_or_not:
-                try:
-                    own.extend(effects.of([proposal]))
-                except (InputError, SolveError) as error:
-                    rejected[kind] = f"{proposal.region}: cannot be simulated here: {error}"
+        switches = [proposal for proposal in proposals if proposal.is_there_or_not]
+        for proposal, tried in zip(switches, _tried(effects, switches), strict=True):
+            if isinstance(tried, Effect):
+                own.append(tried)
+            else:
+                rejected[kind] = f"{proposal.region}: cannot be simulated here: {tried}"
         if own:
             of_kind[kind] = np.arange(len(found), len(found) + len(own))
             rejected.pop(kind, None)
@@ -190,3 +191,18 @@ def candidates_at(
         of_kind[name] = np.array([len(found)])
         found.append(effect)
     return Candidates(tuple(of_kind), tuple(found), of_kind, frozenset(alternatives), rejected, effects)
+
+
+def _tried(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | InputError | SolveError]:
+    """Effects of what is there or not, or why there is none; what lets go is a dense solution each, in threads."""
+
+    def attempt(proposal: Proposal) -> Effect | InputError | SolveError:
+        try:
+            return effects.of([proposal])[0]
+        except (InputError, SolveError) as error:
+            return error
+
+    if any(proposal.follows != "release" for proposal in proposals):
+        return [attempt(proposal) for proposal in proposals]
+    # the first makes the surface, with threads of its own
+    return [*map(attempt, proposals[:1]), *in_threads(attempt, proposals[1:])]

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import copy
 import itertools
+import threading
 from functools import cached_property
 from typing import Any
 
@@ -55,6 +56,10 @@ class Linearisation:
         # held surfaces of the state, and what its sensors record of each
         self._surfaces: dict[bytes, HeldSurface] = {}
         self._of_surfaces: dict[bytes, Floats] = {}
+        # threads ask for patches of one surface
+        self._making = threading.Lock()
+        # forces that were answered one by one so far
+        self._answered = 0
         self._factorise()
 
     def _factorise(self) -> None:
@@ -71,7 +76,7 @@ class Linearisation:
         """The same state with other sensors; nothing is factorised again."""
         other = copy.copy(self)
         other.sensors = sensors
-        other._of_surfaces = {}
+        other._of_surfaces, other._answered = {}, 0
         for made in ("compliance", "_rows"):
             other.__dict__.pop(made, None)
         return other
@@ -116,6 +121,12 @@ class Linearisation:
             If too little holds the body without the patch.
         """
         key = held.tobytes()
+        with self._making:
+            surface = self._surface(key, held)
+        return np.asarray(self._of_surfaces[key] @ surface.moved(patch, lifts))
+
+    def _surface(self, key: bytes, held: NDArray[np.bool_]) -> HeldSurface:
+        """A held surface, and what the sensors record of it: made once."""
         if key not in self._surfaces:
             mesh = self.system.model.mesh
             self._surfaces[key] = HeldSurface(
@@ -127,13 +138,12 @@ class Linearisation:
                 self.reactions,
                 float(np.linalg.norm(np.ptp(mesh.points, axis=0))),
             )
-        surface = self._surfaces[key]
         if key not in self._of_surfaces:
             sensors = self.sensors
-            self._of_surfaces[key] = surface.answers(
+            self._of_surfaces[key] = self._surfaces[key].answers(
                 self.stiffness, self._free, self.compliance, sensors.by_displacement, sensors.by_reactions
             )
-        return np.asarray(self._of_surfaces[key] @ surface.moved(patch, lifts))
+        return self._surfaces[key]
 
     def answers(self, forces: Floats) -> Floats:
         """What nodal forces (..., N, 3) [N] change of what is recorded: (n, ...)."""
@@ -158,11 +168,12 @@ class Linearisation:
         return self._answers(forces)
 
     def _answers(self, forces: Any) -> Floats:
-        """What forces (3 N, k) change: by the compliance, or by equilibria if that is fewer of them."""
+        """What forces (3 N, k) change: by the compliance, or by equilibria until these are as many as it takes."""
         from scipy.sparse import issparse
 
         count = forces.shape[1]
-        if "_rows" in self.__dict__ or count >= len(self.sensors):
+        self._answered += count
+        if "_rows" in self.__dict__ or self._answered >= len(self.sensors):
             rows, which = self._rows
             return np.asarray((rows @ forces)[which])
         forces = forces.toarray() if issparse(forces) else forces

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from warpbrain.diagnosis.screening import Screen, Screening
 from warpbrain.diagnosis.single_points import LARGE, OFTEN
 from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage
+from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -63,7 +65,7 @@ def sound_points(base: Base, candidates: Candidates) -> Bools:
         points = np.unique(groups[base.aside & ~sound]).tolist()
         for several in ([[point] for point in points], _near_each_other(base, points)):
             each = [np.isin(groups, together) for together in several]
-            odds = [_log_odds(base, screening, rows, kappa) for rows in each]
+            odds = in_threads(partial(_log_odds, base, screening, kappa), each)
             if odds and max(odds) > 0.0:
                 break
         else:
@@ -82,7 +84,7 @@ def _near_each_other(base: Base, points: Sequence[int]) -> list[list[int]]:
     ]
 
 
-def _log_odds(base: Base, screening: Screening, rows: Bools, kappa: float) -> float:
+def _log_odds(base: Base, screening: Screening, kappa: float, rows: Bools) -> float:
     """Logarithm of the odds that points, whose rows are set aside in a screening, are no gross errors."""
     asked = [screening.with_noise(rows, times / ASIDE) for times in (1.0, LARGE)]
     screens = [one.run(one.explanation.whitened(base.residual)[:, None]) for one in asked]

@@ -19,6 +19,9 @@ from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]
 
+#: Numbers in a stack from which threads gain more than they cost.
+_LARGE = 50_000
+
 
 @dataclass(frozen=True, eq=False)
 class _Family:
@@ -85,7 +88,8 @@ class StackEvidence:
         if self._grams is None:
             self._grams = [self._gram(family) for family in self._families]
         missing = [kappa for kappa in kappas.tolist() if kappa not in self._at]
-        self._at.update(zip(missing, in_threads(self._known, missing), strict=True))
+        made = in_threads(self._known, missing) if self._VG.size > _LARGE else map(self._known, missing)
+        self._at.update(zip(missing, made, strict=True))
 
     def log_factors(self, residuals: Floats, kappas: Floats = KAPPAS) -> Floats:
         """Log Bayes factor of each effect against none, for whitened residuals (n, b): (kappas, v, b)."""

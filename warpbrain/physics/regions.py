@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,9 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import ParameterError
 
 Floats = NDArray[np.float64]
+
+#: Balls whose weights are kept, the latest ones.
+_KEPT = 1024
 
 
 def region_weights(
@@ -42,15 +47,24 @@ def region_weights(
     elif elements:
         raise ParameterError("elements", "given beside centre and radius: a region is a set or a ball")
     else:
-        away = mesh.centres - np.asarray(centre)
-        square = np.einsum("ei,ei->e", away, away)
-        # most elements are far away: they need neither a root nor a cosine
-        near = np.flatnonzero(square < (2.0 * radius) ** 2)
-        weights = np.zeros(len(square))
-        weights[near] = 0.5 * (1.0 + np.cos(0.5 * np.pi * np.sqrt(square[near]) / radius))
+        near, inside = _ball_weights(mesh, tuple(map(float, centre)), float(radius))
+        weights = np.zeros(len(mesh.tetrahedra))
+        weights[near] = inside
     if not weights.any():
         raise ParameterError("centre" if centre is not None else "elements", "no element is in this region")
     return weights
+
+
+@lru_cache(maxsize=_KEPT)
+def _ball_weights(
+    mesh: TetMesh, centre: tuple[float, ...], radius: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Elements in twice the radius, and their weights: a scan asks for each of its balls many times."""
+    away = mesh.centres - np.array(centre)
+    square = np.einsum("ei,ei->e", away, away)
+    # most elements are far away: they need neither a root nor a cosine
+    near = np.flatnonzero(square < (2.0 * radius) ** 2)
+    return near, 0.5 * (1.0 + np.cos(0.5 * np.pi * np.sqrt(square[near]) / radius))
 
 
 def elements_of(mesh: TetMesh, elements: str) -> NDArray[np.int64]:

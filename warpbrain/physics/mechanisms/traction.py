@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -22,6 +23,8 @@ from warpbrain.physics.proposal import Proposal, Situation
 
 #: Where it is looked for: radii [m] of patches, and standard deviation of each component [Pa].
 _RADII, _USUAL = (0.009, 0.014), 1000.0
+#: Patches whose nodes are kept, the latest ones.
+_KEPT = 1024
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,12 +92,26 @@ class Traction(Load, Mechanism):
         )
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
-        def traction(points: NDArray[np.float64]) -> NDArray[np.float64]:
-            away = points - np.asarray(self.centre)
-            square = np.einsum("ki,ki->k", away, away)
-            near = np.flatnonzero(square < self.radius**2)
-            found = np.zeros(points.shape)
-            found[near] = np.outer(0.5 * (1.0 + np.cos(np.pi * np.sqrt(square[near]) / self.radius)), self.value)
-            return found
+        nodes, areas = _patch(mesh, tuple(map(float, self.centre)), float(self.radius))
+        found = np.zeros(mesh.points.shape)
+        found[nodes] = np.outer(areas, self.value)
+        return found
 
-        return surface_forces(mesh, traction)
+
+@lru_cache(maxsize=_KEPT)
+def _patch(
+    mesh: TetMesh | QuadraticMesh, centre: tuple[float, ...], radius: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Nodes of a patch, and areas [m2] with which a traction at its centre acts on them: a scan asks for them often."""
+
+    def profile(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        away = points - np.array(centre)
+        square = np.einsum("ki,ki->k", away, away)
+        near = np.flatnonzero(square < radius**2)
+        found = np.zeros(points.shape)
+        found[near, 0] = 0.5 * (1.0 + np.cos(np.pi * np.sqrt(square[near]) / radius))
+        return found
+
+    areas = surface_forces(mesh, profile)[:, 0]
+    nodes = np.flatnonzero(areas)
+    return nodes, areas[nodes]
