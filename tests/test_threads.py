@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from warpbrain.threads import MOST, in_threads, processors, thread_count
+from warpbrain.threads import MOST, beside, in_threads, processors, thread_count
 
 
 @pytest.mark.parametrize(
@@ -62,3 +62,25 @@ def test_blas_has_one_thread_in_each(monkeypatch):
     with threadpool_limits(2, user_api="blas"):
         assert in_threads(lambda part: threads(), range(2)) == [{1}, {1}]
         assert threads() == {2}
+
+
+@pytest.mark.parametrize("count", ["1", "2"])
+def test_something_beside_is_there_when_it_is_asked_for(monkeypatch, count):
+    monkeypatch.setenv("OMP_NUM_THREADS", count)
+    begun = threading.Event()
+
+    def work() -> set[int]:
+        begun.set()
+        return set(in_threads(lambda _: threading.get_ident(), range(3)))
+
+    wait = beside(work)
+    assert begun.wait(0.0 if count == "1" else 30.0) == (count == "2")
+    found = wait()
+    # alone it is done by who asks, else in one thread of its own
+    assert len(found) == 1 and (found == {threading.get_ident()}) == (count == "1")
+
+    def fail() -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        beside(fail)()

@@ -48,8 +48,29 @@ def in_threads(work: Callable[[Part], Made], parts: Sequence[Part]) -> list[Made
     with one_thread_of_blas():
         if count < 2:
             return [work(part) for part in parts]
-        with ThreadPoolExecutor(count, initializer=_become_part) as pool:
-            return list(pool.map(work, parts))
+        return list(_pool(count, os.getpid()).map(work, parts))
+
+
+def beside(work: Callable[[], Made]) -> Callable[[], Made]:
+    """Begin something that is asked for later, in a thread of its own if there may be several.
+
+    Returns
+    -------
+    callable
+        Waits for it, and gives what came out or raises what went wrong.
+    """
+    if thread_count() < 2 or getattr(_here, "is_part", False):
+        return work
+    pool = ThreadPoolExecutor(1, initializer=_become_part)
+    begun = pool.submit(work)
+    pool.shutdown(wait=False)
+    return begun.result
+
+
+@cache
+def _pool(count: int, process: int) -> ThreadPoolExecutor:
+    """Threads that stay, in one process: a copy of it would have none of them."""
+    return ThreadPoolExecutor(count, initializer=_become_part)
 
 
 def _become_part() -> None:

@@ -7,6 +7,7 @@ not. Where the load is large one round from the declared state is not enough: co
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ from warpbrain.diagnosis.time_courses import main_courses
 from warpbrain.diagnosis.tissue_prior import declared, tissue_prior
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.threads import beside
 
 Floats = NDArray[np.float64]
 
@@ -165,10 +167,16 @@ class BaseFinder:
         self, states: States, spacing: float, mesh_error: bool, without_nuisances: bool, listener: Listener
     ) -> None:
         self.states = states
-        self.prior = tissue_prior(states.case, states.parameters)
+        # a second of drawing from the generative model, while the first state is solved
+        self._prior = beside(lambda: tissue_prior(states.case, states.parameters))
         self._spacing, self._mesh_error, self._bare = spacing, mesh_error, without_nuisances
         self._listener = listener
         self._remarks: list[str] = []
+
+    @cached_property
+    def prior(self) -> Gaussian:
+        """Of the tissues' parameters."""
+        return self._prior()
 
     def find(self) -> Base:
         """The base state.

@@ -53,7 +53,7 @@ from warpbrain.diagnosis.verdict import CLAIM, overall
 from warpbrain.diagnosis.virtual import VirtualCases
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
-from warpbrain.threads import one_thread_of_blas
+from warpbrain.threads import beside, one_thread_of_blas
 
 Floats = NDArray[np.float64]
 
@@ -134,20 +134,21 @@ class Diagnosing:
         with self._timed("held out"):
             judge = Judge(base, options, rng)
             at_first = judge.judge(first)
+        draws_of_cases = np.random.default_rng([options.seed, 11])
+        virtual = beside(lambda: VirtualCases(first.screening, first.kappa, options.alpha, draws_of_cases).confusion())
         with self._timed("beside"):
 
-            def beside(before: Stage, kind: str) -> tuple[Stage, Judgement] | None:
+            def next_stage(before: Stage, kind: str) -> tuple[Stage, Judgement] | None:
                 fit = before.fits.get(kind) or self._refit(refitting, before, kind, None, before.fits.get("none"))
                 if fit is None:
                     return None
                 stage = self._beside(refitting, before, kind, fit, rng)
                 return stage, judge.judge(stage)
 
-            stages, judged = named_in_turn(first, at_first, beside)
+            stages, judged = named_in_turn(first, at_first, next_stage)
         self.listener.stage("virtual cases")
         with self._timed("virtual cases"):
-            draws_of_cases = np.random.default_rng([options.seed, 11])
-            confusion = VirtualCases(first.screening, first.kappa, options.alpha, draws_of_cases).confusion()
+            confusion = virtual()
         return self._conclude(stages, at_first, judged, judge, where, rng, confusion)
 
     def _first(self, base: Base, candidates: Candidates, rng: np.random.Generator) -> tuple[Stage, Refitting]:

@@ -146,22 +146,19 @@ class Screening:
         if self.pairs is not None:
             self.pairs.prepare(self._kappas)
         each = [residuals[:, low : low + _AT_ONCE] for low in range(0, max(residuals.shape[1], 1), _AT_ONCE)]
-        screens = in_threads(self._screen, each)
-        return Screen(
-            (*self.candidates.kinds, UNKNOWN),
-            np.concatenate([one.none for one in screens]),
-            np.concatenate([one.log_factors for one in screens], axis=1),
-            np.concatenate([one.places for one in screens], axis=1),
-        )
+        nones, all_places, unknowns = zip(*in_threads(self._some, each), strict=True)
+        none, places = np.concatenate(nones), np.concatenate(all_places, axis=1)
+        log_factors = np.vstack([self._by_kind(places), np.concatenate(unknowns)])
+        return Screen((*self.candidates.kinds, UNKNOWN), none, log_factors, places)
 
-    def _screen(self, residuals: Floats) -> Screen:
+    def _some(self, residuals: Floats) -> tuple[Floats, Floats, Floats]:
+        """Log density (b,) with nothing missing, and log Bayes factors (v, b) of effects and (b,) of the unknown."""
         none = self.explanation.log_marginal(residuals, self._kappas)
         places = self.of_effects.log_places(residuals, self._kappas) - none
         for kind, lasting in self._lasting.items():
             alike = lasting.explanation.log_marginal(residuals, self._kappas)
             places[self.candidates.of_kind[kind]] = lasting.log_places(residuals, self._kappas) - alike
-        unknown = self._log_unknown(residuals) - none
-        return Screen((*self.candidates.kinds, UNKNOWN), none, np.vstack([self._by_kind(places), unknown]), places)
+        return none, places, self._log_unknown(residuals) - none
 
     def _log_unknown(self, residuals: Floats) -> Floats:
         """With what has no name: a smooth force, or as likely two places that draw each other."""

@@ -15,11 +15,14 @@ large, and whatever explains that one point would be credited with the noise of 
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.evidence import KAPPAS, Explanation, kappa_log_prior
 from warpbrain.diagnosis.sensors import Sensors, rows_of_points
+from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]
 
@@ -48,7 +51,9 @@ def log_evidence_and_odds(
     """
     from scipy.special import logsumexp
 
-    odds = np.array([log_odds(sensors, explanation, residual, kappa) for kappa in kappas.tolist()])
+    at = partial(log_odds, sensors, explanation, residual)
+    # with the first the explanation makes what the others need of it, too
+    odds = np.array([*map(at, kappas[:1].tolist()), *in_threads(at, kappas[1:].tolist())])
     first = np.unique(sensors.groups, return_index=True)[1]
     gains = np.logaddexp(0.0, odds[:, first]).sum(axis=1)
     logs = explanation.log_none(explanation.whitened(residual)[:, None], kappas)[:, 0] + kappa_log_prior(kappas) + gains

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
+from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
+from warpbrain.mesh import TetMesh
 from warpbrain.simulation.model import Model
 
 
@@ -13,15 +17,9 @@ def require_held(model: Model) -> None:
 
     Each part needs constrained components, or mechanisms that hold it, that exclude its six rigid motions.
     """
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import connected_components
-
     mesh = model.node_mesh
     count = len(mesh.points)
-    first = np.repeat(mesh.tetrahedra[:, 0], 3)
-    others = mesh.tetrahedra[:, 1:].ravel()
-    links = csr_matrix((np.ones(len(first), dtype=np.int8), (first, others)), shape=(count, count))
-    parts, part = connected_components(links, directed=False)
+    parts, part = _connected_parts(mesh)
     holding = [mechanism.held(mesh) for mechanism in model.mechanisms]
     for number in range(parts):
         members = np.flatnonzero(part == number)
@@ -45,3 +43,17 @@ def require_held(model: Model) -> None:
                 f"{which} around ({where[0]:.0f}, {where[1]:.0f}, {where[2]:.0f}) mm is not held: its constrained "
                 f"nodes leave {6 - rank} of 6 rigid motions free, so it has no equilibrium"
             )
+
+
+@lru_cache(maxsize=4)
+def _connected_parts(mesh: TetMesh) -> tuple[int, NDArray[np.int32]]:
+    """How many there are, and which of them each node (n,) belongs to; a mesh is asked for every state of it."""
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(mesh.points)
+    first = np.repeat(mesh.tetrahedra[:, 0], 3)
+    others = mesh.tetrahedra[:, 1:].ravel()
+    links = csr_matrix((np.ones(len(first), dtype=np.int8), (first, others)), shape=(count, count))
+    parts, part = connected_components(links, directed=False)
+    return int(parts), part
