@@ -87,6 +87,9 @@ def test_what_is_imported_is_declared():
     for module, extra in (("distributed", "dask"), ("pyarrow", "parquet")):
         assert [_plain(re.split(r"[^\w.-]", line)[0]) for line in extras[extra]] == [module]
         imported.remove(module)
+    for cuda in ("12", "13"):
+        assert [line.split(">")[0] for line in extras[f"cuda{cuda}"]] == [f"cupy-cuda{cuda}x[ctk]"]
+    imported -= {"cupy", "cupyx"}
     foreign = imported - set(sys.stdlib_module_names) - {"warpbrain"}
     dependencies = tomllib.loads(project)["project"]["dependencies"]
     declared = {_plain(re.split(r"[^\w.-]", line)[0]) for line in dependencies}

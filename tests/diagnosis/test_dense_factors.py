@@ -33,7 +33,7 @@ def test_a_gpu_without_cupy_has_none(monkeypatch):
     class Device:
         is_cuda, ordinal = True, 0
 
-    monkeypatch.setattr(module, "_has_cupy", lambda: False)
+    monkeypatch.setattr(module, "has_cupy", lambda device: False)
     assert dense_factors(_matrix()[0], Device()) is None
 
 
@@ -64,4 +64,4 @@ def test_what_is_too_large_is_for_the_host(gpu, monkeypatch):
     monkeypatch.setattr(module, "_MATRICES", 10**12)
     assert dense_factors(_matrix()[0], gpu) is None
     with pytest.raises(MemoryError, match="GB"):
-        DenseFactors(_matrix()[0], gpu.ordinal)
+        DenseFactors(_matrix()[0], gpu)

@@ -7,11 +7,12 @@ right-hand sides as soon. It takes memory of three such matrices, so what is lar
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from warpbrain.simulation.cupy_on import has_cupy, require_memory
 
 Floats = NDArray[np.float64]
 
@@ -25,8 +26,8 @@ class DenseFactors:
     Parameters
     ----------
     matrix : SciPy sparse matrix (n, n)
-    ordinal : int
-        Of the GPU.
+    device : warp.Device
+        A GPU for which there is CuPy.
 
     Raises
     ------
@@ -36,20 +37,15 @@ class DenseFactors:
         If it does not fit into the GPU's memory.
     """
 
-    def __init__(self, matrix: Any, ordinal: int) -> None:
+    def __init__(self, matrix: Any, device: Any) -> None:
         import cupy
         import cupyx
         from cupyx.scipy.sparse import csr_matrix
 
-        self._device = cupy.cuda.Device(ordinal)
-        with self._device:
-            # what CuPy holds from before is free, too
-            cupy.get_default_memory_pool().free_all_blocks()
-            needed = _MATRICES * 8 * matrix.shape[0] ** 2
-            if needed > self._device.mem_info[0]:
-                raise MemoryError(f"dense factors take {needed / 1e9:.1f} GB of memory of the GPU")
-            with cupyx.errstate(linalg="raise"):
-                self._L = cupy.linalg.cholesky(csr_matrix(matrix.tocsr().astype(np.float64)).toarray())
+        require_memory(device, _MATRICES * 8 * matrix.shape[0] ** 2)
+        self._device = cupy.cuda.Device(device.ordinal)
+        with self._device, cupyx.errstate(linalg="raise"):
+            self._L = cupy.linalg.cholesky(csr_matrix(matrix.tocsr().astype(np.float64)).toarray())
 
     def solve(self, columns: Any) -> Floats:
         """What answers to columns (n, k), an array or SciPy sparse: (n, k), column after column in memory."""
@@ -65,6 +61,8 @@ class DenseFactors:
         from cupyx.scipy.linalg import solve_triangular
         from cupyx.scipy.sparse import csr_matrix
 
+        if columns.shape[1] == 0:
+            return np.empty((rows, 0))
         with self._device:
             # pages that stay in place are copied to several times as fast
             made = cupyx.empty_pinned((rows, columns.shape[1]), dtype=np.float64, order="F")
@@ -90,10 +88,10 @@ def dense_factors(matrix: Any, device: Any) -> DenseFactors | None:
         Symmetric.
     device : warp.Device
     """
-    if not device.is_cuda or not _has_cupy():
+    if not has_cupy(device):
         return None
     try:
-        return DenseFactors(matrix, device.ordinal)
+        return DenseFactors(matrix, device)
     except (MemoryError, np.linalg.LinAlgError):
         return None
 
@@ -106,17 +104,3 @@ def _on_gpu(columns: Any) -> Any:
     if issparse(columns):
         return csc_matrix(columns.tocsc().astype(np.float64)).toarray(order="F")
     return cupy.asarray(columns, dtype=np.float64, order="F")
-
-
-@cache
-def _has_cupy() -> bool:
-    """Whether CuPy is there, and finds the libraries that it calls."""
-    try:
-        import cupy
-        import cupyx.scipy.linalg  # noqa: F401
-
-        cupy.linalg.cholesky(cupy.eye(2))
-    except Exception:
-        # whatever keeps an extra from working is no reason to stop: the host does the same
-        return False
-    return True

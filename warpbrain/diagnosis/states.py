@@ -21,6 +21,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import Patch
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
+from warpbrain.simulation.keeping import kept_for
 from warpbrain.simulation.kept_factors import KeptFactors
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
@@ -109,7 +110,7 @@ class States:
         self.realign(self.motion)
         self.modes = stiffness_modes(case.remaining[0])
         self.solves = 0
-        self._factors: dict[tuple[str, ...], KeptFactors] = {}
+        self._factors: dict[tuple[str, ...], KeptFactors | None] = {}
 
     def realign(self, motion: Floats) -> None:
         """Take recordings for moved by a rigid motion (6,); see `realigned`."""
@@ -166,7 +167,10 @@ class States:
             states = [found[time] for time in self.times]
         else:
             course = ()
-            states = [EquilibriumSolver(system, options).solve(model.external_forces(), start)] * len(self.times)
+            # on a CPU conjugate gradients have found a single state as soon as factors are made
+            factors = None if system.device.is_cpu else self._factors_of(system)
+            solver = EquilibriumSolver(system, options, factors=factors)
+            states = [solver.solve(model.external_forces(), start)] * len(self.times)
         external = model.external_forces()
         reactions = [model.reactions(state.internal, external) for state in states]
         sensors = self._sensors([(state.u, R) for state, R in zip(states, reactions, strict=True)], expected)
@@ -214,11 +218,15 @@ class States:
             found.append((u, system.model.reactions(state.internal, external)))
         return found[len(_SHORT) :]
 
-    def _factors_of(self, system: System) -> KeptFactors:
-        """Kept while the same mechanisms act: a fit has many states of those, one after the other."""
-        acting = tuple(type(mechanism).__name__ for mechanism in system.model.mechanisms)
+    def _factors_of(self, system: System) -> KeptFactors | None:
+        """Kept while the same mechanisms act: a fit has many states of those, one after the other.
+
+        On a GPU whatever acts: there an inverse is made anew as soon as it helps less.
+        """
+        same = system.model.mechanisms if system.device.is_cpu else ()
+        acting = tuple(type(mechanism).__name__ for mechanism in same)
         if acting not in self._factors:
-            self._factors = {acting: KeptFactors()}
+            self._factors = {acting: kept_for(system.device)}
         return self._factors[acting]
 
     def _system(self, hypothesis: Hypothesis) -> System:

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from warpbrain.errors import InputError, SolveError
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.coupled import LinearSolver
-from warpbrain.simulation.factored import FactoredSolver
 from warpbrain.simulation.held import require_held
+from warpbrain.simulation.keeping import with_kept
 from warpbrain.simulation.kept_factors import KeptFactors
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
@@ -182,8 +182,8 @@ class EquilibriumSolver:
             preconditioner=self.options.preconditioner,
             watch_curvature=True,
         )
-        if factors is not None and system.device.is_cpu:
-            self._linear = FactoredSolver(system, self._linear, factors, self.options.cg_tolerance)
+        if factors is not None:
+            self._linear = with_kept(system, self._linear, factors, self.options.cg_tolerance)
         self._history: list[NewtonStep] = []
         self._free = 1.0 - system.model.constrained
         # residuals cannot fall below the rounding of the sums of element forces

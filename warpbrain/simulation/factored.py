@@ -2,8 +2,8 @@
 
 On the CPU one solve with factors takes as long as some ten iterations of the captured loops of `warpbrain.kernels`.
 Where many states follow each other three to six of them do what takes conjugate gradients 50 to 200 iterations, and
-MINRES 50 to 1,500. Where fluid has a pressure beside the displacement: `warpbrain.simulation.coupled_block`. On a GPU
-the captured loops stay, which never leave it.
+MINRES 50 to 1,500. Where fluid has a pressure beside the displacement: `warpbrain.simulation.coupled_block`. On a GPU:
+`warpbrain.simulation.kept_inverse`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 #: Iterations after which factors are of no use, and with new ones the captured loop takes over.
-_MOST = 60
+MOST = 60
 
 
 class FactoredSolver:
@@ -89,10 +89,10 @@ class FactoredSolver:
     def _try(self, wanted: float) -> LinearResult:
         load = self._system.load.numpy().astype(np.float64).ravel()
         if self._block is not None:
-            return self._block.solve(load, wanted, self._factors, _MOST)
+            return self._block.solve(load, wanted, self._factors, MOST)
         x, left = np.zeros_like(load), load.copy()
         goal = wanted * float(np.linalg.norm(load))
-        result = host_gradients(lambda p: self._K @ p, self._factors.solve, x, left, goal, _MOST)
+        result = host_gradients(lambda p: self._K @ p, self._factors.solve, x, left, goal, MOST)
         self._system.solution.assign(x.reshape(-1, 3))
         return result
 
