@@ -7,6 +7,7 @@ from warpbrain.errors import InputError
 from warpbrain.gp.metamodels.fit import Fit, fit
 from warpbrain.gp.metamodels.models import METAMODELS
 from warpbrain.gp.metamodels.stability import unstable
+from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 
 
 def fitted(name: str, *values: float) -> Fit:
@@ -54,6 +55,33 @@ def test_what_fails_in_space_alone() -> None:
     assert unstable(one, 0.45) == ""
     assert "along (l, 1, 1)" in unstable(one, 0.2)
     assert "lam = " in unstable(fitted("mooney-rivlin", 0.1, 300.0), 0.2)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("neo-hookean", (1.0,)),
+        ("mooney-rivlin", (0.1, 0.9)),
+        ("mooney-rivlin", (0.6, 0.4)),
+        ("ogden", (1.0, 0.9)),
+        ("ogden", (-1.0, -4.7)),
+    ],
+)
+@pytest.mark.parametrize("poisson", [0.2, 0.45])
+def test_stability_has_no_unit(name: str, values: tuple[float, ...], poisson: float) -> None:
+    """What is said of a law is said of it in its own numbers, whatever is known of the same one in another unit."""
+    moduli = [unit == "Pa" for unit in METAMODELS[name].units]
+    said = []
+    for scale in (1e-3, 1.0, 1234.5, 1e6):
+        scaled = fitted(name, *np.where(moduli, scale, 1.0) * values)
+        expected = ""
+        try:
+            require_stable(scaled.law(), poisson)
+        except UnstableLawError as error:
+            expected = str(error)
+        said.append(unstable(scaled, poisson))
+        assert said[-1] == expected
+    assert len(set(map(bool, said))) == 1
 
 
 def test_bad_arguments_are_not_an_unstable_law() -> None:

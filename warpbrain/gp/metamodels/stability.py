@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
 from warpbrain.errors import InputError
 from warpbrain.gp.metamodels.fit import Fit
+
+if TYPE_CHECKING:
+    from warpbrain.physics.laws import Law
 
 
 def unstable(fit: Fit, poisson: float = 0.45, formulation: str = "coupled") -> str:
@@ -33,8 +39,26 @@ def unstable(fit: Fit, poisson: float = 0.45, formulation: str = "coupled") -> s
         law = fit.law()
     except InputError as error:
         return str(error)
+    if _is_stable(law.scaled_to(1.0), poisson, formulation):
+        return ""
     try:
         require_stable(law, poisson, formulation)
     except UnstableLawError as error:
         return str(error)
     return ""
+
+
+@lru_cache(maxsize=64)
+def _is_stable(law: Law, poisson: float, formulation: str) -> bool:
+    """Whether a law of the shear modulus 1 Pa is stable; kept for the last ones that were asked for.
+
+    The conditions are signs, and ratios to the shear modulus: they hold for a law in one unit if they do in another.
+    All neo-Hookean laws are one then, so that the thousand of a prior are looked at once.
+    """
+    from warpbrain.physics.laws.stability import UnstableLawError, require_stable
+
+    try:
+        require_stable(law, poisson, formulation)
+    except UnstableLawError:
+        return False
+    return True
