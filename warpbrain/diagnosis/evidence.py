@@ -106,12 +106,12 @@ class Explanation:
         from scipy.linalg import solve_triangular
 
         if rows.ndim == 1 or rows.shape[1] <= _TOGETHER:
-            return np.asarray(solve_triangular(self.factor, rows, lower=True))
+            return np.asarray(solve_triangular(self.factor, rows, lower=True, check_finite=False))
         found = np.empty(rows.shape, order="F")
 
         def fill(first: int) -> None:
             some = slice(first, first + _TOGETHER)
-            found[:, some] = solve_triangular(self.factor, rows[:, some], lower=True)
+            found[:, some] = solve_triangular(self.factor, rows[:, some], lower=True, check_finite=False)
 
         in_threads(fill, range(0, rows.shape[1], _TOGETHER))
         return found

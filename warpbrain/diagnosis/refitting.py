@@ -234,7 +234,7 @@ class Refitting:
             return False
         change = self._beyond(before, error, state)
         self._mesh = replace(before, own=error)
-        return float(np.linalg.norm(solve_triangular(self.factor, change, lower=True))) > _MATTERS
+        return float(np.linalg.norm(solve_triangular(self.factor, change, lower=True, check_finite=False))) > _MATTERS
 
     def _beyond(self, known: MeshErrors, error: Difference, state: SolvedState) -> Floats:
         """What an error of the mesh is beyond that which its tissue alone is known to have, in what is recorded."""
@@ -300,7 +300,7 @@ class Refitting:
                 columns, made_at = self._columns_at(state, effects, z[q:], columns), z
                 if solved:
                     columns = self._columns_solved(state, residual, effects, z, columns)
-            white = solve_triangular(self.factor, np.column_stack([residual, columns]), lower=True) / kappa
+            white = solve_triangular(self.factor, np.column_stack([residual, columns]), lower=True, check_finite=False) / kappa
             gradient = white[:, 1:].T @ white[:, 0] - z
             step = np.linalg.solve(np.eye(len(z)) + white[:, 1:].T @ white[:, 1:], gradient)
             taken = False
@@ -345,7 +345,7 @@ class Refitting:
     def _objective(self, residual: Floats, z: Floats, kappa: float) -> float:
         from scipy.linalg import solve_triangular
 
-        white = solve_triangular(self.factor, residual, lower=True) / kappa
+        white = solve_triangular(self.factor, residual, lower=True, check_finite=False) / kappa
         return 0.5 * float(white @ white + z @ z)
 
     def _hypothesis(self, effects: tuple[Effect, ...], z: Floats) -> Hypothesis:

@@ -155,7 +155,7 @@ class States:
         """
         self.solves += 1
         system = self._system(hypothesis)
-        model = system.model
+        model, external = system.model, system.model.external_forces()
         options = EquilibriumOptions(tolerance=TOLERANCE)
         # relaxing stress or fluid of its own: what a term has in its memory beside that changes no state in time
         in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
@@ -170,8 +170,7 @@ class States:
             # on a CPU conjugate gradients have found a single state as soon as factors are made
             factors = None if system.device.is_cpu else self._factors_of(system)
             solver = EquilibriumSolver(system, options, factors=factors)
-            states = [solver.solve(model.external_forces(), start)] * len(self.times)
-        external = model.external_forces()
+            states = [solver.solve(external, start)] * len(self.times)
         reactions = [model.reactions(state.internal, external) for state in states]
         sensors = self._sensors([(state.u, R) for state, R in zip(states, reactions, strict=True)], expected)
         return SolvedState(hypothesis, system, states[-1].u, reactions[-1], sensors, tuple(course))
