@@ -94,6 +94,8 @@ class FinerStates:
         self._beyond: Floats | float = 0.0
         self._system: System | None = None
         self._factors: tuple[Factors, NDArray[np.bool_]] | None = None
+        # of the system and the factors that there are
+        self._linear: TwoLevelGradient | None = None
 
     def errors(self, state: SolvedState, less_compressible: Mechanism, prior: Gaussian) -> MeshErrors:
         """The error of a state, and what it is beside that with other tissue.
@@ -147,7 +149,7 @@ class FinerStates:
         except SolveError:
             found = solver.solve(external, flat)
         if linear is not None and linear.slow:
-            self._factors = None
+            self._factors = self._linear = None
         self._beyond = found.u - flat
         u, reactions = restricted(finer.prolongation, found.u, model.reactions(found.internal, external))
         return Difference(u - coarse.u, reactions - coarse.reactions, hypothesis.theta)
@@ -159,6 +161,8 @@ class FinerStates:
         """
         if not system.device.is_cpu or system.quadratic is not None:
             return None
+        if self._linear is not None:
+            return self._linear
         plain = system.linear_solver(tolerance=_ROUGH, max_iterations=_MOST, watch_curvature=True)
         if not isinstance(plain, ConjugateGradient):
             return None
@@ -171,7 +175,8 @@ class FinerStates:
                 return None
         factors, free = self._factors
         prolong = free_prolongation(prolongation, free, system.model.constrained)
-        return TwoLevelGradient(plain, system.load, system.solution, factors, prolong, tolerance=_ROUGH)
+        self._linear = TwoLevelGradient(plain, system.load, system.solution, factors, prolong, tolerance=_ROUGH)
+        return self._linear
 
     def _system_of(self, model: Model) -> System:
         """The system of the last state with other numbers, or another one where numbers are not all that changed."""
@@ -181,5 +186,5 @@ class FinerStates:
                 return self._system
             except InputError:
                 pass
-        self._system = System(model, self.states.device)
+        self._system, self._linear = System(model, self.states.device), None
         return self._system

@@ -300,7 +300,10 @@ class Refitting:
                 columns, made_at = self._columns_at(state, effects, z[q:], columns), z
                 if solved:
                     columns = self._columns_solved(state, residual, effects, z, columns)
-            white = solve_triangular(self.factor, np.column_stack([residual, columns]), lower=True, check_finite=False) / kappa
+            white = (
+                solve_triangular(self.factor, np.column_stack([residual, columns]), lower=True, check_finite=False)
+                / kappa
+            )
             gradient = white[:, 1:].T @ white[:, 0] - z
             step = np.linalg.solve(np.eye(len(z)) + white[:, 1:].T @ white[:, 1:], gradient)
             taken = False
