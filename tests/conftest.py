@@ -26,6 +26,15 @@ def device(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
+@pytest.fixture
+def gpu(device: str) -> wp.Device:
+    """A GPU for which CuPy is there."""
+    if device == "cpu":
+        pytest.skip("on a GPU only")
+    pytest.importorskip("cupy")
+    return wp.get_device(device)
+
+
 @pytest.fixture(scope="session", params=list(PRECISIONS))
 def precision(request: pytest.FixtureRequest) -> Precision:
     return PRECISIONS[request.param]

@@ -16,15 +16,6 @@ def _matrix(n: int = 60):
     return csr_array(half @ half.T + 3.0 * eye_array(n)), rng
 
 
-@pytest.fixture
-def gpu(device):
-    """A GPU for which CuPy is there."""
-    if device == "cpu":
-        pytest.skip("on a GPU only")
-    pytest.importorskip("cupy")
-    return wp.get_device(device)
-
-
 def test_a_host_has_none():
     assert dense_factors(_matrix()[0], wp.get_device("cpu")) is None
 

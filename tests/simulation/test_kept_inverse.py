@@ -1,7 +1,6 @@
 """The inverse of a state near by, on a GPU: it finds what the captured loop finds, in fewer iterations."""
 
 import numpy as np
-import pytest
 import warp as wp
 from bodies import model_of
 from shapes import cube
@@ -26,15 +25,6 @@ def body(modulus: float = 1000.0, pressed: float = 0.1) -> Model:
     prescribed[above, 2] = -pressed
     held = np.repeat((below | above)[:, None], 3, axis=1)
     return model_of(mesh, Material(NeoHookean(modulus), 0.45), constrained=held, prescribed=prescribed)
-
-
-@pytest.fixture
-def gpu(device):
-    """A GPU for which CuPy is there."""
-    if device == "cpu":
-        pytest.skip("on a GPU only")
-    pytest.importorskip("cupy")
-    return wp.get_device(device)
 
 
 def equilibrium(model: Model, device: str, kept: KeptFactors | None) -> tuple[np.ndarray, list[int]]:
