@@ -2,9 +2,10 @@
 
 import threading
 
+import numpy as np
 import pytest
 
-from warpbrain.threads import MOST, beside, in_threads, processors, thread_count
+from warpbrain.threads import MOST, beside, fill_columns, in_threads, processors, thread_count
 
 
 @pytest.mark.parametrize(
@@ -84,3 +85,17 @@ def test_something_beside_is_there_when_it_is_asked_for(monkeypatch, count):
 
     with pytest.raises(ZeroDivisionError):
         beside(fail)()
+
+
+@pytest.mark.parametrize("count", ["1", "3"])
+def test_columns_are_filled_some_at_a_time(monkeypatch, count):
+    monkeypatch.setenv("OMP_NUM_THREADS", count)
+    found, asked = np.zeros((2, 7)), []
+
+    def work(some: slice) -> np.ndarray:
+        asked.append(some.start)
+        return np.arange(7.0)[some] * [[1.0], [-1.0]]
+
+    fill_columns(found, work, 3)
+    np.testing.assert_array_equal(found, [np.arange(7.0), -np.arange(7.0)])
+    assert sorted(asked) == [0, 3, 6]

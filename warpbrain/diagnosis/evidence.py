@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effect
-from warpbrain.threads import in_threads
+from warpbrain.threads import fill_columns
 
 Floats = NDArray[np.float64]
 
@@ -108,12 +108,9 @@ class Explanation:
         if rows.ndim == 1 or rows.shape[1] <= _TOGETHER:
             return np.asarray(solve_triangular(self.factor, rows, lower=True, check_finite=False))
         found = np.empty(rows.shape, order="F")
-
-        def fill(first: int) -> None:
-            some = slice(first, first + _TOGETHER)
-            found[:, some] = solve_triangular(self.factor, rows[:, some], lower=True, check_finite=False)
-
-        in_threads(fill, range(0, rows.shape[1], _TOGETHER))
+        fill_columns(
+            found, lambda some: solve_triangular(self.factor, rows[:, some], lower=True, check_finite=False), _TOGETHER
+        )
         return found
 
     def with_more(self, nuisances: Floats) -> Explanation:

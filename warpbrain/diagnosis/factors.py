@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.dense_factors import dense_factors
 from warpbrain.errors import SolveError
 from warpbrain.simulation.symmetric_factors import symmetric_factors
-from warpbrain.threads import in_threads
+from warpbrain.threads import fill_columns
 
 Floats = NDArray[np.float64]
 
@@ -68,10 +68,10 @@ class Factors:
         columns = columns.tocsc() if issparse(columns) else columns
         made = np.empty((rows, columns.shape[1]), order="F")
 
-        def solve_block(first: int) -> None:
-            block = columns[:, first : first + _TOGETHER]
+        def solve_block(some: slice) -> Floats:
+            block = columns[:, some]
             block = block.toarray() if issparse(block) else block
-            made[:, first : first + _TOGETHER] = of(self._factors.solve(np.asfortranarray(block, dtype=np.float64)))
+            return of(self._factors.solve(np.asfortranarray(block, dtype=np.float64)))
 
-        in_threads(solve_block, range(0, columns.shape[1], _TOGETHER))
+        fill_columns(made, solve_block, _TOGETHER)
         return made

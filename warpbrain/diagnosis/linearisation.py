@@ -26,7 +26,7 @@ from warpbrain.diagnosis.releasing import HeldSurface
 from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.mesh import vertex_normals
 from warpbrain.simulation.system import System
-from warpbrain.threads import in_threads
+from warpbrain.threads import fill_columns, in_threads
 
 Floats = NDArray[np.float64]
 
@@ -176,12 +176,7 @@ class Linearisation:
         if "_rows" in self.__dict__ or self._answered >= len(self.sensors):
             rows, which = self._rows
             found = np.empty((len(rows), count))
-
-            def fill(first: int) -> None:
-                some = slice(first, first + _TOGETHER)
-                found[:, some] = rows @ forces[:, some]
-
-            in_threads(fill, range(0, count, _TOGETHER))
+            fill_columns(found, lambda some: rows @ forces[:, some], _TOGETHER)
             return found[which]
         forces = forces.toarray() if issparse(forces) else forces
         du = np.zeros((len(self._free), count))

@@ -226,15 +226,13 @@ class Refitting:
 
         It depends on the tissue, not only in proportion, and would be taken for a mechanism's share otherwise.
         """
-        from scipy.linalg import solve_triangular
-
         try:
             error = self._finer.error(state.hypothesis, state)
         except SolveError:
             return False
         change = self._beyond(before, error, state)
         self._mesh = replace(before, own=error)
-        return float(np.linalg.norm(solve_triangular(self.factor, change, lower=True, check_finite=False))) > _MATTERS
+        return float(np.linalg.norm(self._whitened(change))) > _MATTERS
 
     def _beyond(self, known: MeshErrors, error: Difference, state: SolvedState) -> Floats:
         """What an error of the mesh is beyond that which its tissue alone is known to have, in what is recorded."""
@@ -279,8 +277,6 @@ class Refitting:
         anew: bool,
     ) -> tuple[SolvedState, Floats, Floats, Floats, bool]:
         """State, coordinates, residual, columns and whether it converged; `anew`: whether columns are made anew."""
-        from scipy.linalg import solve_triangular
-
         q = self._U.shape[1]
         state, residual, z = self._best_of(effects, begins, kappa, near)
         best = self._objective(residual, z, kappa)
@@ -300,10 +296,7 @@ class Refitting:
                 columns, made_at = self._columns_at(state, effects, z[q:], columns), z
                 if solved:
                     columns = self._columns_solved(state, residual, effects, z, columns)
-            white = (
-                solve_triangular(self.factor, np.column_stack([residual, columns]), lower=True, check_finite=False)
-                / kappa
-            )
+            white = self._whitened(np.column_stack([residual, columns])) / kappa
             gradient = white[:, 1:].T @ white[:, 0] - z
             step = np.linalg.solve(np.eye(len(z)) + white[:, 1:].T @ white[:, 1:], gradient)
             taken = False
@@ -346,10 +339,14 @@ class Refitting:
         return found
 
     def _objective(self, residual: Floats, z: Floats, kappa: float) -> float:
+        white = self._whitened(residual) / kappa
+        return 0.5 * float(white @ white + z @ z)
+
+    def _whitened(self, rows: Floats) -> Floats:
+        """`L^-1` of rows (n, ...)."""
         from scipy.linalg import solve_triangular
 
-        white = solve_triangular(self.factor, residual, lower=True, check_finite=False) / kappa
-        return 0.5 * float(white @ white + z @ z)
+        return np.asarray(solve_triangular(self.factor, rows, lower=True, check_finite=False))
 
     def _hypothesis(self, effects: tuple[Effect, ...], z: Floats) -> Hypothesis:
         mechanisms, patches, at = [], [], self._U.shape[1]

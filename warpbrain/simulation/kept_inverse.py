@@ -7,7 +7,7 @@ takes a captured loop hundreds of iterations. By CuPy, which is an extra, and as
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -18,9 +18,6 @@ from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.cupy_on import require_memory, stream_of
 from warpbrain.simulation.factored import MOST, FactoredSolver
 from warpbrain.simulation.kept_factors import KeptFactors
-
-if TYPE_CHECKING:
-    pass
 
 #: Dense matrices in single precision for which there has to be memory.
 _MATRICES = 3
