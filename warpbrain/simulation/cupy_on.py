@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
@@ -35,9 +37,15 @@ def require_memory(device: Any, needed: int) -> None:
         raise MemoryError(f"{needed / 1e9:.1f} GB of memory of {device.alias} are needed, {free / 1e9:.1f} GB are free")
 
 
-def stream_of(device: Any) -> Any:
-    """A context in which CuPy works on a GPU in the order in which Warp does."""
+@contextmanager
+def stream_of(device: Any) -> Iterator[None]:
+    """While it lasts, CuPy works on a GPU in the order in which Warp does."""
     import cupy
     import warp as wp
 
-    return cupy.cuda.ExternalStream(wp.get_stream(device).cuda_stream, device.ordinal)
+    # a stream of another GPU than the present one is refused
+    with (
+        cupy.cuda.Device(device.ordinal),
+        cupy.cuda.ExternalStream(wp.get_stream(device).cuda_stream, device.ordinal),
+    ):
+        yield
