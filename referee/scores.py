@@ -27,6 +27,7 @@ BARS = {
     "centre within 10 mm": 0.5,
     "unknown found": 0.6,
     "both of two named": 0.6,
+    "both of two named, each d >= 5": 0.6,
 }
 #: Level of the tool's alarm.
 ALPHA = 0.05
@@ -69,9 +70,15 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
         "amount within 2 sd": share(a[1] for o in effects if (a := o.amount) is not None and a[1] is not None),
         "unknown found": share(o.said.verdict in ("unknown", "named + rest") for o in of["outside"] if o.d >= VISIBLE),
         "both of two named": share(set(o.label["names"]) <= o.said.said for o in of["two"]),
+        "both of two named, each d >= 5": share(set(o.label["names"]) <= o.said.said for o in of["two"] if _both(o)),
         "one of two named": share(o.held for o in of["two"]),
     }
     return found
+
+
+def _both(outcome: Outcome) -> bool:
+    """Whether each of two effects is visible."""
+    return all(float(effect["detectability"]) >= VISIBLE for effect in outcome.label["effects"])
 
 
 def calibration(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:

@@ -9,9 +9,8 @@ from referee.outcomes import Outcome
 
 def label(case, kind="none", names=(), d=0.0, **effect):
     """What is true of a case."""
-    first = (
-        {"kind": names[0], "where_m": None, "also": [], "amount": None, "parameter": "", "size": 1.0} if names else {}
-    )
+    unknown = {"where_m": None, "also": [], "amount": None, "parameter": "", "size": 1.0, "detectability": d}
+    first = {"kind": names[0], **unknown} if names else {}
     return {
         "case": case,
         "kind": kind,

@@ -50,7 +50,10 @@ def outcomes(tmp_path):
         (label("t1", "trap", ("noise",)), diagnosis("not physics")),
         (label("t2", "trap", ("coarse",)), diagnosis("named+rest", "pressure", 0.9)),
         (label("2a", "two", ("gravity", "swelling"), 9.0), diagnosis("named", ["gravity", "swelling"], 0.9)),
-        (label("2b", "two", ("gravity", "pressure"), 9.0), diagnosis("named + rest", "gravity", 0.9)),
+        (
+            label("2b", "two", ("gravity", "pressure"), 9.0, detectability=4.0),
+            diagnosis("named + rest", "gravity", 0.9),
+        ),
     ]
     return [outcome(tmp_path, true, said) for true, said in pairs]
 
@@ -70,6 +73,7 @@ def test_shares(outcomes):
     assert found["amount within 2 sd"] == (1, 1)
     assert found["unknown found"] == (1, 2)
     assert found["both of two named"] == (1, 2)
+    assert found["both of two named, each d >= 5"] == (1, 1)
     assert found["one of two named"] == (2, 2)
 
 
