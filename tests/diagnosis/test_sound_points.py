@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpbrain.diagnosis.dictionary import candidates_at, dictionary_of
-from warpbrain.diagnosis.sound_points import sound_points
+from warpbrain.diagnosis.sound_points import sound_points as sound_points_of
 
 
 @pytest.fixture(scope="module")
@@ -16,6 +16,10 @@ def setting(small_diagnosis):
     sensors = base.at.sensors
     noise = base.explanation.factor @ np.random.default_rng(5).normal(size=len(sensors))
     return base, candidates, noise
+
+
+def sound_points(base, candidates):
+    return sound_points_of(base, candidates, base.explanation, base.residual)
 
 
 def aside(base, residual, group):
@@ -70,6 +74,19 @@ def test_so_do_two_beside_one_cause_that_were_both_set_aside(setting, monkeypatc
     # alone neither of them does
     monkeypatch.setattr("warpbrain.diagnosis.sound_points._NEAR", 0.0)
     assert not sound_points(changed, candidates).any()
+
+
+def test_so_does_one_beside_a_second_cause_once_the_first_is_known(setting):
+    base, candidates, noise = setting
+    local = [effect for effect in candidates.effects if effect.proposed.centre is not None]
+    effect = max(local, key=lambda one: np.abs(one.columns / base.sigma[:, None]).max())
+    second = 4.0 * effect.columns[:, 0]
+    # something that no candidate explains moves everything, this point too
+    first = 3e-3 * np.tile(np.sin(np.arange(len(noise) // 3))[:, None], 3).ravel()
+    changed, rows = aside(base, first + second + noise, base.at.sensors.groups[np.argmax(np.abs(second))])
+    assert not sound_points(changed, candidates).any()
+    beside = changed.explanation.with_more(first[:, None])
+    assert np.array_equal(sound_points_of(changed, candidates, beside, changed.residual), rows)
 
 
 def test_two_gross_errors_near_each_other_do_not(setting):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from warpbrain.diagnosis.concluding import named_together
 from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
 from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import Explanation, Stack
+from warpbrain.diagnosis.gross_errors import ASIDE
 from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.judging import Judge, Judgement
 from warpbrain.diagnosis.locating import ScoreMap, score_map
@@ -62,6 +63,18 @@ Floats = NDArray[np.float64]
 _REFITTED, _REFITTED_BESIDE, _BEHIND, _WORTH = 3, 2, 12.0, 2.0
 #: By how much [nats] the fit of nothing may be better than what is linear about the base, until that is moved there.
 _FAR = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What is named, stage by stage; where something is seen; and what the case would say of each mechanism."""
+
+    stages: list[Stage]
+    at_first: Judgement
+    judged: list[Judgement]
+    judge: Judge
+    where: ScoreMap
+    virtual: Callable[[], Confusion]
 
 
 class Diagnosing:
@@ -127,6 +140,21 @@ class Diagnosing:
             self.listener.stage("again without points that are gross errors")
             base = base.without(gross)
             first, refitting = self._first(base, candidates, rng)
+        found = self._named(first, refitting, rng)
+        sound = self._sound_beside(found.stages[-1])
+        if sound.any():
+            self.listener.stage("again with points that are no gross errors beside what is named")
+            again = self._named(*self._first(base.with_back(sound), candidates, rng), rng)
+            # for the sake of what is named only
+            found = again if len(again.stages) > len(found.stages) else found
+        self.listener.stage("virtual cases")
+        with self._timed("virtual cases"):
+            confusion = found.virtual()
+        return self._conclude(found, confusion, rng)
+
+    def _named(self, first: Stage, refitting: Refitting, rng: np.random.Generator) -> _Found:
+        """What is named, one beside the other, and where something is seen."""
+        options, base, spacing = self.options, first.base, self.dictionary.situation.spacing
         with self._timed("significance"):
             where = score_map(
                 base.at, base.explanation, base.whitened, first.null, first.kappa, 0.7 * spacing, spacing, options.alpha
@@ -146,10 +174,18 @@ class Diagnosing:
                 return stage, judge.judge(stage)
 
             stages, judged = named_in_turn(first, at_first, next_stage)
-        self.listener.stage("virtual cases")
-        with self._timed("virtual cases"):
-            confusion = virtual()
-        return self._conclude(stages, at_first, judged, judge, where, rng, confusion)
+        return _Found(stages, at_first, judged, judge, where, virtual)
+
+    def _sound_beside(self, last: Stage) -> NDArray[np.bool_]:
+        """Rows (n,) of points that are no gross errors beside what is named, if something more is seen with them."""
+        nothing = np.zeros(len(last.base.aside), dtype=bool)
+        if not last.known:
+            return nothing
+        with self._timed("beside"):
+            sound = sound_points(last.base, last.candidates, last.explanation, last.residual)
+            screening = last.screening.with_noise(sound, 1.0 / ASIDE)
+            screen = screening.run(screening.explanation.whitened(last.residual)[:, None])
+        return sound if screen.log_factors[: len(last.candidates.kinds)].max() > _WORTH else nothing
 
     def _first(self, base: Base, candidates: Candidates, rng: np.random.Generator) -> tuple[Stage, Refitting]:
         """What acts at all: screened, and refitted where something does."""
@@ -173,7 +209,7 @@ class Diagnosing:
                 self.dictionary, base.effects, alternatives, lambda kind: self.listener.stage(f"candidate: {kind}")
             )
         with self._timed("screening"):
-            return base.with_back(sound_points(base, candidates)), candidates
+            return base.with_back(sound_points(base, candidates, base.explanation, base.residual)), candidates
 
     def _beside(self, refitting: Refitting, before: Stage, kind: str, fit: Refit, rng: np.random.Generator) -> Stage:
         """The next stage: what acts beside a kind, as it was refitted."""
@@ -242,16 +278,8 @@ class Diagnosing:
         size = stage.candidates.effects[number].columns.shape[1]
         return between_neighbours(stage.candidates, kind, number, begin[len(begin) - size :])
 
-    def _conclude(
-        self,
-        stages: list[Stage],
-        at_first: Judgement,
-        judged: list[Judgement],
-        judge: Judge,
-        where: ScoreMap,
-        rng: np.random.Generator,
-        confusion: Confusion,
-    ) -> Diagnosis:
+    def _conclude(self, found: _Found, confusion: Confusion, rng: np.random.Generator) -> Diagnosis:
+        stages, at_first, judged, judge, where = found.stages, found.at_first, found.judged, found.judge, found.where
         first = stages[0]
         base, candidates, fits = first.base, first.candidates, first.fits
         named = named_together(stages, judged)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.refining import Refined, spread_of_place
+from warpbrain.diagnosis.screened import Screened
 from warpbrain.diagnosis.stack_evidence import StackEvidence
-from warpbrain.diagnosis.stage import Stage
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh, face_vectors, tangents
 from warpbrain.physics.mechanism import Mechanism
@@ -36,29 +36,29 @@ _PROFILE = 0.15
 _FARTHEST = 3.0
 
 
-def placed(stage: Stage, number: int) -> Refined:
+def placed(screened: Screened, number: int) -> Refined:
     """What the best effect of a scan comes to between its places.
 
     Parameters
     ----------
-    stage : Stage
+    screened : Screened
     number : int
         Of the effect, which acts in one place.
     """
-    scan = _Scan(stage, number)
-    best, value = _at(stage, stage.candidates.effects[number].proposed)
+    scan = _Scan(screened, number)
+    best, value = _at(screened, screened.candidates.effects[number].proposed)
     for part in _STEPS:
         for _ in range(_MOVES):
-            beside = [_at(stage, proposal) for proposal in scan.beside(best.proposed, part)]
+            beside = [_at(screened, proposal) for proposal in scan.beside(best.proposed, part)]
             effect, other = max(beside, key=lambda one: one[1], default=(best, value))
             if other <= value:
                 break
             best, value = effect, other
-    wider = _wider(stage, best, scan)
+    wider = _wider(screened, best, scan)
     proposal = wider.proposed
     assert proposal.radius is not None
     sd = proposal.sd[-proposal.placing :]
-    open_ = _unresolved(stage.base.at.system.model.mesh, proposal.radius, proposal.placing - 1)
+    open_ = _unresolved(screened.mesh, proposal.radius, proposal.placing - 1)
     return Refined(wider, wider.columns[:, -proposal.placing :] * (open_ / sd))
 
 
@@ -68,14 +68,16 @@ def _unresolved(mesh: TetMesh, radius: float, directions: int) -> Floats:
     return np.array([*np.full(directions, edge), np.hypot(edge / radius, _PROFILE)])
 
 
-def _at(stage: Stage, proposal: Proposal) -> tuple[Effect, float]:
-    """The effect of a proposal at the state of a stage, and its log evidence there."""
+def _at(screened: Screened, proposal: Proposal) -> tuple[Effect, float]:
+    """The effect of a proposal at the state that was screened, and its log evidence there."""
     try:
-        effect = _made(stage, proposal)
+        effect = _made(screened, proposal)
     except SolveError:
         return Effect(proposal, np.zeros(0), np.zeros((0, 0))), -np.inf
-    white = stage.explanation.whitened(stage.residual)[:, None]
-    return effect, float(StackEvidence(stage.explanation, stage.explanation.stack([effect])).log_places(white)[0, 0])
+    white = screened.explanation.whitened(screened.residual)[:, None]
+    return effect, float(
+        StackEvidence(screened.explanation, screened.explanation.stack([effect])).log_places(white)[0, 0]
+    )
 
 
 class _Scan:
@@ -83,15 +85,15 @@ class _Scan:
 
     Parameters
     ----------
-    stage : Stage
+    screened : Screened
     number : int
         Of the best effect.
     """
 
-    def __init__(self, stage: Stage, number: int) -> None:
-        self._stage, self._mesh = stage, stage.base.at.system.model.mesh
-        effects = stage.candidates.effects
-        own = next(own for own in stage.candidates.of_kind.values() if number in own).tolist()
+    def __init__(self, screened: Screened, number: int) -> None:
+        self._screened, self._mesh = screened, screened.mesh
+        effects = screened.candidates.effects
+        own = next(own for own in screened.candidates.of_kind.values() if number in own).tolist()
         self._numbers = [k for k in own if effects[k].proposed.elsewhere is not None]
         self._centres = np.array([effects[k].proposed.centre for k in self._numbers])
         self._radii = np.array([effects[k].proposed.radius for k in self._numbers])
@@ -127,7 +129,7 @@ class _Scan:
         """Standard deviation (d + 1,) of the place beforehand: a step of the scan, and what the scan leaves open."""
         assert best.centre is not None and best.radius is not None
         at = np.column_stack([(self._centres - best.centre) @ directions.T, np.log(self._radii / best.radius)])
-        return spread_of_place(at, self._stage.screen.places[self._numbers, 0], _CELL * self.steps(directions))
+        return spread_of_place(at, self._screened.screen.places[self._numbers, 0], _CELL * self.steps(directions))
 
 
 def _typical_distance(points: Floats) -> float:
@@ -157,7 +159,7 @@ def _tangents(mesh: TetMesh, point: Floats) -> Floats:
     return tangents(_nearest_face(mesh, point)[1])
 
 
-def _wider(stage: Stage, best: Effect, scan: _Scan) -> Effect:
+def _wider(screened: Screened, best: Effect, scan: _Scan) -> Effect:
     """The same with its place among its coefficients."""
     proposal = best.proposed
     assert proposal.elsewhere is not None and proposal.centre is not None and proposal.radius is not None
@@ -171,8 +173,10 @@ def _wider(stage: Stage, best: Effect, scan: _Scan) -> Effect:
     def make(c: Floats) -> Mechanism:
         return elsewhere(*place(c)).make(c[:count])
 
-    white = stage.explanation.whitened(stage.residual)[:, None]
-    z, _ = StackEvidence(stage.explanation, stage.explanation.stack([best])).coefficients(white[:, 0], stage.kappa, 0)
+    white = screened.explanation.whitened(screened.residual)[:, None]
+    z, _ = StackEvidence(screened.explanation, screened.explanation.stack([best])).coefficients(
+        white[:, 0], screened.kappa, 0
+    )
     here = proposal.mean + proposal.sd * np.clip(z, -_FARTHEST, _FARTHEST)
     nowhere = np.zeros(len(sd))
     wider = replace(
@@ -188,10 +192,10 @@ def _wider(stage: Stage, best: Effect, scan: _Scan) -> Effect:
         placing=len(sd),
         log_covered=float(np.log(sd / (_CELL * scan.steps(directions))).sum()),
     )
-    return _made(stage, wider)
+    return _made(screened, wider)
 
 
-def _made(stage: Stage, proposal: Proposal) -> Effect:
-    assert stage.candidates.makes is not None
-    [effect] = stage.candidates.makes.of([proposal])
+def _made(screened: Screened, proposal: Proposal) -> Effect:
+    assert screened.candidates.makes is not None
+    [effect] = screened.candidates.makes.of([proposal])
     return effect

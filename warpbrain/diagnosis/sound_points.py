@@ -13,6 +13,8 @@ step of the scan matters, the best of them are moved between places (`placed`), 
 
 Two points beside one cause may both have been set aside, and neither has the other for a neighbour then. So where no
 point comes back alone, those near each other are asked two at a time: both sound against both gross errors.
+
+What moves points beside a second cause is told by both causes together. So they are asked again beside what is named.
 """
 
 from __future__ import annotations
@@ -26,13 +28,13 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.evidence import log_mean
+from warpbrain.diagnosis.evidence import Explanation, log_mean
 from warpbrain.diagnosis.gross_errors import ASIDE
 from warpbrain.diagnosis.placing import placed
+from warpbrain.diagnosis.screened import Screened
 from warpbrain.diagnosis.screening import Screen, Screening
 from warpbrain.diagnosis.single_points import LARGE, OFTEN
 from warpbrain.diagnosis.stack_evidence import StackEvidence
-from warpbrain.diagnosis.stage import Stage
 from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]
@@ -46,26 +48,30 @@ _OPEN, _BEHIND = -8.0, 8.0
 _NEAR = 0.03
 
 
-def sound_points(base: Base, candidates: Candidates) -> Bools:
+def sound_points(base: Base, candidates: Candidates, explanation: Explanation, residual: Floats) -> Bools:
     """Rows (n,) of points that were set aside, and are rather no gross errors.
 
     Parameters
     ----------
     base : Base
     candidates : Candidates
-        There.
+        At the state in question.
+    explanation : Explanation
+        Noise and nuisances there, and what is known to act.
+    residual : (n,) array
+        Of the linear model there, with all nuisances in the middle of their prior.
     """
     sound = np.zeros(len(base.aside), dtype=bool)
     if not base.aside.any():
         return sound
-    kappa = base.explanation.best_kappa(base.whitened)
-    screening = Screening(base.explanation, candidates, base.smooth_forces, np.array([kappa]))
+    kappa = explanation.best_kappa(explanation.whitened(residual))
+    screening = Screening(explanation, candidates, base.smooth_forces, np.array([kappa]))
     groups = base.at.sensors.groups
     while True:
         points = np.unique(groups[base.aside & ~sound]).tolist()
         for several in ([[point] for point in points], _near_each_other(base, points)):
             each = [np.isin(groups, together) for together in several]
-            odds = in_threads(partial(_log_odds, base, screening, kappa), each)
+            odds = in_threads(partial(_log_odds, base, screening, residual, kappa), each)
             if odds and max(odds) > 0.0:
                 break
         else:
@@ -84,19 +90,21 @@ def _near_each_other(base: Base, points: Sequence[int]) -> list[list[int]]:
     ]
 
 
-def _log_odds(base: Base, screening: Screening, kappa: float, rows: Bools) -> float:
+def _log_odds(base: Base, screening: Screening, residual: Floats, kappa: float, rows: Bools) -> float:
     """Logarithm of the odds that points, whose rows are set aside in a screening, are no gross errors."""
-    asked = [screening.with_noise(rows, times / ASIDE) for times in (1.0, LARGE)]
-    screens = [one.run(one.explanation.whitened(base.residual)[:, None]) for one in asked]
+    sound, gross = (_screened(base, screening.with_noise(rows, n / ASIDE), residual, kappa) for n in (1.0, LARGE))
     before = len(np.unique(base.at.sensors.groups[rows])) * float(np.log1p(-OFTEN) - np.log(OFTEN))
-    sound, gross = (_log_density(screen, screen.log_factors[:, 0]) for screen in screens)
-    if not _OPEN < before + sound - gross <= 0.0:
-        return before + sound - gross
-    sound, gross = (
-        _log_density(screen, _between_places(base, one, screen, kappa))
-        for one, screen in zip(asked, screens, strict=True)
-    )
-    return before + sound - gross
+
+    def log_odds(of_sound: Floats, of_gross: Floats) -> float:
+        return before + _log_density(sound.screen, of_sound) - _log_density(gross.screen, of_gross)
+
+    found = log_odds(sound.screen.log_factors[:, 0], gross.screen.log_factors[:, 0])
+    return log_odds(_between_places(sound), _between_places(gross)) if _OPEN < found <= 0.0 else found
+
+
+def _screened(base: Base, screening: Screening, residual: Floats, kappa: float) -> Screened:
+    screen = screening.run(screening.explanation.whitened(residual)[:, None])
+    return Screened(base, screening.candidates, screening, residual, screen, kappa)
 
 
 def _log_density(screen: Screen, log_factors: Floats) -> float:
@@ -104,12 +112,10 @@ def _log_density(screen: Screen, log_factors: Floats) -> float:
     return float(screen.none[0] + np.logaddexp(0.0, log_mean(log_factors[:, None])[0]))
 
 
-def _between_places(base: Base, screening: Screening, screen: Screen, kappa: float) -> Floats:
+def _between_places(screened: Screened) -> Floats:
     """Log Bayes factors (kinds,) with what acts in one place between the places of its scan, where that is better."""
-    candidates, explanation = screening.candidates, screening.explanation
-    nothing = np.empty((explanation.size, 0))
-    stage = Stage(base, (), candidates, screening, base.residual, screen, nothing, 1.0, kappa, {})
-    white = explanation.whitened(base.residual)[:, None]
+    candidates, explanation, screen = screened.candidates, screened.explanation, screened.screen
+    white = explanation.whitened(screened.residual)[:, None]
     found = screen.log_factors[:, 0].copy()
     least = found.max() - _BEHIND
     for k, (kind, own) in enumerate(candidates.of_kind.items()):
@@ -117,9 +123,9 @@ def _between_places(base: Base, screening: Screening, screen: Screen, kappa: flo
         proposal = candidates.effects[number].proposal
         if proposal is None or proposal.elsewhere is None or found[k] < least:
             continue
-        effect = placed(stage, number).effect
+        effect = placed(screened, number).effect
         beside = StackEvidence(explanation, explanation.stack([effect]))
-        value = beside.log_places(white, np.array([kappa]))[0, 0] - screen.none[0]
+        value = beside.log_places(white, np.array([screened.kappa]))[0, 0] - screen.none[0]
         # its prior covers as many places of the scan as its evidence is averaged over
         found[k] = max(found[k], value + effect.proposed.log_covered - np.log(len(own)))
     return found

@@ -17,55 +17,35 @@ from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.evidence import Explanation, log_mean
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.refitting import Refit
-from warpbrain.diagnosis.screening import UNKNOWN, Screen, Screening
+from warpbrain.diagnosis.screened import Screened
+from warpbrain.diagnosis.screening import UNKNOWN, Screening
 from warpbrain.diagnosis.single_points import log_evidence_and_odds
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class Stage(Screened):
     """What is compared.
 
     Attributes
     ----------
-    base : Base
     known : tuple of str
         Kinds that are in all of the hypotheses.
-    candidates : Candidates
-        At the state of this stage.
-    screening : Screening
-        With noise and nuisances of this stage.
-    residual : (n,) array
-        Of the linear model, with all nuisances in the middle of their prior.
-    screen : Screen
     null : (n, b) array
         Whitened residuals in which nothing more is missing.
     p_value : float
         Of nothing more missing.
-    kappa : float
-        Factor on the noise.
     fits : dict of str to Refit
         Without linearising: ``"none"`` with what is known, the others with their kind as the last effect.
     """
 
-    base: Base
     known: tuple[str, ...]
-    candidates: Candidates
-    screening: Screening
-    residual: Floats
-    screen: Screen
     null: Floats
     p_value: float
-    kappa: float
     fits: dict[str, Refit]
     _known: dict[Refit, tuple[float, Floats]] = field(default_factory=dict, init=False, repr=False)
     _unknowns: dict[Refit, float] = field(default_factory=dict, init=False, repr=False)
-
-    @property
-    def explanation(self) -> Explanation:
-        """Noise and nuisances."""
-        return self.screening.explanation
 
     @property
     def without(self) -> tuple[Floats, Floats, float]:
@@ -79,10 +59,6 @@ class Stage:
     def beyond(self) -> float:
         """How much better [nats] the fit without anything more is than what is linear about this state."""
         return self.fits["none"].log_evidence - float(self.screen.none[0]) if "none" in self.fits else 0.0
-
-    def best_effect(self, kind: str) -> Effect:
-        """The most probable effect of a kind."""
-        return self.candidates.effects[self.screen.best_effect(self.candidates, kind)]
 
     def log_evidence(self) -> dict[str, float]:
         """Against nothing more: of refits where there are, else of screening, no better than a refit."""
@@ -203,7 +179,7 @@ def compared(
     null = explanation.draws(draws, kappa, rng)
     alarms = screening.run(null).alarm
     p_value = float((1 + np.sum(alarms >= screen.alarm[0])) / (1 + len(alarms)))
-    return Stage(base, known, candidates, screening, residual, screen, null, p_value, kappa, {})
+    return Stage(base, candidates, screening, residual, screen, kappa, known, null, p_value, {})
 
 
 def linear_point(
