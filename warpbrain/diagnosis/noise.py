@@ -15,10 +15,12 @@ COMMON, REACH = 0.45, 0.018
 
 def noise_factor(sensors: Sensors, sigma: Floats) -> Floats:
     """Lower triangular factor (n, n) of the covariance of the noise, `sigma` (n,) its independent part."""
+    from scipy.spatial.distance import cdist
+
     covariance = np.diag(sigma**2)
     rows = np.flatnonzero(sensors.is_displacement)
     where, directions = sensors.positions[rows], sensors.directions[rows]
-    apart = np.linalg.norm(where[:, None] - where[None], axis=2)
+    apart = cdist(where, where)
     common = np.exp(-0.5 * (apart / REACH) ** 2) * (directions @ directions.T)
     # what was recorded at another time has another noise
     common *= sensors.times[rows][:, None] == sensors.times[rows][None]

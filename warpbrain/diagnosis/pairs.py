@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,13 +90,18 @@ class Pairs:
 
     def linear(self, moments: Floats) -> Floats:
         """`g^T m` (p, b) of the pairs' columns from that of the places (3 s, b)."""
-        each = moments.reshape(len(self.sites), 3, -1)
-        first, second = self.ends
+        return np.asarray(self._of_places @ moments)
+
+    @cached_property
+    def _of_places(self) -> Any:
+        """From forces at the places to those of the pairs, SciPy CSR (p, 3 s): six numbers a row."""
+        from scipy.sparse import csr_matrix
+
+        places = 3 * np.column_stack(self.ends)[:, :, None] + np.arange(3)
         scaled = self.scales[:, None] * self.along
-        found = np.zeros((len(first), each.shape[2]))
-        for axis in range(3):
-            found += scaled[:, axis, None] * (each[first, axis] - each[second, axis])
-        return found
+        first = np.arange(0, places.size + 1, 6)
+        values = np.column_stack([scaled, -scaled]).ravel()
+        return csr_matrix((values, places.ravel(), first), (len(scaled), 3 * len(self.sites)))
 
 
 def pairs_at(at: Linearisation, spacing: float) -> Pairs:

@@ -10,6 +10,7 @@ the average over places near by, not the best, and amounts are no surer than the
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,11 +142,18 @@ def _typical_distance(points: Floats) -> float:
 
 def _nearest_face(mesh: TetMesh, point: Floats) -> tuple[Floats, Floats]:
     """Middle of the nearest face of the surface, and its unit normal."""
-    faces = mesh.boundary
-    middles = mesh.points[faces].mean(axis=1)
-    nearest = int(np.argmin(np.linalg.norm(middles - point, axis=1)))
-    [normal] = face_vectors(mesh.points, faces[[nearest]])
+    from scipy.spatial.distance import cdist
+
+    middles = _middles(mesh)
+    nearest = int(np.argmin(cdist(point[None], middles)))
+    [normal] = face_vectors(mesh.points, mesh.boundary[[nearest]])
     return middles[nearest], normal / np.linalg.norm(normal)
+
+
+@lru_cache(maxsize=4)
+def _middles(mesh: TetMesh) -> Floats:
+    """Of the faces of the surface (b, 3) [m]: a search for a place asks for them at each of its steps."""
+    return np.asarray(mesh.points[mesh.boundary].mean(axis=1))
 
 
 def _on_surface(mesh: TetMesh, point: Floats) -> Floats:

@@ -156,11 +156,13 @@ def spread_points(points: Floats, spacing: float, most: int = 2000) -> Ints:
 
     Farthest-point sampling (Gonzalez 1985), which begins at the point nearest to the middle.
     """
+    from scipy.spatial.distance import cdist
+
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     chosen = [int(np.argmin(np.sum((points - points.mean(axis=0)) ** 2, axis=1)))]
-    distance = np.linalg.norm(points - points[chosen[0]], axis=1)
+    distance = cdist(points, points[chosen])[:, 0]
     while len(chosen) < most and distance.max() > spacing:
         chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        distance = np.minimum(distance, cdist(points, points[chosen[-1:]])[:, 0])
     return np.array(chosen, dtype=np.int64)
