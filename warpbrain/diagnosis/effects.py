@@ -219,9 +219,10 @@ class Effects:
 
     def _forces(self, mechanism: Any, faces: frozenset[type]) -> Floats:
         """Nodal forces (N, 3) of a mechanism with these faces."""
-        found = np.zeros((self.at.system.size, 3))
         if Load in faces:
-            found += mechanism.factor() * mechanism.nodal_forces(self.at.system.model.mesh)
+            found = mechanism.factor() * mechanism.nodal_forces(self.at.system.model.mesh)
+        else:
+            found = np.zeros((self.at.system.size, 3))
         if Following in faces:
             found -= self._following(mechanism)
         if Substituting in faces:

@@ -32,8 +32,8 @@ Floats = NDArray[np.float64]
 
 #: Growth by which the derivative of the forces of growing tissue is taken.
 _GROWTH = 1e-4
-#: Patches whose answers one thread makes.
-_TOGETHER = 64
+#: Patches whose answers one thread makes, and sparse columns of forces: of some mechanisms no node is without any.
+_TOGETHER, _TOGETHER_SPARSE = 64, 8
 
 
 class Linearisation:
@@ -123,7 +123,9 @@ class Linearisation:
         key = held.tobytes()
         with self._making:
             surface = self._surface(key, held)
-        return np.asarray(self._of_surfaces[key] @ surface.moved(patch, lifts))
+        moved = surface.moved(patch, lifts)
+        loose = np.flatnonzero(moved)
+        return np.asarray(self._of_surfaces[key][:, loose] @ moved[loose])
 
     def _surface(self, key: bytes, held: NDArray[np.bool_]) -> HeldSurface:
         """A held surface, and what the sensors record of it: made once."""
@@ -140,9 +142,11 @@ class Linearisation:
             )
         if key not in self._of_surfaces:
             sensors = self.sensors
-            self._of_surfaces[key] = self._surfaces[key].answers(
+            answers = self._surfaces[key].answers(
                 self.stiffness, self._free, self.compliance, sensors.by_displacement, sensors.by_reactions
             )
+            # by columns: of each patch a few are asked for
+            self._of_surfaces[key] = np.asfortranarray(answers)
         return self._surfaces[key]
 
     def answers(self, forces: Floats) -> Floats:
@@ -176,7 +180,8 @@ class Linearisation:
         if "_rows" in self.__dict__ or self._answered >= len(self.sensors):
             rows, which = self._rows
             found = np.empty((len(rows), count))
-            fill_columns(found, lambda some: rows @ forces[:, some], _TOGETHER)
+            together = _TOGETHER_SPARSE if issparse(forces) else _TOGETHER
+            fill_columns(found, lambda some: rows @ forces[:, some], together)
             return found[which]
         forces = forces.toarray() if issparse(forces) else forces
         du = np.zeros((len(self._free), count))

@@ -32,7 +32,8 @@ class SparseColumns:
 
     def add(self, number: int, column: Floats) -> None:
         """Add a column (size,)."""
-        rows = np.flatnonzero(column)
+        # of numbers it takes eight times as long as of truth values
+        rows = np.flatnonzero(column != 0.0)
         if len(rows):
             self.numbers.append(number)
             self._rows.append(rows)
