@@ -17,7 +17,9 @@ from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.prior_modes import PriorMode
 from warpbrain.estimation.problem import Problem
 from warpbrain.estimation.registration import Registration
+from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
+from warpbrain.recordings.location import locate
 
 THETA = np.log([1200.0, 1100.0])
 
@@ -88,6 +90,19 @@ def test_the_estimated_noise_is_the_likeliest() -> None:
         given = replace(seen, recordings=(replace(seen.recordings[0], sigma=factor * weighed.sigma[0]),))
         [beside] = Likelihood().weigh(Observations.to_fit(given).each, [residuals])
         assert beside.negative_log > weighed.negative_log
+
+
+def test_points_are_located_anew_where_they_or_the_mesh_are_others() -> None:
+    case = block({"white": WHITE}, "pushed")
+    mesh, seen = case.mesh, beads(truth(case), sigma=3e-4)
+    moved = replace(seen, points=seen.points * 0.9)
+    larger = replace(case, mesh=TetMesh(1.1 * mesh.points, mesh.tetrahedra, mesh.tissue, mesh.node_sets))
+    u = case.mesh.points**2
+    for there, recording in ((case, seen), (case, moved), (larger, seen)):
+        [one] = Observations.to_fit(replace(there, recordings=(recording,))).each
+        expected = locate(there.mesh.points, there.mesh.tetrahedra, recording.points).interpolate(u)
+        values = one.at(u, np.zeros_like(u), np.zeros(3)).values
+        np.testing.assert_allclose(values, recording.displacement - expected, atol=1e-15)
 
 
 def test_degrees_of_freedom_are_positive() -> None:

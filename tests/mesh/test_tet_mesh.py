@@ -35,6 +35,11 @@ def test_tissue_defaults_to_one():
     assert TetMesh(CORNER, [[0, 1, 2, 3]]).tissue.tolist() == [1]
 
 
+def test_labels_are_those_of_the_tissue_that_is_there():
+    assert two().labels == (1, 2)
+    assert two().without(np.array([True, False]))[0].labels == (2,)
+
+
 def test_arrays_are_copied_and_cannot_be_written():
     points = CORNER.copy()
     mesh = TetMesh(points, [[0, 1, 2, 3]])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import rigid_columns
+from warpbrain.mesh import TetMesh
 from warpbrain.mesh.feature_normals import feature_normals
 from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.comparison import faces_of_set
@@ -30,6 +32,8 @@ Rows = NDArray[np.int64]
 
 #: Noise can be estimated from no fewer residuals than this.
 _FEWEST = 10
+#: Sets of points whose places in a mesh are kept, the latest ones.
+_KEPT = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +191,7 @@ def _observation(case: Case, recording: Recording, time: float | None) -> Observ
 
 
 def _points(case: Case, recording: PointsRecording, time: float | None) -> Observation:
-    from scipy.sparse import csr_matrix, eye, kron
+    from scipy.sparse import csr_matrix
 
     mesh = case.remaining[0]
     rows = rows_at(recording, time)
@@ -197,9 +201,7 @@ def _points(case: Case, recording: PointsRecording, time: float | None) -> Obser
     rows, weights = rows[weights > 0.0], weights[weights > 0.0]
     if len(rows) == 0:
         raise InputError(f"recording '{recording.name}': the weight of every point is zero")
-    count = len(mesh.points)
-    matrix = locate(mesh.points, mesh.tetrahedra, recording.points[rows]).matrix(count)
-    by_displacement = kron(matrix, eye(3), format="csr")
+    matrix, by_displacement = _located(mesh, recording.points[rows].astype(np.float64).tobytes())
     nothing = csr_matrix(by_displacement.shape)
     positions = recording.points[rows] + recording.displacement[rows]
 
@@ -209,6 +211,18 @@ def _points(case: Case, recording: PointsRecording, time: float | None) -> Obser
 
     sigma = _sigma(recording, rows, weights)
     return Observation(recording.name, recording.kind, "m", rows, sigma, weights, 3, positions, at)
+
+
+@lru_cache(maxsize=_KEPT)
+def _located(mesh: TetMesh, points: bytes) -> tuple[Any, Any]:
+    """From values at nodes to those at points, given as bytes of (n, 3) [m]: SciPy CSR (n, N) and (3 n, 3 N).
+
+    Recordings that are taken to have been moved are of the same points of the body each time.
+    """
+    from scipy.sparse import eye, kron
+
+    matrix = locate(mesh.points, mesh.tetrahedra, np.frombuffer(points).reshape(-1, 3)).matrix(len(mesh.points))
+    return matrix, kron(matrix, eye(3), format="csr")
 
 
 def _surface(case: Case, recording: SurfaceRecording, time: float | None) -> Observation:

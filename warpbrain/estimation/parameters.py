@@ -82,7 +82,7 @@ class Parameters:
             If tissues of one group have different laws or formulations, or a mechanism says what law tissues have.
         """
         members: dict[str, list[int]] = {}
-        for label in np.unique(case.remaining[0].tissue).tolist():
+        for label in case.remaining[0].labels:
             # a tissue without a group is one of its own
             members.setdefault(case.tissues[label].prior or f"tissue {label}", []).append(label)
         first = [case.tissues[labels[0]] for labels in members.values()]

@@ -150,7 +150,7 @@ class TetMesh:
         object.__setattr__(self, "element_vectors", _vectors(self.element_vectors, count))
 
     def __repr__(self) -> str:
-        labels = ", ".join(str(label) for label in np.unique(self.tissue))
+        labels = ", ".join(map(str, self.labels))
         return (
             f"TetMesh({len(self.points)} nodes, {len(self.tetrahedra)} tetrahedra, {self.volume:.6g} m3, "
             f"tissue {labels}, node sets {sorted(self.node_sets)}, element sets {sorted(self.element_sets)})"
@@ -160,6 +160,11 @@ class TetMesh:
         # a mapping proxy cannot be pickled, and meshes travel to worker processes
         named = (dict(self.node_sets), dict(self.element_sets), dict(self.element_vectors))
         return (TetMesh, (self.points, self.tetrahedra, self.tissue, *named))
+
+    @cached_property
+    def labels(self) -> tuple[int, ...]:
+        """Labels of the tissues that there are, increasing; found once."""
+        return tuple(np.unique(self.tissue).tolist())
 
     @cached_property
     def volumes(self) -> Floats:

@@ -149,7 +149,7 @@ def tissue_entries(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> 
     from matplotlib.patches import Patch
 
     entries = []
-    for i, label in enumerate(np.unique(mesh.tissue).tolist()):
+    for i, label in enumerate(mesh.labels):
         colour = TISSUE_COLOURS[i % len(TISSUE_COLOURS)]
         entries.append((Patch(facecolor=colour, edgecolor=TISSUE_EDGE), names.get(label, str(label))))
     if resected.any():

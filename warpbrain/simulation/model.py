@@ -153,7 +153,7 @@ class Model:
             raise InputError("prescribed: a component that is not constrained has a displacement")
         if not (math.isfinite(self.density) and self.density > 0.0):
             raise InputError(f"density = {self.density:g} kg/m3: expected a positive number")
-        missing = sorted(set(np.unique(self.mesh.tissue).tolist()) - set(self.materials))
+        missing = sorted(set(self.mesh.labels) - set(self.materials))
         if missing:
             raise InputError(f"materials: no material for tissue {', '.join(map(str, missing))} of the mesh")
         object.__setattr__(self, "constrained", constrained)
@@ -213,6 +213,8 @@ class Model:
 
     def remaining_share(self, scales: Sequence[float]) -> Floats:
         """Share (n,) of the volume around each node that is left, with a scale from 0 to 1 for each of `emptying`."""
+        if not self.emptying:
+            return np.ones(len(self.constrained))
         part = np.ones(len(self.mesh.tetrahedra))
         for mechanism, scale in zip(self.emptying, scales, strict=True):
             part *= mechanism.remaining_part(self.mesh, scale)

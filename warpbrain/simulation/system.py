@@ -191,7 +191,7 @@ class System:
     def _grouped(model: Model) -> dict[tuple[type[Law], str], dict[int, Material]]:
         """Materials of the tissues of the mesh by what they are launched with."""
         by_code: dict[tuple[type[Law], str], dict[int, Material]] = {}
-        for label in np.unique(model.mesh.tissue).tolist():
+        for label in model.mesh.labels:
             material = model.materials[label]
             by_code.setdefault((type(material.law), material.formulation), {})[label] = material
         return by_code
@@ -209,7 +209,8 @@ class System:
         # the last column, where something grows, is the growth stretch
         parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self._growing)))
         for (label, material), row in zip(materials.items(), rows, strict=True):
-            parameters[self.model.mesh.tissue == label, : 1 + len(row)] = (modulus(material), *row)
+            members = np.flatnonzero(self.model.mesh.tissue == label)
+            parameters[members, : 1 + len(row)] = (modulus(material), *row)
         if self._growing:
             parameters[:, -1] = self._growth_stretch
         return parameters
@@ -292,7 +293,7 @@ class System:
                 raise InputError(f"model: another {name} than the one that was pre-processed")
         if before.constrained is not model.constrained and np.any(before.constrained != model.constrained):
             raise InputError("model: other components are constrained than those that were pre-processed")
-        for label in np.unique(model.mesh.tissue).tolist():
+        for label in model.mesh.labels:
             old, new = before.materials[label], model.materials[label]
             if _code(old) != _code(new):
                 raise InputError(

@@ -104,7 +104,7 @@ def describe(mesh: TetMesh, quality: Quality) -> dict[str, Any]:
         "node_sets": {key: int(members.sum()) for key, members in mesh.node_sets.items()},
         "element_sets": {key: int(members.sum()) for key, members in mesh.element_sets.items()},
         "tissue_volume": {
-            str(label): _rounded(float(mesh.volumes[mesh.tissue == label].sum())) for label in np.unique(mesh.tissue)
+            str(label): _rounded(float(mesh.volumes[mesh.tissue == label].sum())) for label in mesh.labels
         },
         "element_set_volume": {
             key: _rounded(float(mesh.volumes[members].sum())) for key, members in mesh.element_sets.items()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
-
 from warpbrain.cases.case import Tissue
 from warpbrain.cases.format.table import Reading
 from warpbrain.cases.format.tables import BODY, PRIOR, PRIOR_GROUPS, TISSUE
@@ -39,7 +37,7 @@ def read_tissues(context: Context) -> dict[int, Tissue]:
         if tissue is not None:
             tissues[int(key)] = tissue
     if context.mesh is not None:
-        there = set(np.unique(context.mesh.tissue).tolist())
+        there = set(context.mesh.labels)
         for label in sorted(label for label in there if label < 0):
             found = f"the mesh has tissue {label}, expected labels from 0"
             context.problems.add(context.file, "[tissue]", found, "number the labels of the mesh anew")
