@@ -365,7 +365,8 @@ class EquilibriumSolver:
     def _least_shift(self) -> float:
         """A multiple of the mass that is just felt beside the tangent: 0.1 % of its mean diagonal [1/s2]."""
         if self._reference_shift is None:
-            diagonal = self.system.matrix.values.numpy()[self.system.diagonal.numpy()]
+            # picked on the device: the whole matrix takes longer to copy than a system to solve
+            diagonal = self.system.matrix.values[self.system.diagonal].numpy()
             stiffness = float(np.mean(np.trace(diagonal, axis1=1, axis2=2))) / 3.0
             self._reference_shift = 1e-3 * abs(stiffness) / float(np.mean(self.system.model.node_masses))
         return self._reference_shift
