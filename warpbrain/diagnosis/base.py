@@ -262,7 +262,7 @@ class BaseFinder:
         nuisances = nuisances_at(at, self.states, state.hypothesis.theta, self.prior, effects, errors)
         if self._bare:
             nuisances = nuisances.weakened()
-        flexible = tuple(flexible_columns(at, length * self._spacing) for length in LENGTHS)
+        flexible = flexible_columns(at, [length * self._spacing for length in LENGTHS])
         # what the state has of tissue and field is given back, so that their middle is that of their prior
         z = nuisances.coordinates(self.prior, state.hypothesis)
         z[nuisances.part("registration")] = self.states.motion / REGISTRATION_SD

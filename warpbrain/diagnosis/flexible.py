@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.sensors import spread_points
+from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]
 
@@ -35,11 +36,14 @@ def force_patches(at: Linearisation, length: float, spacing: float | None = None
     return sites, at.answers_of_patches(weights)
 
 
-def flexible_columns(at: Linearisation, length: float) -> Floats:
-    """Columns (n, k) of a body force of a length, of 1 m root mean square over the displacements."""
-    _, answers = force_patches(at, length)
-    columns = answers.reshape(len(answers), -1)
-    rows = at.sensors.is_displacement
+def flexible_columns(at: Linearisation, lengths: Sequence[float]) -> tuple[Floats, ...]:
+    """Columns (n, k) of a body force of each length [m], of 1 m root mean square over the displacements."""
+    answers = [force_patches(at, length)[1] for length in lengths]
+    return tuple(in_threads(lambda own: _seen(own.reshape(len(own), -1), at.sensors.is_displacement), answers))
+
+
+def _seen(columns: Floats, rows: NDArray[np.bool_]) -> Floats:
+    """The modes (n, k) of columns that displacements, in some of the rows (n,), see."""
     # modes of displacements: forces that were recorded have another unit, and would be all that counts
     lengths = columns[rows] if rows.any() else columns
     squares, left = np.linalg.eigh(lengths @ lengths.T)

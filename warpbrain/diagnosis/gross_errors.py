@@ -38,26 +38,32 @@ def gross_errors(sensors: Sensors, explanation: Explanation, kappa: float, resid
     """
     from scipy.special import chdtrc
 
-    S = kappa**2 * explanation.factor @ explanation.factor.T + explanation.nuisances @ explanation.nuisances.T
     aside = np.zeros(len(sensors), dtype=bool)
     points = rows_of_points(sensors.groups)
     for _ in range(_ROUNDS):
         kept = np.flatnonzero(~aside)
         place = np.full(len(sensors), -1)
         place[kept] = np.arange(len(kept))
-        precision = np.linalg.inv(S[np.ix_(kept, kept)])
-        weighted = precision @ residual[kept]
+        left = _of_rows(explanation, kept) if aside.any() else explanation
+        weighted = left.inverse_times(residual[kept], kappa)
         found = []
         for rows in points:
             own = place[rows[(place[rows] >= 0).all(axis=1)]]
             # what all others leave of a point, by its own block of the inverse
-            apart = np.linalg.solve(precision[own[:, :, None], own[:, None, :]], weighted[own][:, :, None])[:, :, 0]
+            blocks = left.inverse_blocks(own, kappa)
+            apart = np.linalg.solve(blocks, weighted[own][:, :, None])[:, :, 0]
             squares = np.sum(weighted[own] * apart, axis=1)
             found.extend(kept[own[chdtrc(rows.shape[1], squares) < _UNLIKELY]].ravel().tolist())
         if not found:
             break
         aside[found] = True
     return _without_clusters(sensors, aside)
+
+
+def _of_rows(explanation: Explanation, rows: NDArray[np.int64]) -> Explanation:
+    """The explanation of some rows (k,) alone."""
+    factor = explanation.factor[rows]
+    return Explanation(np.asarray(np.linalg.cholesky(factor @ factor.T), dtype=np.float64), explanation.nuisances[rows])
 
 
 def _without_clusters(sensors: Sensors, aside: Bools) -> Bools:
