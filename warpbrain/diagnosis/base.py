@@ -259,10 +259,11 @@ class BaseFinder:
         at = Linearisation(state.system, state.u, state.reactions, sensors)
         known = Known()
         effects = Effects(at, Solving(self.states, state, sensors, known))
+        # which makes the compliance: with it nuisances are products, where each would have an equilibrium of its own
+        flexible = flexible_columns(at, [length * self._spacing for length in LENGTHS])
         nuisances = nuisances_at(at, self.states, state.hypothesis.theta, self.prior, effects, errors)
         if self._bare:
             nuisances = nuisances.weakened()
-        flexible = flexible_columns(at, [length * self._spacing for length in LENGTHS])
         # what the state has of tissue and field is given back, so that their middle is that of their prior
         z = nuisances.coordinates(self.prior, state.hypothesis)
         z[nuisances.part("registration")] = self.states.motion / REGISTRATION_SD
