@@ -19,7 +19,6 @@ from warpbrain.diagnosis.concluding import named_together
 from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
 from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import Explanation, Stack
-from warpbrain.diagnosis.gross_errors import ASIDE
 from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.judging import Judge, Judgement
 from warpbrain.diagnosis.locating import ScoreMap, score_map
@@ -47,20 +46,20 @@ from warpbrain.diagnosis.result import (
 from warpbrain.diagnosis.screening import UNKNOWN as UNKNOWN_KIND
 from warpbrain.diagnosis.sentences import assumptions_of, sentence_of
 from warpbrain.diagnosis.sound_points import sound_points
-from warpbrain.diagnosis.stage import Stage, candidates_beside, compared, linear_point
+from warpbrain.diagnosis.stage import WORTH, Stage, candidates_beside, compared, linear_point
 from warpbrain.diagnosis.states import States
 from warpbrain.diagnosis.traits import Traits, traits_of
 from warpbrain.diagnosis.verdict import CLAIM, overall
 from warpbrain.diagnosis.virtual import VirtualCases
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
-from warpbrain.threads import beside, one_thread_of_blas
+from warpbrain.threads import beside, in_threads, one_thread_of_blas
 
 Floats = NDArray[np.float64]
 
 #: Kinds that are refitted without linearising, at first and beside others, and the log Bayes factor behind the best at
-#: which that ends, and against nothing more that one beside others needs.
-_REFITTED, _REFITTED_BESIDE, _BEHIND, _WORTH = 3, 2, 12.0, 2.0
+#: which that ends.
+_REFITTED, _REFITTED_BESIDE, _BEHIND = 3, 2, 12.0
 #: By how much [nats] the fit of nothing may be better than what is linear about the base, until that is moved there.
 _FAR = 3.0
 
@@ -75,6 +74,11 @@ class _Found:
     judge: Judge
     where: ScoreMap
     virtual: Callable[[], Confusion]
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Kinds that are named."""
+        return self.stages[-1].known
 
 
 class Diagnosing:
@@ -146,7 +150,7 @@ class Diagnosing:
             self.listener.stage("again with points that are no gross errors beside what is named")
             again = self._named(*self._first(base.with_back(sound), candidates, rng), rng)
             # for the sake of what is named only
-            found = again if len(again.stages) > len(found.stages) else found
+            found = again if set(again.known) > set(found.known) else found
         self.listener.stage("virtual cases")
         with self._timed("virtual cases"):
             confusion = found.virtual()
@@ -177,15 +181,15 @@ class Diagnosing:
         return _Found(stages, at_first, judged, judge, where, virtual)
 
     def _sound_beside(self, last: Stage) -> NDArray[np.bool_]:
-        """Rows (n,) of points that are no gross errors beside what is named, if something more is seen with them."""
-        nothing = np.zeros(len(last.base.aside), dtype=bool)
-        if not last.known:
-            return nothing
+        """Rows (n,) of points that are no gross errors beside what is named, if with them more is seen."""
+        aside, groups = last.base.aside, last.base.at.sensors.groups
+        nothing = np.zeros(len(aside), dtype=bool)
         with self._timed("beside"):
+            each = [groups == group for group in np.unique(groups[aside])] if last.known else []
+            if not any(in_threads(last.more_is_seen_with, each)):
+                return nothing
             sound = sound_points(last.base, last.candidates, last.explanation, last.residual)
-            screening = last.screening.with_noise(sound, 1.0 / ASIDE)
-            screen = screening.run(screening.explanation.whitened(last.residual)[:, None])
-        return sound if screen.log_factors[: len(last.candidates.kinds)].max() > _WORTH else nothing
+        return sound if last.more_is_seen_with(sound) else nothing
 
     def _first(self, base: Base, candidates: Candidates, rng: np.random.Generator) -> tuple[Stage, Refitting]:
         """What acts at all: screened, and refitted where something does."""
@@ -228,7 +232,7 @@ class Diagnosing:
         kinds = stage.candidates.kinds
         factors = stage.screen.log_factors[: len(kinds), 0]
         order = np.argsort(-factors).tolist()
-        least = factors[order[0]] - _BEHIND if known is None else max(factors[order[0]] - _BEHIND, _WORTH)
+        least = factors[order[0]] - _BEHIND if known is None else max(factors[order[0]] - _BEHIND, WORTH)
         chosen = [kinds[k] for k in order[:most] if factors[k] > least]
         # to first order fluid and relaxing stress are too much alike: where one is refitted the other is
         in_time = [kinds[k] for k in order if factors[k] > least and stage.candidates.changes_in_time(kinds[k])]

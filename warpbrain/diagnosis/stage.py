@@ -15,6 +15,7 @@ from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.evidence import Explanation, log_mean
+from warpbrain.diagnosis.gross_errors import ASIDE
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.screened import Screened
@@ -22,6 +23,9 @@ from warpbrain.diagnosis.screening import UNKNOWN, Screening
 from warpbrain.diagnosis.single_points import log_evidence_and_odds
 
 Floats = NDArray[np.float64]
+
+#: Log Bayes factor that something needs to be looked at beside what is known.
+WORTH = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +107,18 @@ class Stage(Screened):
         screened = beside_lasting(self.explanation.nuisances, self.residual)
         alike = max(beside_lasting(without.columns, without.linear), screened)
         return beside_lasting(fit.columns, fit.linear) - alike
+
+    def more_is_seen_with(self, rows: NDArray[np.bool_]) -> bool:
+        """Whether another kind than the known ones is best, and gains, with rows (n,) that are set aside.
+
+        A known one does not count: beside a load nothing explains what moves as well as another such load, since nobody
+        knows how the first is spread.
+        """
+        screening = self.screening.with_noise(rows, 1.0 / ASIDE)
+        factors = screening.run(screening.explanation.whitened(self.residual)[:, None]).log_factors[:, 0]
+        kinds = self.candidates.kinds
+        best = int(np.argmax(factors[: len(kinds)]))
+        return kinds[best] not in self.known and bool(factors[best] - self.screen.log_factors[best, 0] > WORTH)
 
     def gross_errors(self) -> NDArray[np.bool_]:
         """Rows (n,) of points that are rather gross errors than not, over all refits as they are probable."""
