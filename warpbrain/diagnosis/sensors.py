@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -156,8 +157,15 @@ def spread_points(points: Floats, spacing: float, most: int = 2000) -> Ints:
 
     Farthest-point sampling (Gonzalez 1985), which begins at the point nearest to the middle.
     """
+    return _spread(np.ascontiguousarray(points, dtype=np.float64).tobytes(), spacing, most)
+
+
+@lru_cache(maxsize=16)
+def _spread(points_as_bytes: bytes, spacing: float, most: int) -> Ints:
+    """The same of points given as bytes: every state of a diagnosis asks for sites of the same nodes."""
     from scipy.spatial.distance import cdist
 
+    points = np.frombuffer(points_as_bytes).reshape(-1, 3)
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     chosen = [int(np.argmin(np.sum((points - points.mean(axis=0)) ** 2, axis=1)))]
@@ -165,4 +173,6 @@ def spread_points(points: Floats, spacing: float, most: int = 2000) -> Ints:
     while len(chosen) < most and distance.max() > spacing:
         chosen.append(int(np.argmax(distance)))
         distance = np.minimum(distance, cdist(points, points[chosen[-1:]])[:, 0])
-    return np.array(chosen, dtype=np.int64)
+    found = np.array(chosen, dtype=np.int64)
+    found.flags.writeable = False
+    return found
