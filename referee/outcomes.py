@@ -90,8 +90,9 @@ class Outcome:
 
     @property
     def held(self) -> bool:
-        """Whether it gives the right name, alone or in a group."""
-        return self.named or (self.said.verdict == "group" and any(self.right(name) for name in self.said.said))
+        """Whether it gives the right name, alone or in a group; outside the dictionary that of the unknown."""
+        right = {name for name in self.said.said if self.right(name) or (self.kind == "outside" and name == UNKNOWN)}
+        return self.named or (self.said.verdict == "group" and bool(right))
 
     @property
     def centre_error(self) -> float | None:

@@ -19,6 +19,7 @@ VISIBLE, PLAIN = 5.0, 8.0
 #: Bars: false alarms and traps at most, all others at least.
 BARS = {
     "false alarms": 0.05,
+    "significant where nothing is missing": 0.05,
     "traps named as physics": 0.05,
     "right name or group holding it, d >= 8": 0.95,
     "right name alone, d >= 8": 0.85,
@@ -47,6 +48,7 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
     plain = [o for o in effects if o.d >= PLAIN]
     found = {
         "false alarms": share(o.said.alarm for o in of["none"]),
+        "significant where nothing is missing": share(o.said.p_value <= ALPHA for o in of["none"]),
         "traps named as physics": share(o.said.verdict in NAMING for o in of["trap"]),
         "traps said to be unknown physics": share(o.said.verdict == "unknown" for o in of["trap"]),
     }

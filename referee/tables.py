@@ -68,7 +68,7 @@ def score_text(
 
 
 def _most(name: str) -> bool:
-    return name.startswith(("false alarms", "traps"))
+    return name.startswith(("false alarms", "significant", "traps"))
 
 
 def _bar(name: str, bar: float | None) -> str:

@@ -76,6 +76,12 @@ def test_so_are_two_where_a_force_without_a_name_fits_better_than_each(kinds):
     assert stages == [(), ("gravity",), ("gravity", "pressure")]
 
 
+def test_so_are_two_where_one_and_a_force_without_a_name_are_a_group():
+    says = {("gravity",): judged(NAMED, "pressure"), ("pressure",): judged(NAMED, "gravity")}
+    _, found, _ = turns(judged(GROUP, "gravity", "unknown"), says)
+    assert found == [("gravity",), ("pressure",), ()]
+
+
 def test_both_have_to_beat_a_force_without_a_name():
     first = judged(UNKNOWN)
     first.ranking[0].log_evidence = 18.0

@@ -47,7 +47,11 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         ({"gravity": 0.97, "pressure": 0.03}, {"adequacy_p": 0.001}, NAMED_AND_REST),
         ({"gravity": 0.97, "pressure": 0.03}, {"adequacy_p": 0.001, "needed": 0.6}, CANNOT_SAY),
         ({"gravity": 0.7, "unknown": 0.3}, {"adequacy_p": 0.001}, UNKNOWN),
-        ({"gravity": 0.7, "unknown": 0.3}, {}, CANNOT_SAY),
+        # either, as it leaves nothing
+        ({"gravity": 0.7, "unknown": 0.3}, {}, GROUP),
+        ({"gravity": 0.7, "unknown": 0.3}, {"p_value": 0.03}, CANNOT_SAY),
+        ({"gravity": 0.7, "unknown": 0.3}, {"gain": -1.0}, CANNOT_SAY),
+        ({"gravity": 0.7, "unknown": 0.2, "registration": 0.1}, {}, CANNOT_SAY),
         ({"gravity": 0.7, "unknown": 0.3}, {"adequacy_p": 0.001, "unknown_sure": -1.0}, CANNOT_SAY),
         ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {}, GROUP),
         ({"unknown": 0.8, "gravity": 0.2}, {}, UNKNOWN),

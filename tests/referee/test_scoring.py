@@ -34,7 +34,7 @@ def outcomes(tmp_path):
     pairs = [
         (label("n1"), diagnosis()),
         (label("n2"), diagnosis("named", "gravity", 0.9)),
-        (label("n3"), diagnosis("cannot say")),
+        (label("n3"), diagnosis("cannot say", p_value=0.01)),
         (
             label("s1", "effect", ("swelling",), 12.0, **swollen),
             diagnosis("named", "swelling", 0.95, where=where, parameters=value, fit=fit),
@@ -61,6 +61,7 @@ def outcomes(tmp_path):
 def test_shares(outcomes):
     found = {name: (value.hits, value.of) for name, value in shares(outcomes).items()}
     assert found["false alarms"] == (1, 3)
+    assert found["significant where nothing is missing"] == (1, 3)
     assert found["traps named as physics"] == (1, 2)
     assert found["best candidate right, d >= 8"] == (2, 2)
     assert found["best candidate right, 5 <= d < 8"] == (0, 1)

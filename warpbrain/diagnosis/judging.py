@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.averaging import averaged_values
 from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.calibration import BODIES, probabilities
-from warpbrain.diagnosis.evidence import Explanation, log_mean
+from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.flexible import SCALES
 from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo, scattered_blocks, spatial_blocks
 from warpbrain.diagnosis.letting_go import where_it_lets_go
@@ -122,7 +122,7 @@ class Judge:
         evidence = Evidence(
             self.options.alpha,
             stage.p_value,
-            min(stage.p_value, float(np.exp(-log_mean(np.array(list(log_evidence.values()))) / BODIES.temperature))),
+            min(stage.p_value, float(np.exp(-stage.alarm / BODIES.temperature))),
             ranking,
             gain,
             sure,

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from warpbrain.diagnosis.calibration import probabilities
 from warpbrain.diagnosis.judging import Judgement
-from warpbrain.diagnosis.result import UNKNOWN
+from warpbrain.diagnosis.result import GROUP, UNKNOWN
 from warpbrain.diagnosis.screening import UNKNOWN as UNKNOWN_KIND
 from warpbrain.diagnosis.stage import Stage
 from warpbrain.diagnosis.verdict import SURE
@@ -53,13 +53,14 @@ def _both(first: Stage, at_first: Judgement, beside: Beside) -> tuple[Stage, Jud
     """Two that are named beside each other: the stage beside the first of them, and the judgements that name the first
     and the second; None if there are none, or they are not to be looked for.
 
-    They are a group of two; or where a force without a name fits better, the best one and what is named beside it,
-    however little that explains alone.
+    They are a group of two; or where a force without a name fits better, or about as well, the best one and what is
+    named beside it, however little that explains alone.
     """
     verdict = at_first.verdict
     fitted = [one.kind for one in at_first.ranking if one.physics and one.kind in first.fits]
     group = len(verdict.kinds) == 2 and set(verdict.kinds) <= set(fitted)
-    if verdict.adds or not fitted or not (group or verdict.verdict == UNKNOWN):
+    nameless = verdict.verdict == UNKNOWN or (verdict.verdict == GROUP and UNKNOWN_KIND in verdict.kinds)
+    if verdict.adds or not fitted or not (group or nameless):
         return None
     best = verdict.kinds[0] if group else fitted[0]
     found = beside(first, best)

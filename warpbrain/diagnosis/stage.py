@@ -38,18 +38,36 @@ class Stage(Screened):
         Kinds that are in all of the hypotheses.
     null : (n, b) array
         Whitened residuals in which nothing more is missing.
-    p_value : float
-        Of nothing more missing.
+    alarms : (b,) array
+        Log Bayes factor of anything more in each of these.
     fits : dict of str to Refit
         Without linearising: ``"none"`` with what is known, the others with their kind as the last effect.
     """
 
     known: tuple[str, ...]
     null: Floats
-    p_value: float
+    alarms: Floats
     fits: dict[str, Refit]
+    _compared: dict[tuple[Refit, ...], dict[str, float]] = field(default_factory=dict, init=False, repr=False)
     _known: dict[Refit, tuple[float, Floats]] = field(default_factory=dict, init=False, repr=False)
     _unknowns: dict[Refit, float] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def p_value(self) -> float:
+        """Of nothing more missing: by the screening, and by what was refitted if anything was, the larger of both.
+
+        To first order an effect that is far from small may seem to explain what it does not. Refits come as near to the
+        truth as nothing missing is to the linear model, which the null is drawn from.
+        """
+        alarms = [float(self.screen.alarm[0])]
+        if not self.fits.keys() <= {"none"}:
+            alarms.append(self.alarm)
+        return float((1 + np.sum(self.alarms >= min(alarms))) / (1 + len(self.alarms)))
+
+    @property
+    def alarm(self) -> float:
+        """Log Bayes factor of anything more against nothing more: the mean over kinds, refits included."""
+        return float(log_mean(np.array(list(self.log_evidence().values()))))
 
     @property
     def without(self) -> tuple[Floats, Floats, float]:
@@ -66,6 +84,12 @@ class Stage(Screened):
 
     def log_evidence(self) -> dict[str, float]:
         """Against nothing more: of refits where there are, else of screening, no better than a refit."""
+        there = tuple(self.fits.values())
+        if there not in self._compared:
+            self._compared[there] = self._log_evidence()
+        return self._compared[there]
+
+    def _log_evidence(self) -> dict[str, float]:
         screen, fits = self.screen, self.fits
         screened = dict(zip(screen.kinds, screen.log_factors[:, 0].tolist(), strict=True))
         if "none" not in fits:
@@ -194,8 +218,7 @@ def compared(
     screen = screening.run(explanation.whitened(residual)[:, None])
     null = explanation.draws(draws, kappa, rng)
     alarms = screening.run(null).alarm
-    p_value = float((1 + np.sum(alarms >= screen.alarm[0])) / (1 + len(alarms)))
-    return Stage(base, candidates, screening, residual, screen, kappa, known, null, p_value, {})
+    return Stage(base, candidates, screening, residual, screen, kappa, known, null, alarms, {})
 
 
 def linear_point(

@@ -7,8 +7,9 @@
 3. Not physics if a nuisance far larger than it should be explains the residuals better than any mechanism.
 4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is, and predicts points
    that it was not fitted to better; or if it may be, and the best mechanism leaves something significant: then a force
-   without a name acts in either case. Else: cannot say. A weak alarm is never more than that, nor are recordings of
-   which many points contradict each other.
+   without a name acts in either case. Where the best mechanism leaves nothing, and it and a force without a name are
+   probable enough only together: a group of both. Else: cannot say. A weak alarm is never more than that, nor are
+   recordings of which many points contradict each other.
 """
 
 from __future__ import annotations
@@ -156,11 +157,12 @@ def decide(found: Evidence) -> Verdict:
     if best.physics and best.probability >= SURE and not vetoes:
         return Verdict(NAMED if found.adequacy_p > ADEQUATE else NAMED_AND_REST, (best.kind,))
     label_set = _label_set(found.ranking)
-    physics = all(ranked.physics for ranked in found.ranking if ranked.kind in label_set)
+    missing = {ranked.kind for ranked in found.ranking if ranked.physics or ranked.kind == UNKNOWN_KIND}
     claims = found.chance <= CLAIM * found.alpha and found.aside <= CONTRADICTED
-    if claims and 1 < len(label_set) <= MEMBERS and physics and found.gain > 0.0:
-        return Verdict(GROUP, label_set, "; ".join(vetoes))
     left = best.physics and UNKNOWN_KIND in label_set and found.adequacy_p <= ADEQUATE
+    few = best.physics and 1 < len(label_set) <= MEMBERS and missing.issuperset(label_set)
+    if claims and few and not left and found.gain > 0.0:
+        return Verdict(GROUP, label_set, "; ".join(vetoes))
     if claims and (left or (best.kind == UNKNOWN_KIND and best.probability >= 0.5)):
         if found.unknown_sure > TENFOLD:
             return Verdict(UNKNOWN, (best.kind,) if left else ())
