@@ -28,6 +28,7 @@ SAID = {
 #: What the last stage may say of what names leave.
 LEFT = [
     Verdict("group", ("gravity", "swelling")),
+    Verdict("group", ("gravity", "unknown")),
     Verdict("unknown", ()),
     Verdict("unknown", ("gravity",)),
     Verdict("not physics", ("registration",)),

@@ -55,10 +55,10 @@ def sentence_of(
         return f"{' '.join([each[0], *also])} {_grounds(named, fit)}{rest}"
     if verdict.verdict == GROUP:
         members = [ranked for ranked in ranking if ranked.kind in verdict.kinds]
-        said = "; or ".join(f"{_clause(one)} ({_percent(one.probability)})" for one in members)
+        said = "; or ".join(f"{_clause(one.kind)} ({_percent(one.probability)})" for one in members)
         return f"Something is missing ({_chance(p_value)}), and these data do not tell which of these it is: {said}."
     if verdict.verdict == UNKNOWN and verdict.kinds:
-        nearest = next(_clause(one) for one in ranking if one.kind in verdict.kinds)
+        nearest = next(_clause(one.kind) for one in ranking if one.kind in verdict.kinds)
         return (
             f"Something is missing ({_chance(p_value)}) that none of the known mechanisms explains alone: a force "
             f"without a name acts, in the place of what comes nearest or beside it. Nearest: {nearest}."
@@ -74,7 +74,7 @@ def sentence_of(
         return f"It is not physics that is missing ({_chance(p_value)}). {said} That explains the mismatch better."
     assert verdict.verdict == CANNOT_SAY
     why = f": {verdict.why}" if verdict.why else ""
-    perhaps = [_clause(one) for one in ranking if one.kind in verdict.kinds and one.physics][:2]
+    perhaps = [_clause(one.kind) for one in ranking if one.kind in verdict.kinds and one.physics][:2]
     guess = f" Perhaps: {'; or '.join(perhaps)}." if perhaps else ""
     return f"Something is missing ({_chance(p_value)}), but these data cannot say what{why}.{guess}"
 
@@ -82,7 +82,7 @@ def sentence_of(
 def effect_sentence(ranked: Ranked, gravity_axis: tuple[float, float, float] | None = None) -> str:
     """What a mechanism is, how large it was found to be, and where."""
     sizes = "; ".join(size_in_words(ranked.kind, ranked.values, gravity_axis))
-    found = [_said(ranked).rstrip(".")]
+    found = [_said(ranked.kind).rstrip(".")]
     if sizes:
         found.append(f": {sizes}")
     return f"{''.join(found)}.{_where(ranked)}"
@@ -108,16 +108,16 @@ def confusion_sentences(confusion: Confusion) -> tuple[str, str]:
     )
 
 
-def _said(ranked: Ranked) -> str:
+def _said(kind: str) -> str:
     known = mechanisms()
-    if ranked.kind in known:
-        return known[ranked.kind].sentence
-    return SENTENCES.get(ranked.kind, "A force without a name acts.")
+    if kind in known:
+        return known[kind].sentence
+    return SENTENCES.get(kind, "Something acts that is none of the known mechanisms.")
 
 
-def _clause(ranked: Ranked) -> str:
+def _clause(kind: str) -> str:
     """The sentence within another one."""
-    said = _said(ranked)
+    said = _said(kind)
     return f"{said[0].lower()}{said[1:].rstrip('.')}"
 
 
@@ -146,8 +146,7 @@ def _grounds(named: Sequence[Ranked], fit: Fit) -> str:
 def _rest(rest: Verdict | None) -> str:
     """What is said of what names leave."""
     if rest is not None and rest.verdict == GROUP:
-        known = mechanisms()
-        either = "; or ".join(known[kind].sentence.rstrip(".") for kind in rest.kinds)
+        either = "; or ".join(_clause(kind) for kind in rest.kinds)
         return f"Something else is left, and these data do not tell which of these it is: {either}."
     if rest is not None and rest.verdict == NOT_PHYSICS:
         return f"Something else is left, which is no physics: {SENTENCES[rest.kinds[0]]}"
