@@ -142,7 +142,7 @@ class Base:
     def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
         """What nuisances do to the displacement of other points (k, 3) [m], and what makes effects there."""
         at = self.at.with_sensors(tracked_points(self.at.system.model.mesh, points, self.states.centre))
-        effects = Effects(at, Solving(self.states, self.state, at.sensors, self.known))
+        effects = Effects(at, Solving(self.states, self.state, at.sensors, self.known), self.mesh_errors)
         theta = self.state.hypothesis.theta
         own = self.nuisances
         return nuisances_at(
@@ -248,8 +248,7 @@ class BaseFinder:
         if not self._mesh_error:
             return None
         try:
-            volume = other_volume(self.states)
-            return FinerStates(self.states).errors(state, volume.make(volume.mean + volume.sd), self.prior)
+            return FinerStates(self.states).errors(state, other_volume(self.states), self.prior)
         except (SolveError, InputError) as error:
             self._remarks.append(f"the error of the mesh is not known: {error}")
             return None
@@ -258,7 +257,7 @@ class BaseFinder:
         sensors = state.sensors
         at = Linearisation(state.system, state.u, state.reactions, sensors)
         known = Known()
-        effects = Effects(at, Solving(self.states, state, sensors, known))
+        effects = Effects(at, Solving(self.states, state, sensors, known), errors)
         # which makes the compliance: with it nuisances are products, where each would have an equilibrium of its own
         flexible = flexible_columns(at, [length * self._spacing for length in LENGTHS])
         nuisances = nuisances_at(at, self.states, state.hypothesis.theta, self.prior, effects, errors)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.course import Course
 from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.diagnosis.mesh_error import MeshErrors, expected_answer, volume_of
 from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.diagnosis.sparse_columns import SparseColumns
 from warpbrain.errors import InputError
@@ -92,10 +93,13 @@ class Effects:
     at : Linearisation
     solved : Solved, optional
         Asked for proposals that are switches or courses.
+    mesh_errors : MeshErrors, optional
+        Of the state: what is less compressible locks more, and that is part of what it changes.
     """
 
-    def __init__(self, at: Linearisation, solved: Solved | None = None) -> None:
+    def __init__(self, at: Linearisation, solved: Solved | None = None, mesh_errors: MeshErrors | None = None) -> None:
         self.at = at
+        self.mesh_errors = mesh_errors
         self._given = solved
         self._internal: Floats | None = None
         model = at.system.model
@@ -215,7 +219,21 @@ class Effects:
         for weights, own in ((stiffer, "element_forces"), (larger, "growth_forces")):
             if weights.numbers:
                 total[:, weights.numbers] += at.answers_of_elements(getattr(at, own), weights.matrix())
+        if self.mesh_errors is not None and (volumes := self._volumes(mechanisms)).any():
+            total += expected_answer(at.sensors, self.mesh_errors.by_volume)[:, None] * volumes
         return total
+
+    def _volumes(self, mechanisms: Sequence[Any]) -> Floats:
+        """By how much `volume_of` the tissue is larger with each mechanism (count,)."""
+        own = self.at.system.model.materials
+        return np.array(
+            [
+                volume_of(substituted(own, mechanism)) - volume_of(own)
+                if Substituting in _faces(mechanism.__class__)
+                else 0.0
+                for mechanism in mechanisms
+            ]
+        )
 
     def _forces(self, mechanism: Any, faces: frozenset[type]) -> Floats:
         """Nodal forces (N, 3) of a mechanism with these faces."""

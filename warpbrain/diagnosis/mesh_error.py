@@ -9,6 +9,8 @@ compressibility may explain has these changes, or a tenth more stiffness would b
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,10 +25,10 @@ from warpbrain.estimation.discretisation import Difference, Discretisation
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.kernels.linear import ConjugateGradient
 from warpbrain.kernels.two_level import TwoLevelGradient
-from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.proposal import Proposal
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.finer import FinerCase, free_prolongation, restricted
-from warpbrain.simulation.model import Model
+from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
@@ -46,8 +48,10 @@ class MeshErrors:
     Attributes
     ----------
     own : Difference
+    volume : float
+        `volume_of` the tissue there.
     by_volume : Difference
-        What one standard deviation of compressibility adds to it.
+        What it gains for each unit of that.
     by_tissue : tuple of Difference
         What one standard deviation of each coordinate of the tissues' prior adds to it.
     finer : FinerStates
@@ -55,16 +59,22 @@ class MeshErrors:
     """
 
     own: Difference
+    volume: float
     by_volume: Difference
     by_tissue: tuple[Difference, ...]
     finer: FinerStates
 
-    def with_tissue(self, theta: Floats, prior: Gaussian) -> Difference:
-        """The error with other tissue (p,), without what belongs to a mechanism beside."""
+    def with_tissue(self, theta: Floats, volume: float, prior: Gaussian) -> Difference:
+        """The error with other tissue (p,) of another `volume_of`, without what belongs to a mechanism beside."""
         found = self.own
         for z, change in zip(np.linalg.solve(prior.factor, theta - found.theta), self.by_tissue, strict=True):
             found = found.plus(change.times(float(z)))
-        return found
+        return found if volume == self.volume else found.plus(self.by_volume.times(volume - self.volume))
+
+
+def volume_of(materials: Mapping[int, Material]) -> float:
+    """`-ln(1 - 2 nu)` in the mean of tissues: even steps of it are even steps of the logarithm of bulk moduli."""
+    return -float(np.mean([math.log1p(-2.0 * material.poisson) for material in materials.values()]))
 
 
 def expected(known: Difference) -> Difference:
@@ -97,14 +107,14 @@ class FinerStates:
         # of the system and the factors that there are
         self._linear: TwoLevelGradient | None = None
 
-    def errors(self, state: SolvedState, less_compressible: Mechanism, prior: Gaussian) -> MeshErrors:
+    def errors(self, state: SolvedState, volume: Proposal, prior: Gaussian) -> MeshErrors:
         """The error of a state, and what it is beside that with other tissue.
 
         Parameters
         ----------
         state : SolvedState
-        less_compressible : Mechanism
-            Tissue that is one standard deviation less compressible.
+        volume : Proposal
+            Tissue that is more or less compressible, by its `volume_of`.
         prior : Gaussian
             Of the tissues' parameters.
 
@@ -114,12 +124,14 @@ class FinerStates:
             If there is no equilibrium on the finer mesh.
         """
         own, here = self.error(state.hypothesis, state), state.hypothesis
+        less_compressible = volume.make(volume.mean + volume.sd)
         other = self.error(replace(here, mechanisms=(*here.mechanisms, less_compressible)), state)
         by_tissue = []
         for axis in prior.factor.T:
             beside = self.error(replace(here, theta=here.theta + _STEP * axis), state)
             by_tissue.append(beside.less(own).times(1.0 / _STEP))
-        return MeshErrors(own, other.less(own), tuple(by_tissue), self)
+        by_volume = other.less(own).times(1.0 / float(volume.sd[0]))
+        return MeshErrors(own, volume_of(self.states.materials(here)), by_volume, tuple(by_tissue), self)
 
     def error(self, hypothesis: Hypothesis, near: SolvedState) -> Difference:
         """The error of a hypothesis without its stiffness field, which it hardly depends on.

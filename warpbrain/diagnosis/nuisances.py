@@ -147,9 +147,7 @@ def nuisances_at(
     families = [
         Family("tissue", tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors)),
         Family("stiffness field", field_columns(at, states)),
-        Family(
-            "compressibility", _law_columns(effects, [other_volume(states)]) + _volume_locking(sensors, mesh_errors)
-        ),
+        Family("compressibility", _law_columns(effects, [other_volume(states)])),
         Family("shape of the law", _law_columns(effects, _other_shape())),
         Family("known loads", _known_loads(at)),
         Family("registration", sensors.rigid * REGISTRATION_SD),
@@ -197,13 +195,6 @@ def other_volume(states: States) -> Proposal:
     """Tissue that is more or less compressible than the case says, as much in all tissues."""
     own = -math.log1p(-2.0 * states.case.poisson)
     return Proposal.of_one(lambda c: Compressibility(poisson=-0.5 * math.expm1(-c)), own, _VOLUME, "smooth", own)
-
-
-def _volume_locking(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:
-    """What the mesh's error adds (n, 1) to what one standard deviation of compressibility changes."""
-    if mesh_errors is None:
-        return np.zeros((len(sensors), 1))
-    return expected_answer(sensors, mesh_errors.by_volume)[:, None]
 
 
 def mesh_by_tissue(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:

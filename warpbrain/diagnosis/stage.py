@@ -240,7 +240,8 @@ def candidates_beside(fit: Refit, candidates: Candidates) -> Candidates:
     of which a case has only one is left out where the refit has it.
     """
     state = fit.state
-    effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors))
+    known = None if candidates.makes is None else candidates.makes.mesh_errors
+    effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=known)
     acting = [effect.proposed.make(effect.proposed.mean) for effect in fit.effects]
     there = {mechanism.kind for mechanism in acting if not mechanism.several}
     found: list[Effect] = []

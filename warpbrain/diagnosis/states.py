@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,11 +18,13 @@ from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanism import Mechanism, Substituting
 from warpbrain.physics.proposal import Patch
+from warpbrain.simulation.assumed import substituted
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.keeping import kept_for
 from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.model import Material
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
@@ -122,10 +124,21 @@ class States:
         """The case that a user would write for a hypothesis, but for the stiffness field."""
         applied = self.parameters.applied(self.case, hypothesis.theta)
         mesh, boundaries = _released(applied, hypothesis.patches)
-        kept = tuple(
-            m for m in applied.mechanisms if all(new.several or new.kind != m.kind for new in hypothesis.mechanisms)
-        )
-        return replace(applied, mesh=mesh, boundaries=boundaries, mechanisms=(*kept, *hypothesis.mechanisms))
+        return replace(applied, mesh=mesh, boundaries=boundaries, mechanisms=self._acting(hypothesis))
+
+    def _acting(self, hypothesis: Hypothesis) -> tuple[Mechanism, ...]:
+        """The case's own mechanisms, but of a kind that a case has one of the hypothesis' own."""
+        new = hypothesis.mechanisms
+        kept = (m for m in self.case.mechanisms if all(one.several or one.kind != m.kind for one in new))
+        return (*kept, *new)
+
+    def materials(self, hypothesis: Hypothesis) -> Mapping[int, Material]:
+        """Those of a hypothesis, by label."""
+        found = self.parameters.materials(hypothesis.theta)
+        for mechanism in self._acting(hypothesis):
+            if isinstance(mechanism, Substituting):
+                found = substituted(found, mechanism)
+        return found
 
     def solve(
         self,
