@@ -48,6 +48,15 @@ def test_several_beside_each_other_are_a_signal(sensors: Sensors) -> None:
     assert set_aside(together, residual) == []
 
 
-def test_rows_of_points_are_together_by_their_number() -> None:
-    found = rows_of_points(np.array([3, 3, 0, 2, 2, 7]))
-    assert [rows.tolist() for rows in found] == [[[2], [5]], [[3, 4], [0, 1]]]
+def test_rows_of_points_are_together_by_their_number(sensors: Sensors) -> None:
+    some = replace(sensors, groups=np.array([3, 3, 0, 2, 2, 7, 5, 5]), directions=np.ones((8, 3)))
+    some.directions[6:] = 0.0
+    assert [rows.tolist() for rows in rows_of_points(some)] == [[[2], [5]], [[3, 4], [0, 1]]]
+
+
+def test_a_force_is_no_gross_error(sensors: Sensors) -> None:
+    force = np.isin(sensors.groups, [4])
+    residual = with_errors(sensors, [4, POINTS + 2])
+    assert set_aside(sensors, residual) == [4, POINTS + 2]
+    with_force = replace(sensors, directions=np.where(force[:, None], 0.0, sensors.directions))
+    assert set_aside(with_force, residual) == [POINTS + 2]

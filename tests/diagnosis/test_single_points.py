@@ -14,7 +14,7 @@ POINTS = 12
 def sensors_of(groups):
     n = len(groups)
     nothing = np.zeros((n, 1))
-    rest = (nothing, nothing, np.zeros((n, 6)), np.ones(n), np.zeros((n, 3)), np.zeros((n, 3)))
+    rest = (nothing, nothing, np.zeros((n, 6)), np.ones(n), np.zeros((n, 3)), np.ones((n, 3)))
     return Sensors(np.zeros(n), np.zeros(n), *rest, np.asarray(groups), np.zeros(n, int), np.zeros(n), ("points",))
 
 

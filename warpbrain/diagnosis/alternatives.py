@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 _SHIFT, _TURN = 0.01, math.radians(10.0)
 #: How much larger than it should be another nuisance is.
 _LARGER = 4.0
+#: Standard deviation of each component of a force that was measured wrongly, as a part of what was recorded.
+_FORCE = 0.3
 
 #: What each says to people.
 SENTENCES = {
@@ -24,6 +26,7 @@ SENTENCES = {
     "mesh": "The mesh is too coarse, or not the shape of the anatomy.",
     "stiffness": "Stiffness varies more from place to place than brain tissue is known to.",
     "loads": "The known loads are not as large as was said.",
+    "forces": "A recorded force is not the one that acted, or has another direction.",
 }
 
 
@@ -37,5 +40,17 @@ def alternatives_at(sensors: Sensors, nuisances: Nuisances) -> dict[str, Effect]
     }
     if "mesh" in by_name:
         wide["mesh"] = _LARGER * by_name["mesh"]
+    wide["forces"] = _wrong_forces(sensors)
     nothing = np.zeros(len(sensors))
     return {name: Effect(None, nothing, columns) for name, columns in wide.items() if columns.any()}
+
+
+def _wrong_forces(sensors: Sensors) -> Floats:
+    """Columns (n, k) of each component of the recorded forces, which may be wrong in size and in direction."""
+    rows = np.flatnonzero(~sensors.is_displacement)
+    groups = sensors.groups[rows]
+    recorded = sensors.computed[rows] + sensors.residual[rows]
+    squares = np.bincount(groups, weights=recorded**2, minlength=1)
+    found = np.zeros((len(sensors), len(rows)))
+    found[rows, np.arange(len(rows))] = _FORCE * np.sqrt(squares[groups])
+    return found

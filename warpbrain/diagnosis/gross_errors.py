@@ -39,7 +39,7 @@ def gross_errors(sensors: Sensors, explanation: Explanation, kappa: float, resid
     from scipy.special import chdtrc
 
     aside = np.zeros(len(sensors), dtype=bool)
-    points = rows_of_points(sensors.groups)
+    points = rows_of_points(sensors)
     for _ in range(_ROUNDS):
         kept = np.flatnonzero(~aside)
         place = np.full(len(sensors), -1)

@@ -75,12 +75,13 @@ class Sensors:
         return np.asarray(self.by_displacement @ du.ravel() + self.by_reactions @ dR.ravel())
 
 
-def rows_of_points(groups: Ints) -> list[Ints]:
-    """Rows of each point (g, s), those of points with as many rows together; `groups` as in `Sensors`."""
-    sizes = np.bincount(groups)
-    order = np.argsort(groups, kind="stable")
-    each = [order[sizes[groups[order]] == size] for size in np.unique(sizes[sizes > 0]).tolist()]
-    return [rows.reshape(-1, sizes[groups[rows[0]]]) for rows in each]
+def rows_of_points(sensors: Sensors) -> list[Ints]:
+    """Rows of each recorded point (g, s), those of points with as many rows together; forces have none."""
+    rows = np.flatnonzero(sensors.is_displacement)
+    sizes = np.bincount(sensors.groups[rows], minlength=1)
+    order = rows[np.argsort(sensors.groups[rows], kind="stable")]
+    size_of = sizes[sensors.groups[order]]
+    return [order[size_of == size].reshape(-1, size) for size in np.unique(size_of).tolist()]
 
 
 #: What was recorded at a time, with displacement and reactions (N, 3) then.

@@ -63,6 +63,9 @@ def log_evidence_and_odds(
 def log_odds(sensors: Sensors, explanation: Explanation, residual: Floats, kappa: float) -> Floats:
     """Logarithm of the odds (n,) that the point of each row is a gross error, after what all others say of it.
 
+    Minus infinity for forces: nobody pairs them wrongly. That one was not measured as it should be is what competes
+    with mechanisms; see `warpbrain.diagnosis.alternatives`.
+
     Parameters
     ----------
     sensors : Sensors
@@ -73,8 +76,8 @@ def log_odds(sensors: Sensors, explanation: Explanation, residual: Floats, kappa
         Factor on the noise.
     """
     weighted = explanation.inverse_times(residual, kappa)
-    found = np.zeros(len(sensors))
-    for rows in rows_of_points(sensors.groups):
+    found = np.full(len(sensors), -np.inf)
+    for rows in rows_of_points(sensors):
         own = explanation.inverse_blocks(rows, kappa)
         covariance = np.linalg.inv(own)
         apart = np.einsum("gij,gj->gi", covariance, weighted[rows])

@@ -4,12 +4,13 @@
 2. Named if one mechanism is probable enough, predicts points that it was not fitted to better than without it and than
    patterns that mean nothing, has a plausible size, and leaves nothing significant. Named + rest if something is left.
    That may be all of it: then the name must be probable enough beside any force without a name, too.
-3. Not physics if a nuisance far larger than it should be explains the residuals better than any mechanism.
+   What predicts them but little better needs a strong alarm, what does plainly only a significant one.
+3. Not physics if nuisances far larger than they should be are as probable together.
 4. Group if a few mechanisms together are probable enough. Unknown if a force without a name is, and predicts points
    that it was not fitted to better; or if it may be, and the best mechanism leaves something significant: then a force
    without a name acts in either case. Where the best mechanism leaves nothing, and it and a force without a name are
-   probable enough only together: a group of both. Else: cannot say. A weak alarm is never more than that, nor are
-   recordings of which many points contradict each other.
+   probable enough only together: a group of both. Else: cannot say. A weak alarm is never more than that if held-out
+   points do not bear it out, nor are recordings of which many points contradict each other.
 """
 
 from __future__ import annotations
@@ -39,12 +40,12 @@ Floats = NDArray[np.float64]
 SURE, TOGETHER, ADEQUATE = 0.9, 0.9, 0.01
 #: Largest size [standard deviations of its prior] and placebo probability of a name, and members of a group.
 LARGEST, PLACEBO, MEMBERS = 4.0, 0.05, 4
-#: Part of the probability of a false alarm up to which more is claimed than that something is missing: wrong alarms,
-#: in calibration cases without an effect and in traps, are weak ones.
+#: Part of the probability of a false alarm up to which an alarm is strong: wrong ones, in calibration cases without an
+#: effect and in traps, are weak.
 CLAIM = 0.2
 #: Part of the recorded points that may be gross errors: of more it is the pairing that is in doubt, not single points.
 CONTRADICTED = 0.1
-#: How much more probable [nats] held-out points must be without the block that gains most: ten times.
+#: How much more probable [nats] held-out points are without the block that gains most, where that is plain: ten times.
 TENFOLD = float(np.log(10.0))
 
 
@@ -151,19 +152,19 @@ def decide(found: Evidence) -> Verdict:
     if found.p_value > found.alpha:
         return Verdict(NOTHING, ())
     best = found.ranking[0]
-    if not best.physics and best.kind in SENTENCES and best.probability >= 0.5:
+    if best.kind in SENTENCES and sum(one.probability for one in found.ranking if one.kind in SENTENCES) >= SURE:
         return Verdict(NOT_PHYSICS, (best.kind,))
     vetoes = _vetoes(found)
     if best.physics and best.probability >= SURE and not vetoes:
         return Verdict(NAMED if found.adequacy_p > ADEQUATE else NAMED_AND_REST, (best.kind,))
     label_set = _label_set(found.ranking)
     missing = {ranked.kind for ranked in found.ranking if ranked.physics or ranked.kind == UNKNOWN_KIND}
-    claims = found.chance <= CLAIM * found.alpha and found.aside <= CONTRADICTED
+    strong, paired = found.chance <= CLAIM * found.alpha, found.aside <= CONTRADICTED
     left = best.physics and UNKNOWN_KIND in label_set and found.adequacy_p <= ADEQUATE
     few = best.physics and 1 < len(label_set) <= MEMBERS and missing.issuperset(label_set)
-    if claims and few and not left and found.gain > 0.0:
+    if paired and (strong or found.sure > TENFOLD) and few and not left and found.gain > 0.0:
         return Verdict(GROUP, label_set, "; ".join(vetoes))
-    if claims and (left or (best.kind == UNKNOWN_KIND and best.probability >= 0.5)):
+    if paired and strong and (left or (best.kind == UNKNOWN_KIND and best.probability >= 0.5)):
         if found.unknown_sure > TENFOLD:
             return Verdict(UNKNOWN, (best.kind,) if left else ())
         vetoes = ["a force without a name fits better than a mechanism, but does not predict points that were held out"]
@@ -172,11 +173,11 @@ def decide(found: Evidence) -> Verdict:
 
 def _vetoes(found: Evidence) -> list[str]:
     vetoes = []
-    if found.chance > CLAIM * found.alpha:
+    if found.chance > CLAIM * found.alpha and found.sure <= TENFOLD:
         vetoes.append("the alarm is too weak to claim more")
     if found.aside > CONTRADICTED:
         vetoes.append("so many recorded points contradict those around them that they may be paired wrongly")
-    if found.gain <= 0.0 or found.sure <= TENFOLD:
+    if min(found.gain, found.sure) <= 0.0:
         vetoes.append("points that were held out are not predicted better with it")
     if found.placebo_p > PLACEBO:
         vetoes.append("patterns that mean nothing predict as well")
