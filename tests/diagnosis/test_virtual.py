@@ -71,7 +71,7 @@ def test_noise_alone_rarely_alarms(confusion):
 def test_what_is_plainly_seen_is_named(confusion):
     # its size is normal, so that a part of them is small
     assert confusion.rows["plain"]["plain"] > 0.7
-    assert confusion.rows["registration"][NOT_PHYSICS] > 0.85
+    assert confusion.rows["registration"][NOT_PHYSICS] > 0.8
     assert confusion.named["plain"][-1] > 0.95 and confusion.named["plain"][0] < 0.5
 
 
