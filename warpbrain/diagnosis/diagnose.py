@@ -208,7 +208,7 @@ class Diagnosing:
     def _looked_for(self, base: Base) -> tuple[Base, Candidates]:
         """What is looked for at a base, and that with the points that are no gross errors where something acts."""
         with self._timed("candidates"):
-            alternatives = alternatives_at(base.at.sensors, base.nuisances)
+            alternatives = alternatives_at(base.at, base.nuisances)
             candidates = candidates_at(
                 self.dictionary, base.effects, alternatives, lambda kind: self.listener.stage(f"candidate: {kind}")
             )

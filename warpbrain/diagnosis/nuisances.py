@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.effects import Effects
 from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.mesh_error import MeshErrors, expected_answer
-from warpbrain.diagnosis.sensors import Sensors, spread_points
+from warpbrain.diagnosis.sensors import Sensors, alike_near, spread_points
 from warpbrain.diagnosis.states import Hypothesis, States
 from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.gaussian import Gaussian
@@ -249,8 +249,7 @@ def _fractional(at: Linearisation, anchors: Floats, fraction: float) -> Floats:
     where = sensors.positions[rows]
     nearest = cKDTree(at.system.model.mesh.points).query(where)[1]
     size = np.linalg.norm(at.u, axis=1)[nearest]
-    near: Any = np.exp(-0.5 * (np.linalg.norm(where[:, None] - anchors[None], axis=2) / (0.7 * _ALIKE)) ** 2)
-    near /= np.sqrt(np.sum(near**2, axis=1, keepdims=True))
+    near = alike_near(where, anchors, _ALIKE)
     found = np.zeros((len(sensors), 3 * len(anchors)))
     along = sensors.directions[rows]
     found[rows] = (fraction * size[:, None, None] * near[:, :, None] * along[:, None, :]).reshape(len(rows), -1)

@@ -70,6 +70,11 @@ class Sensors:
         """Which rows are lengths, not forces."""
         return np.asarray(self.directions.any(axis=1))
 
+    @property
+    def of_surfaces(self) -> NDArray[np.bool_]:
+        """Which rows are of points of a surface: they are known along its normals alone, each by one number."""
+        return np.asarray(self.is_displacement & (np.bincount(self.groups)[self.groups] == 1))
+
     def answer(self, du: Floats, dR: Floats) -> Floats:
         """What changes of displacement and reactions (N, 3) change of what is computed: (n,)."""
         return np.asarray(self.by_displacement @ du.ravel() + self.by_reactions @ dR.ravel())
@@ -82,6 +87,13 @@ def rows_of_points(sensors: Sensors) -> list[Ints]:
     order = rows[np.argsort(sensors.groups[rows], kind="stable")]
     size_of = sizes[sensors.groups[order]]
     return [order[size_of == size].reshape(-1, size) for size in np.unique(size_of).tolist()]
+
+
+def alike_near(where: Floats, anchors: Floats, reach: float) -> Floats:
+    """A random field of variance one at places (k, 3), alike within a reach [m], in columns (k, a) of anchors."""
+    squares = np.sum((where[:, None] - anchors[None]) ** 2, axis=2)
+    near: Any = np.exp(-squares / reach**2)
+    return np.asarray(near / np.sqrt(np.sum(near**2, axis=1, keepdims=True)))
 
 
 #: What was recorded at a time, with displacement and reactions (N, 3) then.
