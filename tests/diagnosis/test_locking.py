@@ -1,0 +1,49 @@
+"""The error of the mesh grows as tissue is less compressible: as a nuisance and as a candidate."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sinking_block import write_sinking
+
+from warpbrain.diagnosis.base import Base, BaseFinder
+from warpbrain.diagnosis.effects import Effects
+from warpbrain.diagnosis.mesh_error import expected_answer, volume_of
+from warpbrain.diagnosis.nuisances import other_volume
+from warpbrain.diagnosis.options import Listener
+from warpbrain.diagnosis.states import States
+from warpbrain.physics.mechanisms.compressibility import Compressibility
+from warpbrain.physics.mechanisms.gravity import Gravity
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory: pytest.TempPathFactory) -> Base:
+    case = write_sinking(tmp_path_factory.mktemp("sinking") / "case")
+    # as it says itself that it sinks: without a load there is no error
+    weight = Gravity(direction=(0.0, 0.0, -1.0), density=1000.0, csf_level=0.03)
+    states = States(replace(case, mechanisms=(weight,)), "cpu")
+    return BaseFinder(states, 0.01, True, False, Listener()).find()
+
+
+def test_it_is_known_of_tissue_that_is_less_compressible(base: Base) -> None:
+    known, here = base.mesh_errors, base.state.hypothesis
+    assert known is not None
+    stiffer = replace(here, mechanisms=(Compressibility(poisson=0.46),))
+    volume = volume_of(base.states.materials(stiffer))
+    solved = known.finer.error(stiffer, base.state)
+    said = known.with_tissue(here.theta, volume, base.prior)
+    grown = np.linalg.norm(solved.u - known.own.u)
+    assert grown > 0.02 * np.linalg.norm(known.own.u)
+    assert np.linalg.norm(said.u - solved.u) < 0.25 * grown
+
+
+def test_the_candidate_changes_what_the_nuisance_does(base: Base) -> None:
+    [candidate] = base.effects.of([replace(other_volume(base.states), sd=np.array([1.2]))])
+    own = base.nuisances.columns[:, base.nuisances.part("compressibility")]
+    np.testing.assert_allclose(candidate.columns, 3.0 * own, rtol=1e-6, atol=1e-9)
+    # without the mesh's error it would change less
+    [alone] = Effects(base.at).of([other_volume(base.states)])
+    assert base.mesh_errors is not None
+    locked = float(other_volume(base.states).sd[0]) * expected_answer(base.at.sensors, base.mesh_errors.by_volume)
+    np.testing.assert_allclose(own[:, 0] - alone.columns[:, 0], locked, rtol=1e-6, atol=1e-9)
+    assert np.linalg.norm(locked) > 0.02 * np.linalg.norm(own)
