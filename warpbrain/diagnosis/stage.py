@@ -103,6 +103,8 @@ class Stage(Screened):
                 found[kind] = self._gain(kind, none) + self.over_places(kind) + self._gross(fits[kind]) - gross
             elif kind != UNKNOWN:
                 found[kind] = value - (none - float(screen.none[0]))
+                if kind in self.candidates.alternatives and found[kind] > 0.0:
+                    found[kind] += self._gross_beside(kind) - gross
         best_screened = max((screened[kind] for kind in fits if kind != "none"), default=0.0)
         best_fitted = max((found[kind] for kind in fits if kind != "none"), default=0.0)
         # to first order only: what is not refitted is taken no better beside the best than screening had it
@@ -115,6 +117,13 @@ class Stage(Screened):
     def _gross(self, fit: Refit) -> float:
         """What a refit gains where single points may be gross errors."""
         return self._evidence_and_odds(fit)[0] - fit.log_evidence
+
+    def _gross_beside(self, kind: str) -> float:
+        """The same of the linear model with a kind that is not refitted."""
+        explanation = self.explanation.with_more(self.best_effect(kind).columns)
+        white = explanation.whitened(self.residual)[:, None]
+        found, _ = log_evidence_and_odds(self.base.at.sensors, explanation, self.residual)
+        return found - float(explanation.log_marginal(white)[0])
 
     def _gain(self, kind: str, none: float) -> float:
         """Log evidence of the refit of a kind less that without it; of what changes in time, of the change alone."""
