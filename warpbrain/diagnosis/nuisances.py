@@ -23,11 +23,11 @@ from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
-from warpbrain.physics.mechanism import Mechanism, Substituting
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
 from warpbrain.physics.mechanisms.compressibility import Compressibility
 from warpbrain.physics.proposal import Proposal
-from warpbrain.simulation.assumed import substituted
+from warpbrain.simulation.assumed import all_substituted
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
 
@@ -175,11 +175,7 @@ def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaus
 
 def _materials(system: System, states: States, theta: Floats) -> Mapping[int, Material]:
     """Those of `theta`, as the mechanisms that act have them."""
-    found = states.parameters.materials(theta)
-    for mechanism in system.model.mechanisms:
-        if isinstance(mechanism, Substituting):
-            found = substituted(found, mechanism)
-    return found
+    return all_substituted(states.parameters.materials(theta), system.model.mechanisms)
 
 
 def field_columns(at: Linearisation, states: States) -> Floats:

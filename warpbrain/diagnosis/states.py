@@ -18,9 +18,9 @@ from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.mechanism import Mechanism, Substituting
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import Patch
-from warpbrain.simulation.assumed import substituted
+from warpbrain.simulation.assumed import all_substituted
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.keeping import kept_for
 from warpbrain.simulation.kept_factors import KeptFactors
@@ -134,11 +134,7 @@ class States:
 
     def materials(self, hypothesis: Hypothesis) -> Mapping[int, Material]:
         """Those of a hypothesis, by label."""
-        found = self.parameters.materials(hypothesis.theta)
-        for mechanism in self._acting(hypothesis):
-            if isinstance(mechanism, Substituting):
-                found = substituted(found, mechanism)
-        return found
+        return all_substituted(self.parameters.materials(hypothesis.theta), self._acting(hypothesis))
 
     def solve(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from warpbrain.physics.load import Load
@@ -24,11 +24,18 @@ def with_mechanisms(model: Model, mechanisms: Sequence[Mechanism]) -> Model:
     mechanisms : sequence of Mechanism
     """
     loads = [m for m in mechanisms if isinstance(m, Load)]
-    materials = dict(model.materials)
-    for substituting in (m for m in mechanisms if isinstance(m, Substituting)):
-        materials = substituted(materials, substituting)
+    materials = all_substituted(model.materials, mechanisms)
     acting = [m for m in mechanisms if not isinstance(m, Removing | Load)]
     return replace(model, materials=materials, loads=(*loads, *model.loads), mechanisms=(*acting, *model.mechanisms))
+
+
+def all_substituted(materials: Mapping[int, Material], mechanisms: Iterable[Mechanism]) -> dict[int, Material]:
+    """The materials of tissues as those mechanisms that say something of their law have them, in their order."""
+    found = dict(materials)
+    for mechanism in mechanisms:
+        if isinstance(mechanism, Substituting):
+            found = substituted(found, mechanism)
+    return found
 
 
 def substituted(materials: Mapping[int, Material], mechanism: Substituting) -> dict[int, Material]:
