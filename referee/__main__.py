@@ -14,11 +14,11 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m referee", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("make", help="make a set of cases and seal what is true of them")
-    make.add_argument("--set", required=True, choices=("development", "calibration", "scored"), dest="which")
-    make.add_argument("--count", type=int, help="how many; 18, 80 or 120 if absent")
+    make.add_argument("--set", required=True, choices=("development", "calibration", "scored", "traps"), dest="which")
+    make.add_argument("--count", type=int, help="how many; 18, 80, 120 or 60 if absent")
     make.add_argument("--out", type=Path, required=True)
     make.add_argument(
-        "--geometry", nargs="+", help="bodies, in turn; phantom 0529 or, for the scored set, phantom 0603"
+        "--geometry", nargs="+", help="bodies, in turn; phantom 0603 or, for what is not scored, phantom 0529"
     )
     make.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes")
     make.add_argument("--seed", default="1", help="any text, such as the hash of the commit that froze the tool")
@@ -62,7 +62,7 @@ def _make(given: argparse.Namespace) -> int:
     from referee.make import make_set
     from referee.plan import SETS
 
-    geometries = given.geometry or (["phantom", "phantom", "0603" if given.which == "scored" else "0529"])
+    geometries = given.geometry or (["phantom", "phantom", "0603" if given.which in ("scored", "traps") else "0529"])
     for name in geometries:
         if name not in NAMES:
             raise InputError(f"--geometry {name}: expected one of {', '.join(NAMES)}")

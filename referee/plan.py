@@ -11,11 +11,12 @@ import numpy as np
 from referee.draw import MECHANISMS, OUTSIDE, TRAPS
 
 #: Sets, and how many cases each has if nobody says.
-SETS = {"development": 18, "calibration": 80, "scored": 120}
+SETS = {"development": 18, "calibration": 80, "scored": 120, "traps": 60}
 #: Shares of cases; all others have one mechanism each, in turn.
 SHARES = {
     "scored": {"none": 0.2, "two": 0.1, "outside": 0.05, "trap": 0.05},
     "calibration": {"none": 0.375, "two": 0.075, "outside": 0.075, "trap": 0.075},
+    "traps": {"trap": 1.0},
 }
 #: Least detectability of each of two effects at once.
 BOTH = 5.0
@@ -48,7 +49,7 @@ def planned(which: str, count: int, geometries: Sequence[str], seed: int) -> lis
     count : int
         The scored set of 120 has 24 cases in which nothing is missing, 9 of each mechanism, 12 of two at once, 6
         outside the dictionary and 6 traps; calibration of 80 has 30, 4 of each, 6, 6 and 6; any other number has the
-        same shares. Development takes one of everything in turn.
+        same shares. Traps has nothing else, of each as many. Development takes one of everything in turn.
     geometries : sequence of str
         In turn.
     seed : int
@@ -62,7 +63,7 @@ def planned(which: str, count: int, geometries: Sequence[str], seed: int) -> lis
     of_kind: dict[tuple[str, ...], int] = {}
     cases = []
     for kind, names in chosen:
-        key = (kind, *names) if kind == "effect" else (kind,)
+        key = (kind, *names) if kind in ("effect", "trap") else (kind,)
         turn_of = of_kind.get(key, len(of_kind))
         of_kind[key] = turn_of + 1
         geometry = geometries[turn_of % len(geometries)]
