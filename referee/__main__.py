@@ -1,4 +1,4 @@
-"""The referee: ``python -m referee make|run|score|calibrate``; ``mesh`` makes its meshes anew. See docs/referee.md."""
+"""The referee: ``python -m referee make|run|see|score|calibrate``; ``mesh`` makes its meshes. See docs/referee.md."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--workers", type=int, default=1, help="processes")
     run.add_argument("--tool-args", default="", help='more for the tool, such as "--ablation no-nuisances"')
     run.add_argument("--limit", type=float, help="seconds of a case, after which it counts as without a diagnosis")
+    see = commands.add_parser("see", help="open the labels and find how much what acts stands out for the tool")
     score = commands.add_parser("score", help="open the labels and compare")
     score.add_argument("--out", type=Path, required=True)
     score.add_argument("--no-baselines", action="store_true", help="leave the baselines out")
@@ -38,6 +39,7 @@ def _parser() -> argparse.ArgumentParser:
     calibrate = commands.add_parser("calibrate", help="fit the tool's temperature and offsets to a calibration set")
     for parser_of in (score, calibrate):
         parser_of.add_argument("--cases", type=Path, required=True)
+    for parser_of in (see, score, calibrate):
         parser_of.add_argument("--labels", type=Path, required=True)
         parser_of.add_argument(
             "--commitments", type=Path, help="the published hashes; commitments.txt beside the labels if absent"
@@ -81,6 +83,15 @@ def _run(given: argparse.Namespace) -> int:
     return run_all(given.cases, given.out, given.device, given.workers, given.tool_args.split(), given.limit)
 
 
+def _see(given: argparse.Namespace) -> int:
+    from referee.labels import open_labels
+    from referee.seen_by_tool import write_seen
+
+    found = write_seen(open_labels(given.labels, _commitments(given)), given.diagnoses)
+    print(f"{len(found)} cases with effects")
+    return 0
+
+
 def _score(given: argparse.Namespace) -> int:
     from referee.score import score_all
 
@@ -117,7 +128,7 @@ def _mesh(given: argparse.Namespace) -> int:
     return 0
 
 
-_COMMANDS = {"make": _make, "run": _run, "score": _score, "calibrate": _calibrate, "mesh": _mesh}
+_COMMANDS = {"make": _make, "run": _run, "see": _see, "score": _score, "calibrate": _calibrate, "mesh": _mesh}
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -50,6 +50,8 @@ def label_of(name: str, plan: Planned, truth: Truth, attempts: list[str]) -> dic
         "setting": truth.setting.told(),
         "points_m": _array(points[fitted]),
         "clean_effect_m": _array(clean),
+        "clean_effect_on_wall_m": _array(truth.effect_on_wall),
+        "clean_effect_n": _array(truth.force - truth.held),
         "check_points_m": _array(points[checked]),
         "check_displacement_m": _array(truth.u[:, checked]),
         "check_noise_m": _number(np.sqrt((noise**2).sum(axis=2).mean())),

@@ -11,6 +11,7 @@ import numpy as np
 
 from referee.diagnoses import UNKNOWN, Diagnosis, Ranked, read_diagnosis
 from referee.run import DIAGNOSIS
+from referee.seen_by_tool import read_seen
 
 
 @dataclass(frozen=True)
@@ -23,11 +24,14 @@ class Outcome:
     label : mapping
         What is true; see `referee.labels.label_of`.
     said : Diagnosis
+    seen : float or None
+        How much the effects stand out for the tool, see `referee.seen_by_tool`; None if it was not found out.
     """
 
     name: str
     label: Mapping[str, Any]
     said: Diagnosis
+    seen: float | None = None
 
     @property
     def kind(self) -> str:
@@ -140,10 +144,11 @@ class Outcome:
 def read_outcomes(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> tuple[list[Outcome], list[str]]:
     """Outcomes of all cases of which there is a diagnosis, and the names of those of which there is none."""
     found, missing = [], []
+    seen = read_seen(diagnoses)
     for name, label in labels.items():
         file = diagnoses / name / DIAGNOSIS
         if file.exists():
-            found.append(Outcome(name, label, read_diagnosis(file)))
+            found.append(Outcome(name, label, read_diagnosis(file), seen.get(name)))
         else:
             missing.append(name)
     return found, missing

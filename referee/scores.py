@@ -22,7 +22,9 @@ BARS = {
     "significant where nothing is missing": 0.05,
     "traps named as physics": 0.05,
     "right name or group holding it, d >= 8": 0.95,
+    "right name or group holding it, the tool's d >= 8": 0.95,
     "right name alone, d >= 8": 0.85,
+    "right name alone, the tool's d >= 8": 0.85,
     "90 % label set holds the truth": 0.9,
     "spoken names right": 0.95,
     "centre within 10 mm": 0.5,
@@ -46,6 +48,7 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
     of = {kind: [o for o in outcomes if o.kind == kind] for kind in ("none", "effect", "two", "outside", "trap")}
     effects = of["effect"]
     plain = [o for o in effects if o.d >= PLAIN]
+    for_tool = [o for o in effects if o.seen is not None and o.seen >= PLAIN]
     found = {
         "false alarms": share(o.said.alarm for o in of["none"]),
         "significant where nothing is missing": share(o.said.p_value <= ALPHA for o in of["none"]),
@@ -56,7 +59,8 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
         found[f"best candidate right, {bin_name(low, high)}"] = share(o.top for o in effects if low <= o.d < high)
     others: dict[str, list[tuple[Outcome, float | None]]] = {
         "the old": [(o, o.upper) for o in effects],
-        "tool's own": [(o, o.d_of_tool) for o in effects],
+        "the tool's": [(o, o.seen) for o in effects],
+        "the best fit's": [(o, o.d_of_tool) for o in effects],
     }
     for measure, by in others.items():
         for low, high in BINS:
@@ -64,7 +68,9 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
             found[f"best candidate right, {measure} {bin_name(low, high)}"] = share(within)
     found |= {
         "right name or group holding it, d >= 8": share(o.held for o in plain),
+        "right name or group holding it, the tool's d >= 8": share(o.held for o in for_tool),
         "right name alone, d >= 8": share(o.named for o in plain),
+        "right name alone, the tool's d >= 8": share(o.named for o in for_tool),
         "right name alone, the old d >= 8": share(o.named for o in effects if o.upper >= PLAIN),
         "90 % label set holds the truth": share(o.covered for o in effects if o.d >= VISIBLE and o.said.alarm),
         "spoken names right": share(o.named for o in outcomes if o.said.spoken),

@@ -55,14 +55,14 @@ def score_text(
         lines.append(f"| {true} | {' | '.join(str(count) if count else '' for count in counts)} |")
     lines += [
         "",
-        "| case | true | d | the old d | effect at points [mm] | said | best candidate |",
-        "|---|---|---|---|---|---|---|",
+        "| case | true | d | the tool's d | the old d | effect at points [mm] | said | best candidate |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for o in outcomes:
         said = " + ".join(o.said.names) or ", ".join(o.said.group)
         true = " + ".join(o.label["names"]) or "nothing"
         size = 1e3 * float(o.label["rms_effect_m"])
-        d = f"{o.d:.1f} | {o.upper:.1f}"
+        d = f"{o.d:.1f} | {'' if o.seen is None else f'{o.seen:.1f}'} | {o.upper:.1f}"
         lines.append(f"| {o.name} | {true} | {d} | {size:.2f} | {o.said.verdict}: {said} | {o.said.first} |")
     return "\n".join(lines) + "\n"
 

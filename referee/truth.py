@@ -40,8 +40,8 @@ class Truth:
         Displacement of all nodes [m]; one time if none is told.
     declared : (n, 3) array
         Displacement without the effects [m].
-    force : (3,) array
-        With which the superior cap acts on the tissue in the end [N].
+    force, held : (3,) array
+        With which the superior cap acts on the tissue in the end, and does without the effects [N].
     whole, upper : float
         How much all stand out together, see `referee.detectability`; 0 if nothing is missing.
     left : float
@@ -54,6 +54,7 @@ class Truth:
     u: Floats
     declared: Floats
     force: Floats
+    held: Floats
     whole: float
     upper: float
     left: float
@@ -66,6 +67,12 @@ class Truth:
     def effect(self, nodes: NDArray[np.int64]) -> Floats:
         """Displacement (times, k, 3) [m] of nodes that is due to the effects."""
         return self.u[:, nodes] - self.declared[nodes]
+
+    @property
+    def effect_on_wall(self) -> Floats:
+        """Displacement (p, 3) [m] of the places on the wall that is due to the effects."""
+        nodes, shapes = self.sensors.wall
+        return np.asarray(np.einsum("pa,pai->pi", shapes, self.effect(nodes)[-1]))
 
 
 def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf) -> Truth:
@@ -89,7 +96,7 @@ def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf)
     held = _cap_force(problem, base.u)
     if not wishes:
         u = np.repeat(base.u[None], max(1, len(setting.times)), axis=0)
-        return Truth(setting, (), sensors, u, base.u, held, 0.0, 0.0, base.left)
+        return Truth(setting, (), sensors, u, base.u, held, held, 0.0, 0.0, base.left)
     seen = Detectability(Sight(setting, sensors, base.u, held), unknowns_of(problem, base))
     found = [sized(wish, problem, base, seen, setting.times) for wish in wishes]
     acting, states = _settle(problem, found, setting.times, base, until)
@@ -102,7 +109,7 @@ def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf)
     if len(u) < len(setting.times):
         u = np.repeat(u, len(setting.times), axis=0)
     left = max(base.left, *(state.left for state in states))
-    return Truth(setting, tuple(found), sensors, u, base.u, force, whole, seen.upper(change), left)
+    return Truth(setting, tuple(found), sensors, u, base.u, force, held, whole, seen.upper(change), left)
 
 
 def _settle(

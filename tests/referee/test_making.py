@@ -91,6 +91,15 @@ def test_calibration_has_something_of_everything():
     assert {case.names[0] for case in cases if case.kind == "effect"} == set(MECHANISMS)
 
 
+def test_traps_have_nothing_else_and_as_many_of_each():
+    cases = planned("traps", 60, ["phantom", "phantom", "0603"], 1)
+    assert Counter(case.names for case in cases) == {(name,): 10 for name in TRAPS}
+    assert {case.kind for case in cases} == {"trap"}
+    # a trap is not of one body only, but for the mesh that there is of the phantom alone
+    for name in set(TRAPS) - {"coarse"}:
+        assert len({case.geometry for case in cases if case.names == (name,)}) == 2
+
+
 def test_a_seed_is_any_text():
     assert make.seed_of("a commit") == make.seed_of("a commit") != make.seed_of("another")
 

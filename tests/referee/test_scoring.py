@@ -1,6 +1,7 @@
 """Scores of diagnoses written by hand, whose answers are known."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -76,6 +77,15 @@ def test_shares(outcomes):
     assert found["both of two named"] == (1, 2)
     assert found["both of two named, each d >= 5"] == (1, 1)
     assert found["one of two named"] == (2, 2)
+
+
+def test_shares_by_what_the_tool_can_see(outcomes):
+    assert shares(outcomes)["right name alone, the tool's d >= 8"].of == 0
+    seen = {"s1": 7.0, "g1": 8.5, "p1": 8.0, "2a": 20.0}
+    found = shares([replace(o, seen=seen.get(o.name)) for o in outcomes])
+    told = {name: (value.hits, value.of) for name, value in found.items() if "the tool's d" in name}
+    assert told["right name or group holding it, the tool's d >= 8"] == (1, 2)
+    assert told["right name alone, the tool's d >= 8"] == (0, 2)
 
 
 def test_what_is_measured(outcomes):

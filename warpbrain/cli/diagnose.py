@@ -17,7 +17,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="say what physics a case leaves out",
         description="Locates where simulation and recordings differ, names the physics that was left out, models it, "
         "and shows the fit improve on data it was not fitted to. Writes "
-        "report.html, diagnosis.json, map.vtu, points.csv and explained/.",
+        "report.html, diagnosis.json, map.vtu, points.csv, covariance.npz and explained/.",
     )
     add = parser.add_argument
     add("--case", required=True, metavar="NAME", help="0529, ... (see warpbrain cases), or the path of a case folder")
@@ -109,12 +109,15 @@ class _Way(NamedTuple):
 
 def _of_a_body() -> _Way:
     from warpbrain.diagnosis.diagnose import Diagnosing
+    from warpbrain.report.diagnosis.covariance import write_covariance
     from warpbrain.report.diagnosis.description import describe_diagnosis
     from warpbrain.report.diagnosis.files import write_map
     from warpbrain.report.diagnosis.points import write_points
     from warpbrain.report.diagnosis.text import diagnosis_lines
 
-    return _Way(Diagnosing, describe_diagnosis, diagnosis_lines, {"map.vtu": write_map, "points.csv": write_points})
+    tables: dict[str, Callable[[Path, Any], None]]
+    tables = {"map.vtu": write_map, "points.csv": write_points, "covariance.npz": write_covariance}
+    return _Way(Diagnosing, describe_diagnosis, diagnosis_lines, tables)
 
 
 def _of_a_specimen() -> _Way:

@@ -1,0 +1,72 @@
+"""How much what acts stands out for the tool: the true change of all that was recorded, by the tool's covariance."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError
+
+Floats = NDArray[np.float64]
+
+#: What the tool writes of a case, and where this is kept beside the list of runs.
+POINTS, COVARIANCE, SEEN = "points.csv", "covariance.npz", "detectability.json"
+#: Recordings that are not of points: a key of the label each, and its factor to the units of `points.csv`.
+_OTHERS = {"ventricle wall": ("clean_effect_on_wall_m", 1000.0), "force": ("clean_effect_n", 1.0)}
+
+
+def write_seen(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> dict[str, float]:
+    """Write `d` of every case with effects and a diagnosis, by name of case; covariances are of no use after it."""
+    found = {
+        name: stands_out(label, diagnoses / name)
+        for name, label in labels.items()
+        if label["effects"] and (diagnoses / name / COVARIANCE).exists()
+    }
+    (diagnoses / SEEN).write_text(json.dumps(found, indent=1) + "\n", encoding="ascii")
+    return found
+
+
+def read_seen(diagnoses: Path) -> dict[str, float]:
+    """What was written; nothing if nothing was."""
+    file = diagnoses / SEEN
+    return json.loads(file.read_text(encoding="ascii")) if file.exists() else {}
+
+
+def stands_out(label: Mapping[str, Any], folder: Path) -> float:
+    """`sqrt(D^T S^-1 D)` with the true change `D` of what was recorded and the tool's `S` of noise and nuisances.
+
+    Raises
+    ------
+    InputError
+        If what the tool says was recorded is not what was made.
+    """
+    with (folder / POINTS).open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    directions = np.array([[float(row[f"direction_{axis}"] or 0.0) for axis in "xyz"] for row in rows])
+    names = np.array([row["recording"] for row in rows])
+    change = np.zeros(len(rows))
+    for name in dict.fromkeys(names.tolist()):
+        own = names == name
+        true = _change(label, name)
+        if len(true) != np.count_nonzero(own):
+            raise InputError(f"{folder / POINTS}: {np.count_nonzero(own)} numbers of '{name}', {len(true)} were made")
+        # a force is told by its components, one row each
+        along = directions[own] if directions[own].any() else np.tile(np.eye(3), (len(true) // 3, 1))
+        change[own] = np.einsum("ki,ki->k", along, true)
+    covariance = np.load(folder / COVARIANCE)["covariance"].astype(np.float64)
+    return float(np.sqrt(change @ np.linalg.solve(covariance, change)))
+
+
+def _change(label: Mapping[str, Any], name: str) -> Floats:
+    """What the effects change (n, 3) at each number of a recording [mm] or [N], in the order that it was written."""
+    if name in _OTHERS:
+        key, factor = _OTHERS[name]
+        vectors = factor * np.array(label[key]).reshape(-1, 3)
+        return vectors if name != "force" else np.repeat(vectors, 3, axis=0)
+    return np.repeat(1000.0 * np.array(label["clean_effect_m"]).reshape(-1, 3), 3, axis=0)

@@ -1,0 +1,31 @@
+"""How what was recorded may differ from what is computed where no physics is missing, for effects that users bring."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from warpbrain.atomic import whole_file
+from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.diagnosis.sensing import explanation_of
+from warpbrain.report.files import MILLIMETRES
+
+
+def write_covariance(path: Path, found: Diagnosis) -> None:
+    """Write the covariance (n, n) of noise and nuisances, its rows those of `points.csv` in their units, mm and N.
+
+    With `change` (n,) what an effect changes there, along the directions of `points.csv`, the effect stands out by
+    `sqrt(change @ solve(covariance, change))`. Points that were set aside are in it with the noise that was declared,
+    and all noise is as many times larger as was found.
+    """
+    base = found.base
+    sensors = base.at.sensors
+    columns = base.nuisances.columns
+    noise = base.explanation.best_kappa(base.whitened) * explanation_of(sensors, base.noise, columns).factor
+    factors = np.where(sensors.is_displacement, MILLIMETRES, 1.0)[:, None]
+    parts = factors * np.column_stack([noise, columns])
+    # half the digits: variances are a million times the least of them, not more
+    covariance = (parts @ parts.T).astype(np.float32)
+    with whole_file(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, covariance=covariance)
