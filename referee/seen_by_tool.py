@@ -22,8 +22,11 @@ _OTHERS = {"ventricle wall": ("clean_effect_on_wall_m", 1000.0), "force": ("clea
 
 
 def write_seen(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> dict[str, float]:
-    """Write `d` of every case with effects and a diagnosis, by name of case; covariances are of no use after it."""
-    found = {
+    """Write `d` of every case with effects and a diagnosis, by name of case.
+
+    What is known stays: covariances are large, and of no use once `d` is known.
+    """
+    found = read_seen(diagnoses) | {
         name: stands_out(label, diagnoses / name)
         for name, label in labels.items()
         if label["effects"] and (diagnoses / name / COVARIANCE).exists()
@@ -47,10 +50,10 @@ def stands_out(label: Mapping[str, Any], folder: Path) -> float:
         If what the tool says was recorded is not what was made.
     """
     with (folder / POINTS).open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    directions = np.array([[float(row[f"direction_{axis}"] or 0.0) for axis in "xyz"] for row in rows])
-    names = np.array([row["recording"] for row in rows])
-    change = np.zeros(len(rows))
+        names = np.array([row["recording"] for row in csv.DictReader(stream)])
+    with np.load(folder / COVARIANCE) as known:
+        covariance, directions = known["covariance"].astype(np.float64), known["direction"]
+    change = np.zeros(len(names))
     for name in dict.fromkeys(names.tolist()):
         own = names == name
         true = _change(label, name)
@@ -59,7 +62,6 @@ def stands_out(label: Mapping[str, Any], folder: Path) -> float:
         # a force is told by its components, one row each
         along = directions[own] if directions[own].any() else np.tile(np.eye(3), (len(true) // 3, 1))
         change[own] = np.einsum("ki,ki->k", along, true)
-    covariance = np.load(folder / COVARIANCE)["covariance"].astype(np.float64)
     return float(np.sqrt(change @ np.linalg.solve(covariance, change)))
 
 

@@ -19,16 +19,19 @@ LABEL = {
 @pytest.fixture
 def folder(tmp_path):
     rows = [("points", axis) for _ in range(2) for axis in np.eye(3)]
-    rows += [("ventricle wall", [0.0, 0.6, 0.8])] + [("force", None)] * 3
+    rows += [("ventricle wall", np.array([0.0, 0.6, 0.8]))] + [("force", np.zeros(3))] * 3
     out = tmp_path / "a"
     out.mkdir()
     with (out / "points.csv").open("w", newline="") as stream:
         table = csv.writer(stream)
-        table.writerow(["recording", "direction_x", "direction_y", "direction_z"])
-        for name, direction in rows:
-            table.writerow([name, *(["", "", ""] if direction is None else direction)])
-    np.savez(out / "covariance.npz", covariance=np.diag(np.array([1.0] * 7 + [0.01] * 3)).astype(np.float32))
+        table.writerow(["recording"])
+        table.writerows([name] for name, _ in rows)
+    _write(out, np.diag([1.0] * 7 + [0.01] * 3), np.stack([direction for _, direction in rows]))
     return out
+
+
+def _write(out, covariance, directions):
+    np.savez(out / "covariance.npz", covariance=covariance.astype(np.float32), direction=directions)
 
 
 def test_everything_that_was_recorded_counts_in_its_unit(folder):
@@ -39,8 +42,8 @@ def test_everything_that_was_recorded_counts_in_its_unit(folder):
 def test_what_explains_it_hides_it(folder):
     shift = np.array([0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 5.0, 0.1, 0.2, 0.0])
     before = stands_out(LABEL, folder)
-    noise = np.load(folder / "covariance.npz")["covariance"]
-    np.savez(folder / "covariance.npz", covariance=noise + 100.0 * np.outer(shift, shift))
+    known = np.load(folder / "covariance.npz")
+    _write(folder, known["covariance"] + 100.0 * np.outer(shift, shift), known["direction"])
     assert stands_out(LABEL, folder) < 0.2 * before
 
 
@@ -54,4 +57,6 @@ def test_it_is_kept_beside_the_runs_of_cases_that_have_effects(folder):
     labels = {"a": LABEL, "b": LABEL, "none": {**LABEL, "effects": []}}
     found = write_seen(labels, folder.parent)
     assert set(found) == {"a"} and read_seen(folder.parent) == found
+    (folder / "covariance.npz").unlink()
+    assert write_seen(labels, folder.parent) == found
     assert json.loads((folder.parent / "detectability.json").read_text()) == found

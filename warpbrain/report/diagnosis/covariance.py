@@ -13,11 +13,12 @@ from warpbrain.report.files import MILLIMETRES
 
 
 def write_covariance(path: Path, found: Diagnosis) -> None:
-    """Write the covariance (n, n) of noise and nuisances, its rows those of `points.csv` in their units, mm and N.
+    """Write the `covariance` (n, n) of noise and nuisances, its rows those of `points.csv` in their units, mm and N.
 
-    With `change` (n,) what an effect changes there, along the directions of `points.csv`, the effect stands out by
-    `sqrt(change @ solve(covariance, change))`. Points that were set aside are in it with the noise that was declared,
-    and all noise is as many times larger as was found.
+    With `change` (n,) what an effect changes there, of displacements along `direction` (n, 3), the effect stands out by
+    `sqrt(change @ solve(covariance, change))`. Walls have other normals than in the case as declared, which
+    `points.csv` tells. Points that were set aside are in it with the noise that was declared, and all noise is as many
+    times larger as was found.
     """
     base = found.base
     sensors = base.at.sensors
@@ -28,4 +29,4 @@ def write_covariance(path: Path, found: Diagnosis) -> None:
     # half the digits: variances are a million times the least of them, not more
     covariance = (parts @ parts.T).astype(np.float32)
     with whole_file(path) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(stream, covariance=covariance)
+        np.savez_compressed(stream, covariance=covariance, direction=sensors.directions)
