@@ -127,3 +127,17 @@ def test_inverse_and_its_blocks_are_those_of_the_covariance(model):
     rows = np.arange(3 * POINTS).reshape(-1, 3)
     blocks = inverse[rows[:, :, None], rows[:, None, :]]
     np.testing.assert_allclose(explanation.inverse_blocks(rows, kappa), blocks, rtol=1e-8, atol=1e-10)
+
+
+def test_a_large_noise_is_no_crowd_of_gross_errors(model):
+    sensors, factor, _, random = model
+    # with nuisances that explain half of it, of which each point is compared with all others as if these were sound
+    columns = 10.0 * random.normal(size=(len(sensors), len(sensors) // 2))
+    residual = 3.3 * factor @ random.normal(size=len(sensors)) + columns @ random.normal(size=columns.shape[1])
+    explanation = Explanation(factor, columns)
+    found, odds = log_evidence_and_odds(sensors, explanation, residual)
+    first = np.unique(sensors.groups, return_index=True)[1]
+    assert np.mean(odds[first] > 0.0) < 0.25
+    # the noise is as large as it is without gross errors
+    plain = float(explanation.log_marginal(explanation.whitened(residual)[:, None])[0])
+    assert plain - 1.0 < found < plain + 2.0

@@ -35,6 +35,7 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         "size": 1.0,
         "unknown_sure": 5.0,
         "aside": 0.04,
+        "set_aside": 3,
     }
     return Evidence(**(given | known))
 
@@ -75,6 +76,12 @@ def found(chances: Mapping[str, float], **known: object) -> Evidence:
         ({"gravity": 0.97, "pressure": 0.03}, {"aside": 0.2}, CANNOT_SAY),
         ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {"aside": 0.2}, CANNOT_SAY),
         ({"unknown": 0.8, "gravity": 0.2}, {"aside": 0.2}, CANNOT_SAY),
+        # what single pairs cannot have done
+        ({"gravity": 0.97, "pressure": 0.03}, {"aside": 0.11, "set_aside": 7, "sure": 16.0}, CANNOT_SAY),
+        ({"gravity": 0.97, "pressure": 0.03}, {"aside": 0.11, "set_aside": 7, "sure": 16.2}, NAMED),
+        ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {"aside": 0.11, "set_aside": 7, "sure": 16.2}, GROUP),
+        ({"unknown": 0.8, "gravity": 0.2}, {"aside": 0.11, "set_aside": 7, "unknown_sure": 16.2}, UNKNOWN),
+        ({"unknown": 0.8, "gravity": 0.2}, {"aside": 0.11, "set_aside": 7, "sure": 16.2}, CANNOT_SAY),
         ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {"p_value": 0.03}, GROUP),
         ({"gravity": 0.6, "pressure": 0.38, "unknown": 0.02}, {"p_value": 0.03, "sure": 2.0}, CANNOT_SAY),
     ],

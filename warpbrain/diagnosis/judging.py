@@ -118,7 +118,7 @@ class Judge:
         nameless = {one: [*each, one.predict(plain[0], drawn, plain[2])] for one, each in loose.items()}
         unknown_sure = max(predicted.gain(without[one])[1] for one, each in nameless.items() for predicted in each)
         groups = self.base.at.sensors.groups
-        aside = len(np.unique(groups[self.base.aside])) / len(np.unique(groups))
+        set_aside = len(np.unique(groups[self.base.aside]))
         evidence = Evidence(
             self.options.alpha,
             stage.p_value,
@@ -131,7 +131,8 @@ class Judge:
             needed,
             size,
             unknown_sure,
-            aside,
+            set_aside / len(np.unique(groups)),
+            set_aside,
         )
         return Judgement(
             decide(evidence),

@@ -10,7 +10,9 @@ where `p` is what the others say of the point under the hypothesis: a block of t
 stands out far beyond any smooth force was set aside before; see `gross_errors`.
 
 The factor `kappa` on the noise is averaged over with these factors in place, not before: one gross error would make it
-large, and whatever explains that one point would be credited with the noise of all others.
+large, and whatever explains that one point would be credited with the noise of all others. Factors at which more than
+a quarter of the points would be gross errors do not count: to first order each of them is compared with all others as
+if these were sound, and a noise that is three times what was declared would be a small one with gross errors all over.
 """
 
 from __future__ import annotations
@@ -28,6 +30,8 @@ Floats = NDArray[np.float64]
 
 #: Probability that a point is a gross error, and how large one is in standard deviations of the noise.
 OFTEN, LARGE = 0.03, 8.0
+#: Part of the points of which more are no gross errors, but noise.
+_MOST = 0.25
 
 
 def log_evidence_and_odds(
@@ -57,6 +61,9 @@ def log_evidence_and_odds(
     first = np.unique(sensors.groups, return_index=True)[1]
     gains = np.logaddexp(0.0, odds[:, first]).sum(axis=1)
     logs = explanation.log_none(explanation.whitened(residual)[:, None], kappas)[:, 0] + kappa_log_prior(kappas) + gains
+    few = np.mean(odds[:, first] > 0.0, axis=1) <= _MOST
+    if few.any():
+        logs[~few] = -np.inf
     return float(logsumexp(logs)), odds[int(np.argmax(logs))]
 
 

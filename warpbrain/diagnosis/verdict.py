@@ -77,6 +77,8 @@ class Evidence:
         What `sure` is, of a force without a name.
     aside : float
         Part of the recorded points that were set aside as gross errors.
+    set_aside : int
+        How many.
     """
 
     alpha: float
@@ -91,6 +93,15 @@ class Evidence:
     size: float
     unknown_sure: float
     aside: float
+    set_aside: int
+
+    def paired(self, sure: float) -> bool:
+        """Whether points are not paired so badly that nothing can be said.
+
+        Not more than one in ten contradicts all others; or held-out points are more probable, `sure`, by more than
+        could be if each of them had its part in it: what comes of wrong pairs does not predict others.
+        """
+        return self.aside <= CONTRADICTED or sure > self.set_aside * TENFOLD
 
 
 @dataclass(frozen=True)
@@ -159,12 +170,14 @@ def decide(found: Evidence) -> Verdict:
         return Verdict(NAMED if found.adequacy_p > ADEQUATE else NAMED_AND_REST, (best.kind,))
     label_set = _label_set(found.ranking)
     missing = {ranked.kind for ranked in found.ranking if ranked.physics or ranked.kind == UNKNOWN_KIND}
-    strong, paired = found.chance <= CLAIM * found.alpha, found.aside <= CONTRADICTED
+    strong = found.chance <= CLAIM * found.alpha
     left = best.physics and UNKNOWN_KIND in label_set and found.adequacy_p <= ADEQUATE
     few = best.physics and 1 < len(label_set) <= MEMBERS and missing.issuperset(label_set)
-    if paired and (strong or found.sure > TENFOLD) and few and not left and found.gain > 0.0:
+    plain = strong or found.sure > TENFOLD
+    if found.paired(found.sure) and plain and few and not left and found.gain > 0.0:
         return Verdict(GROUP, label_set, "; ".join(vetoes))
-    if paired and strong and (left or (best.kind == UNKNOWN_KIND and best.probability >= 0.5)):
+    nameless = left or (best.kind == UNKNOWN_KIND and best.probability >= 0.5)
+    if found.paired(found.unknown_sure) and strong and nameless:
         if found.unknown_sure > TENFOLD:
             return Verdict(UNKNOWN, (best.kind,) if left else ())
         vetoes = ["a force without a name fits better than a mechanism, but does not predict points that were held out"]
@@ -175,7 +188,7 @@ def _vetoes(found: Evidence) -> list[str]:
     vetoes = []
     if found.chance > CLAIM * found.alpha and found.sure <= TENFOLD:
         vetoes.append("the alarm is too weak to claim more")
-    if found.aside > CONTRADICTED:
+    if not found.paired(found.sure):
         vetoes.append("so many recorded points contradict those around them that they may be paired wrongly")
     if min(found.gain, found.sure) <= 0.0:
         vetoes.append("points that were held out are not predicted better with it")

@@ -127,7 +127,7 @@ class VirtualCases:
     def _verdict(self, cause: str, screen: Screen, chances: Floats, p_value: float) -> str:
         ranking = [self._ranked(screen.kinds[k], float(chances[k])) for k in np.argsort(-chances).tolist()]
         # held-out points are better predicted, but not so plainly that a weak alarm would do
-        passed = Evidence(self._alpha, p_value, p_value, ranking, np.inf, TENFOLD, 0.0, 1.0, 1.0, 0.0, np.inf, 0.0)
+        passed = Evidence(self._alpha, p_value, p_value, ranking, np.inf, TENFOLD, 0.0, 1.0, 1.0, 0.0, np.inf, 0.0, 0)
         verdict = decide(passed)
         if verdict.verdict == NAMED:
             return verdict.kinds[0]
