@@ -22,8 +22,10 @@ from warpbrain.simulation.system import System
 #: What is looked for: few kinds take few seconds.
 OPTIONS = DiagnosisOptions(candidates=("gravity", "pressure", "swelling", "falx"), mesh_error=False)
 
-#: Edge [m], noise [m] and points of the recording.
-_SIDE, _NOISE, _POINTS = 0.06, 1e-4, 45
+#: Noise of the recordings [m].
+NOISE = 1e-4
+#: Edge [m] and points of a recording.
+_SIDE, _POINTS = 0.06, 45
 
 _CASE = """\
 [case]
@@ -87,7 +89,7 @@ def write_sinking(folder: Path, also: tuple[Mechanism, ...] = ()) -> Case:
     for name in ("beads", "others"):
         points = rng.uniform(0.05, 0.95, size=(_POINTS, 3)) * _SIDE
         moved = locate(mesh.points, mesh.tetrahedra, points).matrix(len(mesh.points)) @ u
-        moved += _NOISE * rng.normal(size=moved.shape)
+        moved += NOISE * rng.normal(size=moved.shape)
         lines = [",".join(f"{1000.0 * v:.6f}" for v in row) for row in np.column_stack([points, moved])]
         (folder / "recordings" / f"{name}.csv").write_text("\n".join(["x,y,z,ux,uy,uz", *lines, ""]), encoding="utf-8")
     (folder / "case.toml").write_text(_CASE + _RECORDINGS, encoding="utf-8")

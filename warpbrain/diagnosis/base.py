@@ -141,7 +141,11 @@ class Base:
 
     def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
         """What nuisances do to the displacement of other points (k, 3) [m], and what makes effects there."""
-        at = self.at.with_sensors(tracked_points(self.at.system.model.mesh, points, self.states.centre))
+        return self.seen_by(tracked_points(self.at.system.model.mesh, points, self.states.centre))
+
+    def seen_by(self, sensors: Sensors) -> tuple[Nuisances, Effects]:
+        """What nuisances do to other sensors, in the coordinates that they have here, and what makes effects there."""
+        at = self.at.with_sensors(sensors)
         effects = Effects(at, Solving(self.states, self.state, at.sensors, self.known), self.mesh_errors)
         theta = self.state.hypothesis.theta
         own = self.nuisances

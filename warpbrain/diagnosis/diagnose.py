@@ -15,6 +15,7 @@ from warpbrain.cases.case import Case
 from warpbrain.diagnosis.alternatives import alternatives_at
 from warpbrain.diagnosis.base import Base, BaseFinder
 from warpbrain.diagnosis.between import between_neighbours
+from warpbrain.diagnosis.checking import check_errors
 from warpbrain.diagnosis.concluding import named_together
 from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
 from warpbrain.diagnosis.effects import Effect
@@ -52,7 +53,6 @@ from warpbrain.diagnosis.traits import Traits, traits_of
 from warpbrain.diagnosis.verdict import CLAIM, overall
 from warpbrain.diagnosis.virtual import VirtualCases
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.observations import Observations
 from warpbrain.threads import beside, in_threads, one_thread_of_blas
 
 Floats = NDArray[np.float64]
@@ -374,21 +374,8 @@ class Diagnosing:
             chance,
             judged.placebo,
             judged.ceiling,
-            self._check(base, fits),
+            check_errors(self.case, base, [fits[kind] for kind in ("none", EXPLAINED) if kind in fits]),
         )
-
-    def _check(self, base: Base, fits: dict[str, Refit]) -> tuple[float, ...] | None:
-        """RMSE [m] at recordings with role `check`, which nothing above has seen."""
-        checks = Observations.to_check(self.case)
-        states = [base.declared, *(fits[kind].state for kind in ("none", EXPLAINED) if kind in fits)]
-        found = []
-        for state in states:
-            parts = checks.at(state.u, state.reactions, base.states.centre)
-            lengths = [p.values for p, one in zip(parts, checks.each, strict=True) if one.kind != "force"]
-            if not lengths:
-                return None
-            found.append(float(np.sqrt(np.mean(np.concatenate([values.ravel() for values in lengths]) ** 2))))
-        return tuple(found)
 
     def _smallest(
         self, base: Base, candidates: Candidates, stack: Stack, kappa: float, confusion: Confusion

@@ -180,7 +180,7 @@ class Fit:
     ceiling : float or None
         Held-out error with any smooth force.
     check : tuple of float, or None
-        RMSE at the recordings with role `check`: declared, refitted, explained.
+        RMSE at the recordings with role `check`: declared, refitted, explained; see `warpbrain.diagnosis.checking`.
     """
 
     declared: tuple[float, float]

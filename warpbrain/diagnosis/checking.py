@@ -1,0 +1,69 @@
+"""Errors at recordings with role `check`, which nothing that was fitted has seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.case import Case
+from warpbrain.diagnosis.base import Base
+from warpbrain.diagnosis.mesh_error import MeshErrors, expected, volume_of
+from warpbrain.diagnosis.realigned import realigned
+from warpbrain.diagnosis.refitting import Refit
+from warpbrain.diagnosis.sensors import sensors_at
+from warpbrain.errors import SolveError
+from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.observations import Observations
+
+Floats = NDArray[np.float64]
+
+
+def check_errors(case: Case, base: Base, fits: Sequence[Refit]) -> tuple[float, ...] | None:
+    """RMSE of displacements [m]: of the case as declared, then of each fit; None if there is nothing to check.
+
+    What a fit says there is its state with the expected error of the mesh, and what it has found of all that is no
+    physics: recordings of one registration are as wrong where they are fitted as where they are not.
+    """
+    checks = Observations.to_check(case)
+    if all(one.kind == "force" for one in checks.each):
+        return None
+    centre, declared = base.states.centre, base.declared
+    sensors = sensors_at([(math.inf, checks, declared.u, declared.reactions)], centre)
+    # what was fitted was realigned before, see `realigned`
+    again = Observations.to_check(realigned(case, base.states.motion, centre))
+    return _size(sensors.residual[sensors.is_displacement]), *(_error(again, base, fit) for fit in fits)
+
+
+def _error(checks: Observations, base: Base, fit: Refit) -> float:
+    """RMSE [m] of a fit."""
+    u, reactions = fit.state.u, fit.state.reactions
+    if base.mesh_errors is not None:
+        error = _mesh_error(base, base.mesh_errors, fit)
+        u, reactions = u + error.u, reactions + error.reactions
+    sensors = sensors_at([(math.inf, checks, u, reactions)], base.states.centre)
+    nuisances, _ = base.seen_by(sensors)
+    found = fit.nuisances.copy()
+    for family in ("tissue", "stiffness field"):
+        # which the state has
+        found[nuisances.part(family)] = 0.0
+    left = sensors.residual - nuisances.columns @ found
+    return _size(left[sensors.is_displacement])
+
+
+def _mesh_error(base: Base, known: MeshErrors, fit: Refit) -> Difference:
+    """The expected error of the mesh, with that of the mechanisms where a finer mesh can follow them."""
+    hypothesis = fit.state.hypothesis
+    if not any(effect.proposed.changes_in_time for effect in fit.effects):
+        try:
+            return expected(known.finer.error(hypothesis, fit.state))
+        except SolveError:
+            pass
+    volume = volume_of(base.states.materials(hypothesis))
+    return expected(known.with_tissue(hypothesis.theta, volume, base.prior))
+
+
+def _size(errors: Floats) -> float:
+    return float(np.sqrt(np.mean(errors**2)))
