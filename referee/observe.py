@@ -85,9 +85,7 @@ def _points(truth: Truth, name: str, role: str, nodes: Ints, mistakes: bool) -> 
 
 def _surface(truth: Truth) -> SurfaceRecording:
     setting = truth.setting
-    nodes, shapes = truth.sensors.wall
-    points = np.einsum("pa,pai->pi", shapes, setting.body.points[nodes])
-    u = np.einsum("pa,pai->pi", shapes, truth.u[-1][nodes])
+    points, u = truth.sensors.on_wall(setting.body.points), truth.sensors.on_wall(truth.u[-1])
     blur = replace(setting.blur, seed=(setting.seed + 5000) % 2**31)
     moved = points + blur.misaligned(points, u, _middle(truth)) + blur.noise(points)
     return SurfaceRecording(

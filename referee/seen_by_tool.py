@@ -17,8 +17,12 @@ Floats = NDArray[np.float64]
 
 #: What the tool writes of a case, and where this is kept beside the list of runs.
 POINTS, COVARIANCE, SEEN = "points.csv", "covariance.npz", "detectability.json"
-#: Recordings that are not of points: a key of the label each, and its factor to the units of `points.csv`.
-_OTHERS = {"ventricle wall": ("clean_effect_on_wall_m", 1000.0), "force": ("clean_effect_n", 1.0)}
+#: Of each recording the key of the label, how many numbers tell of a vector of it, and its factor to mm or N.
+_RECORDED = {
+    "points": ("clean_effect_m", 3, 1000.0),
+    "ventricle wall": ("clean_effect_on_wall_m", 1, 1000.0),
+    "force": ("clean_effect_n", 3, 1.0),
+}
 
 
 def write_seen(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> dict[str, float]:
@@ -67,8 +71,5 @@ def stands_out(label: Mapping[str, Any], folder: Path) -> float:
 
 def _change(label: Mapping[str, Any], name: str) -> Floats:
     """What the effects change (n, 3) at each number of a recording [mm] or [N], in the order that it was written."""
-    if name in _OTHERS:
-        key, factor = _OTHERS[name]
-        vectors = factor * np.array(label[key]).reshape(-1, 3)
-        return vectors if name != "force" else np.repeat(vectors, 3, axis=0)
-    return np.repeat(1000.0 * np.array(label["clean_effect_m"]).reshape(-1, 3), 3, axis=0)
+    key, times, factor = _RECORDED[name]
+    return np.repeat(factor * np.array(label[key]).reshape(-1, 3), times, axis=0)

@@ -36,6 +36,11 @@ class Sensors:
     checked: Ints
     wall: tuple[Ints, Floats]
 
+    def on_wall(self, values: Floats) -> Floats:
+        """Values (n, 3) of all nodes at the places on the wall (p, 3)."""
+        nodes, shapes = self.wall
+        return np.asarray(np.einsum("pa,pai->pi", shapes, values[nodes]))
+
 
 def place_sensors(setting: Setting) -> Sensors:
     """Draw where is seen: within the tissue and on its walls, not where nothing moves freely."""

@@ -52,15 +52,15 @@ class Sight:
 
     def __init__(self, setting: Setting, sensors: Sensors, u: Floats, force: Floats) -> None:
         body: Body = setting.body
-        self.setting, self._nodes, self._wall = setting, sensors.fitted, sensors.wall
+        self.setting, self._sensors, self._nodes = setting, sensors, sensors.fitted
         self._middle = 0.5 * (body.points.min(axis=0) + body.points.max(axis=0))
         self._points = body.points
         moved = body.points + u
-        nodes, shapes = sensors.wall
+        nodes, _ = sensors.wall
         along, across = (moved[nodes[:, k]] - moved[nodes[:, 0]] for k in (1, 2))
         normals = np.cross(along, across)
         self._normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        self._places = np.einsum("pa,pai->pi", shapes, body.points[nodes])
+        self._places = sensors.on_wall(body.points)
         self._moved = moved
         self._force = FORCE_ERROR * float(np.linalg.norm(force)) if setting.total is None else None
 
@@ -84,9 +84,7 @@ class Sight:
         points = change.move[:, self._nodes]
         # what does not change with time is seen at each of them
         parts = [np.repeat(points, self.often // len(points), axis=0).ravel()]
-        nodes, shapes = self._wall
-        wall = np.einsum("pa,pai->pi", shapes, change.move[-1][nodes])
-        parts.append((wall * self._normals).sum(axis=1))
+        parts.append((self._sensors.on_wall(change.move[-1]) * self._normals).sum(axis=1))
         if self._force is not None:
             parts.append(change.force)
         return np.concatenate(parts)

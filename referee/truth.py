@@ -71,8 +71,7 @@ class Truth:
     @property
     def effect_on_wall(self) -> Floats:
         """Displacement (p, 3) [m] of the places on the wall that is due to the effects."""
-        nodes, shapes = self.sensors.wall
-        return np.asarray(np.einsum("pa,pai->pi", shapes, self.effect(nodes)[-1]))
+        return self.sensors.on_wall(self.u[-1] - self.declared)
 
 
 def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf) -> Truth:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.mesh_error import MeshErrors, expected, volume_of
+from warpbrain.diagnosis.mesh_error import MeshErrors, expected
 from warpbrain.diagnosis.realigned import realigned
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.sensors import sensors_at
@@ -45,11 +45,9 @@ def _error(checks: Observations, base: Base, fit: Refit) -> float:
         u, reactions = u + error.u, reactions + error.reactions
     sensors = sensors_at([(math.inf, checks, u, reactions)], base.states.centre)
     nuisances, _ = base.seen_by(sensors)
-    found = fit.nuisances.copy()
-    for family in ("tissue", "stiffness field"):
-        # which the state has
-        found[nuisances.part(family)] = 0.0
-    left = sensors.residual - nuisances.columns @ found
+    # but for tissue and field, which the state has
+    linear = fit.nuisances - nuisances.coordinates(base.prior, fit.state.hypothesis)
+    left = sensors.residual - nuisances.columns @ linear
     return _size(left[sensors.is_displacement])
 
 
@@ -61,8 +59,7 @@ def _mesh_error(base: Base, known: MeshErrors, fit: Refit) -> Difference:
             return expected(known.finer.error(hypothesis, fit.state))
         except SolveError:
             pass
-    volume = volume_of(base.states.materials(hypothesis))
-    return expected(known.with_tissue(hypothesis.theta, volume, base.prior))
+    return expected(known.of(hypothesis, base.prior))
 
 
 def _size(errors: Floats) -> float:

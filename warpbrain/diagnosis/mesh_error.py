@@ -71,6 +71,10 @@ class MeshErrors:
             found = found.plus(change.times(float(z)))
         return found if volume == self.volume else found.plus(self.by_volume.times(volume - self.volume))
 
+    def of(self, hypothesis: Hypothesis, prior: Gaussian) -> Difference:
+        """The error that the tissue of a hypothesis is known to have."""
+        return self.with_tissue(hypothesis.theta, volume_of(self.finer.states.materials(hypothesis)), prior)
+
 
 def volume_of(materials: Mapping[int, Material]) -> float:
     """`-ln(1 - 2 nu)` in the mean of tissues: even steps of it are even steps of the logarithm of bulk moduli."""

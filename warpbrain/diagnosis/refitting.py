@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.effects import Effect, Effects, parts_of
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected, expected_answer, volume_of
+from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected, expected_answer
 from warpbrain.diagnosis.nuisances import Nuisances, field_columns, mesh_by_tissue, tissue_columns
 from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
@@ -236,10 +236,7 @@ class Refitting:
 
     def _beyond(self, known: MeshErrors, error: Difference, state: SolvedState) -> Floats:
         """What an error of the mesh is beyond that which its tissue alone is known to have, in what is recorded."""
-        return expected_answer(state.sensors, error.less(self._known_error(known, state.hypothesis)))
-
-    def _known_error(self, known: MeshErrors, hypothesis: Hypothesis) -> Difference:
-        return known.with_tissue(hypothesis.theta, volume_of(self.states.materials(hypothesis)), self.prior)
+        return expected_answer(state.sensors, error.less(known.of(state.hypothesis, self.prior)))
 
     def _share_of(self, effects: tuple[Effect, ...], state: SolvedState, z: Floats) -> _Share | None:
         """What of the mesh's error belongs to the mechanisms, in proportion to their sizes; None if not known.
@@ -367,7 +364,7 @@ class Refitting:
     ) -> tuple[SolvedState, Floats]:
         hypothesis = self._hypothesis(effects, z)
         begin = self.start if near is None else near
-        error = None if self._mesh is None else expected(self._known_error(self._mesh, hypothesis))
+        error = None if self._mesh is None else expected(self._mesh.of(hypothesis, self.prior))
         try:
             state = self.states.solve(hypothesis, begin.u, error, begin.course or self._course)
         except SolveError:

@@ -67,6 +67,12 @@ def log_evidence_and_odds(
     return float(logsumexp(logs)), odds[int(np.argmax(logs))]
 
 
+def gain_of_gross_errors(sensors: Sensors, explanation: Explanation, residual: Floats) -> float:
+    """What the log evidence of a linear model gains where any point may be a gross error."""
+    plain = float(explanation.log_marginal(explanation.whitened(residual)[:, None])[0])
+    return log_evidence_and_odds(sensors, explanation, residual)[0] - plain
+
+
 def log_odds(sensors: Sensors, explanation: Explanation, residual: Floats, kappa: float) -> Floats:
     """Logarithm of the odds (n,) that the point of each row is a gross error, after what all others say of it.
 

@@ -20,7 +20,7 @@ from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.screened import Screened
 from warpbrain.diagnosis.screening import UNKNOWN, Screening
-from warpbrain.diagnosis.single_points import log_evidence_and_odds
+from warpbrain.diagnosis.single_points import gain_of_gross_errors, log_evidence_and_odds
 
 Floats = NDArray[np.float64]
 
@@ -121,9 +121,7 @@ class Stage(Screened):
     def _gross_beside(self, kind: str) -> float:
         """The same of the linear model with a kind that is not refitted."""
         explanation = self.explanation.with_more(self.best_effect(kind).columns)
-        white = explanation.whitened(self.residual)[:, None]
-        found, _ = log_evidence_and_odds(self.base.at.sensors, explanation, self.residual)
-        return found - float(explanation.log_marginal(white)[0])
+        return gain_of_gross_errors(self.base.at.sensors, explanation, self.residual)
 
     def _gain(self, kind: str, none: float) -> float:
         """Log evidence of the refit of a kind less that without it; of what changes in time, of the change alone."""
@@ -208,8 +206,7 @@ class Stage(Screened):
         best = loose[int(np.argmax(plain))]
         if either[1] > either[0]:
             best = explanation.with_more(pairs.best(white[:, 0]))
-        gross = log_evidence_and_odds(fit.state.sensors, best, fit.linear)[0] - float(best.log_marginal(white)[0])
-        return float(log_mean(either)) + gross
+        return float(log_mean(either)) + gain_of_gross_errors(fit.state.sensors, best, fit.linear)
 
 
 def compared(

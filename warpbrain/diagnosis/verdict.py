@@ -95,6 +95,16 @@ class Evidence:
     aside: float
     set_aside: int
 
+    @property
+    def strong(self) -> bool:
+        """Whether the alarm is."""
+        return self.chance <= CLAIM * self.alpha
+
+    @property
+    def plain(self) -> bool:
+        """Whether the alarm is strong, or held-out points bear it out."""
+        return self.strong or self.sure > TENFOLD
+
     def paired(self, sure: float) -> bool:
         """Whether points are not paired so badly that nothing can be said.
 
@@ -170,14 +180,12 @@ def decide(found: Evidence) -> Verdict:
         return Verdict(NAMED if found.adequacy_p > ADEQUATE else NAMED_AND_REST, (best.kind,))
     label_set = _label_set(found.ranking)
     missing = {ranked.kind for ranked in found.ranking if ranked.physics or ranked.kind == UNKNOWN_KIND}
-    strong = found.chance <= CLAIM * found.alpha
     left = best.physics and UNKNOWN_KIND in label_set and found.adequacy_p <= ADEQUATE
     few = best.physics and 1 < len(label_set) <= MEMBERS and missing.issuperset(label_set)
-    plain = strong or found.sure > TENFOLD
-    if found.paired(found.sure) and plain and few and not left and found.gain > 0.0:
+    if found.paired(found.sure) and found.plain and few and not left and found.gain > 0.0:
         return Verdict(GROUP, label_set, "; ".join(vetoes))
     nameless = left or (best.kind == UNKNOWN_KIND and best.probability >= 0.5)
-    if found.paired(found.unknown_sure) and strong and nameless:
+    if found.paired(found.unknown_sure) and found.strong and nameless:
         if found.unknown_sure > TENFOLD:
             return Verdict(UNKNOWN, (best.kind,) if left else ())
         vetoes = ["a force without a name fits better than a mechanism, but does not predict points that were held out"]
@@ -186,7 +194,7 @@ def decide(found: Evidence) -> Verdict:
 
 def _vetoes(found: Evidence) -> list[str]:
     vetoes = []
-    if found.chance > CLAIM * found.alpha and found.sure <= TENFOLD:
+    if not found.plain:
         vetoes.append("the alarm is too weak to claim more")
     if not found.paired(found.sure):
         vetoes.append("so many recorded points contradict those around them that they may be paired wrongly")

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.atomic import whole_file
+from warpbrain.diagnosis.noise import noise_factor
 from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.diagnosis.sensing import explanation_of
 from warpbrain.report.files import MILLIMETRES
 
 
@@ -22,10 +22,9 @@ def write_covariance(path: Path, found: Diagnosis) -> None:
     """
     base = found.base
     sensors = base.at.sensors
-    columns = base.nuisances.columns
-    noise = base.explanation.best_kappa(base.whitened) * explanation_of(sensors, base.noise, columns).factor
+    noise = base.explanation.best_kappa(base.whitened) * noise_factor(sensors, base.noise)
     factors = np.where(sensors.is_displacement, MILLIMETRES, 1.0)[:, None]
-    parts = factors * np.column_stack([noise, columns])
+    parts = factors * np.column_stack([noise, base.nuisances.columns])
     # half the digits: variances are a million times the least of them, not more
     covariance = (parts @ parts.T).astype(np.float32)
     with whole_file(path) as temporary, temporary.open("wb") as stream:
