@@ -1,4 +1,4 @@
-"""What all tests share: a quiet Warp, and the devices and precisions that a test runs on."""
+"""What all tests share: a quiet Warp, devices and precisions that a test runs on, and the table of verification."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 import warp as wp
+from verification_rows import Row, Rows
 
 from warpbrain.kernels.precision import PRECISIONS, Precision
 
@@ -14,6 +15,39 @@ if TYPE_CHECKING:
     from warpbrain.diagnosis.result import Diagnosis
 
 wp.config.log_level = wp.LOG_WARNING
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--verification-rows", metavar="FILE", help="write the rows of docs/verification.md to a JSON file"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[ROWS] = Rows()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if "verify" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.verification)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if file := session.config.getoption("--verification-rows"):
+        session.config.stash[ROWS].write(file)
+
+
+ROWS = pytest.StashKey[Rows]()
+
+
+@pytest.fixture
+def verify(request: pytest.FixtureRequest) -> Iterator[Row]:
+    """Asserts that a number lies within a bound of its reference, as a row of docs/verification.md."""
+    row = Row(request.node.nodeid)
+    yield row
+    request.config.stash[ROWS].add(row)
+
 
 DEVICES = ["cpu"]
 if wp.get_cuda_device_count() > 0:
