@@ -12,7 +12,7 @@ first. What is kept, and for how long:
 - by bytes of coordinates: sites of a diagnosis (`diagnosis.sensors`);
 - as long as a `Case` or a `Model` lives: what is left of a resection, midside nodes, unit forces of the loads;
 - as long as the process lives: kernels, compiled and loaded, and memory that a GPU's pool keeps. Only these are warm
-  here: the paper's kernels are compiled too.
+  here: that is paid once on a machine or in a process, not for a mesh.
 
 A fresh mesh is therefore another object, and differs in content from every other: no cache by identity or by bytes,
 those above or those to come, can answer for it.

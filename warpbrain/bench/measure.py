@@ -73,7 +73,7 @@ def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, 
         Relative tolerance of the linear solves.
     """
     case = find_case(row.case, row.tissue)
-    # loads every kernel: the paper's are compiled before as well
+    # loads every kernel, which is done once in a process and not for a mesh
     first = preprocess(case, fresh_arrays(case.mesh, 0), device, precision, tolerance)
     first.capture()
     for _ in range(max(1, warmup)):
