@@ -12,13 +12,16 @@ from warpbrain.mesh.surface import (
     boundary_faces,
     closed_surfaces,
     face_vectors,
+    faces_of,
     interface_faces,
     node_areas,
     nodes_of,
     pinched_nodes,
+    rim_edges,
     split_boundary,
     tangents,
     vertex_normals,
+    wall_nodes,
 )
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 
@@ -33,6 +36,7 @@ __all__ = [
     "components",
     "dihedral_angles",
     "face_vectors",
+    "faces_of",
     "interface_faces",
     "measure",
     "node_areas",
@@ -41,10 +45,12 @@ __all__ = [
     "pinched_nodes",
     "read_mesh",
     "read_mesh_file",
+    "rim_edges",
     "split_boundary",
     "surface_forces",
     "tangents",
     "vertex_normals",
     "volume_forces",
+    "wall_nodes",
     "write_mesh",
 ]

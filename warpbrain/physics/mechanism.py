@@ -137,7 +137,7 @@ class Facts:
     Attributes
     ----------
     mesh : TetMesh
-        The imaged anatomy, whole.
+        The imaged anatomy: of what removes elements the whole, of all else what is left then.
     gravity_axis : (float, float, float) or None
     density : float
         [kg/m3]

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from warpbrain.kernels.distance_field import smooth_distance
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
-from warpbrain.mesh import TetMesh, node_areas, vertex_normals
+from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
 from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
@@ -133,8 +133,7 @@ class Contact(Mechanism):
         """Points [m] and outward triangles of the surface it touches."""
         if self.surface is not None:
             return self.surface.points, self.surface.outward
-        own = mesh.boundary
-        own = own[mesh.node_sets[self.nodes][own].all(axis=1)]
+        own = faces_of(mesh, mesh.node_sets[self.nodes])
         if not len(own):
             raise ParameterError("nodes", f"node set '{self.nodes}' holds no face of the surface")
         return mesh.points, own
