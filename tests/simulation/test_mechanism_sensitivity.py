@@ -127,6 +127,7 @@ def check(system: System, models: Callable, theta: Floats, scales: Floats, step:
 def check_alone(name: str, elements: str, device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # constraints are met as well as derivatives are to be compared
     monkeypatch.setattr(contact, "_NEAR", 1e-13)
+    monkeypatch.setattr(contact, "_STUCK", 1e-13)
     plain, mechanism = body_for(name, elements), example(name)
 
     def models(theta: Floats) -> Model:

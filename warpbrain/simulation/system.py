@@ -629,6 +629,11 @@ class System:
         return total
 
     @property
+    def constrained(self) -> NDArray[np.bool_]:
+        """Components (n, 3) of the displacement that are prescribed."""
+        return self.model.constrained
+
+    @property
     def movable(self) -> NDArray[np.bool_]:
         """Nodes (n,) of which some component is not prescribed."""
         return np.asarray(~self.model.constrained.all(axis=1))

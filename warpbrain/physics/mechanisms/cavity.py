@@ -5,11 +5,11 @@ load and `r` what is left of them. What is taken out has the velocity that it ha
 element turns inside out, so walls that meet lean on each other through what is left between them: the contact through
 a third medium of Wriggers, Schroeder and Schwarz (2013).
 
-A fluid at the pressure `p` presses on the wall, the faces between the set and the tissue that stays, and follows it: the
-load of `pressure` on the wall of a `resection`, which is the limit for `r` to 0. A set that reaches the surface of
-the body has an open wall, and the faces of the set on that surface carry nothing: what closes the opening (skull, dura,
-a dressing) bears the fluid there. What the rim of an open wall does is said in `pressure`: if it moves, the load has no
-energy, the skew part of the tangent along it is left out, and Newton's method converges linearly.
+A fluid at the pressure `p` presses on the wall, the faces between the set and the tissue that stays, and follows it:
+the load of `pressure` on the wall of a `resection`, which is the limit for `r` to 0. A set that reaches the surface of
+the body has an open wall, and the faces of the set on that surface carry nothing: what closes the opening (skull,
+dura, a dressing) bears the fluid there. What the rim of an open wall does is said in `pressure`: if it moves, the load
+has no energy, the skew part of the tangent along it is left out, and Newton's method converges linearly.
 
 A limit: what other mechanisms add to the law of these elements (fibres, residual stress, viscosity) is not taken out.
 Leave these elements out of its element set.
