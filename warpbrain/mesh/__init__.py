@@ -6,6 +6,7 @@ Importing this package costs NumPy and nothing else; SciPy and meshio are import
 from warpbrain.mesh.files import MeshInFile, read_mesh, read_mesh_file, write_mesh
 from warpbrain.mesh.integrals import surface_forces, volume_forces
 from warpbrain.mesh.ordering import ordered
+from warpbrain.mesh.patches import patch_around
 from warpbrain.mesh.quadratic import QuadraticMesh
 from warpbrain.mesh.quality import Quality, components, dihedral_angles, measure
 from warpbrain.mesh.surface import (
@@ -42,6 +43,7 @@ __all__ = [
     "node_areas",
     "nodes_of",
     "ordered",
+    "patch_around",
     "pinched_nodes",
     "read_mesh",
     "read_mesh_file",

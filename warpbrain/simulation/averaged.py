@@ -5,9 +5,9 @@
 `F_a` is the mean of the deformation gradients of the elements of one tissue around node a, weighted by a quarter of
 their volumes, `V_a` that volume. What is taken out little by little has means of its own: with those of what stays it
 would hold the wall of a cavity, however little of it is left. `Psi'` is the law with a volumetric modulus of at most
-`KEPT` shear moduli, `s` a small part. The first sum alone does not lock, and bends better than linear tetrahedra do, but has modes that alternate
-from element to element without energy; the elements' own part gives them some. Energies are linear in the volumetric
-modulus, so the first sum is the law with another one, times 1 - s.
+`KEPT` shear moduli, `s` a small part. The first sum alone does not lock, and bends better than linear tetrahedra do,
+but has modes that alternate from element to element without energy; the elements' own part gives them some. Energies
+are linear in the volumetric modulus, so the first sum is the law with another one, times 1 - s.
 """
 
 from __future__ import annotations
