@@ -9,16 +9,18 @@ from warpbrain.mesh.surface import face_vectors
 from warpbrain.mesh.tet_mesh import Bools, Floats
 
 _SIDES = np.array([[0, 1], [1, 2], [2, 0]])
+#: Cosine of the angle between two triangles that face different ways: a right angle, but for rounding.
+_ASIDE = 1e-6
 
 
 def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius: float) -> NDArray[np.int64]:
     """Triangles that belong to the patch of a surface around the point of it that is nearest to a centre.
 
-    Those that come within the radius, face the same way as the surface at that point (less than a right angle from it),
-    and hang together with it through edges within the radius of such triangles. A ball alone would hold the far side of
-    a thin body, a ventricle's wall under a thin mantle and the other bank of a sulcus. Distances along the surface
-    would tell the first two apart as well, but not the two faces of an edge, and paths along the edges of triangles are
-    as much too long as the mesh is coarse.
+    Those that come within the radius, face the same way as the triangle at that point (less than a right angle from
+    it), and hang together with it through edges within the radius of such triangles. A ball alone would hold the far
+    side of a thin body, a ventricle's wall under a thin mantle and the other bank of a sulcus. Distances along the
+    surface would tell these apart as well where the way around is long, but not at an edge or a crest; paths along the
+    edges of triangles are as much too long as the mesh is coarse, and what they select jumps as a centre moves.
 
     Parameters
     ----------
@@ -48,16 +50,16 @@ def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius:
     start = int(np.argmin(distance))
     if distance[start] >= radius:
         return np.zeros(0, dtype=np.int64)
-    outwards = face_vectors(points, triangles[near])
-    facing = outwards @ _normal_at(points, triangles, triangles[near[start]], weights[start]) > 0.0
-    facing[start] = True
+    normals = face_vectors(points, triangles[near])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    facing = normals @ normals[start] > _ASIDE
     taken = np.flatnonzero((distance < radius) & facing)
     together = _connected(triangles[near[taken]], corners[near[taken]], radius)
     return np.asarray(near[taken[together == together[np.searchsorted(taken, start)]]])
 
 
 def nearest_to_origin(corners: Floats) -> Floats:
-    """Barycentric coordinates (k, 3) of the points of triangles with corners (k, 3, 3) that are nearest to the origin."""
+    """Barycentric coordinates (k, 3) of the points nearest to the origin of triangles with corners (k, 3, 3)."""
     a, along = corners[:, 0], corners[:, 1:] - corners[:, :1]
     metric = along @ along.transpose(0, 2, 1)
     inner = np.linalg.solve(metric, -np.einsum("kci,ki->kc", along, a)[..., None])[..., 0]
@@ -78,15 +80,6 @@ def _nearest_on_sides(ends: Floats) -> tuple[Floats, Floats]:
     along = ends[..., 1, :] - ends[..., 0, :]
     part = np.clip(-(ends[..., 0, :] * along).sum(axis=-1) / (along**2).sum(axis=-1), 0.0, 1.0)
     return part, np.linalg.norm(ends[..., 0, :] + part[..., None] * along, axis=-1)
-
-
-def _normal_at(points: ArrayLike, faces: NDArray[np.integer], face: NDArray[np.integer], weights: Floats) -> Floats:
-    """Direction (3,) of the surface in a triangle: between those of its nodes, each the mean of its triangles."""
-    own = faces[np.isin(faces, face).any(axis=1)]
-    vectors = face_vectors(points, own)
-    at_nodes = np.stack([vectors[(own == node).any(axis=1)].sum(axis=0) for node in face])
-    lengths = np.linalg.norm(at_nodes, axis=1, keepdims=True)
-    return np.asarray(weights @ (at_nodes / np.where(lengths > 0.0, lengths, 1.0)))
 
 
 def _connected(faces: NDArray[np.integer], corners: Floats, radius: float) -> NDArray[np.int64]:

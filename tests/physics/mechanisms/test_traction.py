@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from shapes import box, sphere
 
 from warpbrain.cases.shipped import find_case
-from warpbrain.mesh import QuadraticMesh, TetMesh, closed_surfaces, face_vectors, nodes_of, patch_around, vertex_normals
+from warpbrain.mesh import QuadraticMesh, TetMesh, closed_surfaces, face_vectors, nodes_of, patch_around
 from warpbrain.mesh.patches import nearest_to_origin
 from warpbrain.physics.mechanisms.traction import Traction
 
@@ -48,7 +48,7 @@ def test_one_side_of_a_slab_is_pressed(height, loaded, elements, verify):
     )
 
 
-@pytest.mark.parametrize("x", [0.006, 0.012, 0.03])
+@pytest.mark.parametrize("x", [0.002, 0.012, 0.03])
 def test_a_thin_slab_is_pressed_on_one_side_near_its_edge_too(x):
     """Where a ball holds both sides and the edge between them."""
     mesh = slab(0.006)
@@ -99,16 +99,14 @@ def test_a_patch_of_a_brain_is_one_piece_that_faces_one_way(name):
     mesh = find_case(name).remaining[0]
     faces, points = mesh.boundary, mesh.points
     middles = points[faces].mean(axis=1)
-    normals, at_nodes = face_vectors(points, faces), vertex_normals(mesh)
+    normals = face_vectors(points, faces)
     more = 0
     for face in np.random.default_rng(1).choice(len(faces), 60, replace=False):
         centre = middles[face]
         found = patch_around(points, faces, centre, RADIUS)
         assert face in found
         assert closed_surfaces(faces[found]).max() == 0
-        # seen from where the surface faces in the middle of this triangle
-        there = at_nodes[faces[face]].mean(axis=0)
-        assert np.all(normals[np.setdiff1d(found, face)] @ there > 0.0)
+        assert np.all(normals[found] @ normals[face] > 0.0)
         force = Traction(centre=tuple(centre), value=(0.0, 0.0, 1.0), radius=RADIUS).nodal_forces(mesh)
         assert not force[~nodes_of(faces[found], len(points))].any() and force.sum() > 0.0
         ball = np.linalg.norm(points[faces] - centre, axis=2).min(axis=1) < RADIUS

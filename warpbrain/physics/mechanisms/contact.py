@@ -10,12 +10,14 @@ energy, and from it the force and tangent
 
 `<p> = max(0, p)` where it can lift off, `p` where it only slides, `k` a penalty [Pa/m] and `q` the pressure that
 augmentation has found so far (Wriggers, Computational Contact Mechanics, 2nd ed., sections 6.3 and 6.7): in an
-equilibrium `q` becomes `<k g + q>` until what is left of `g` is small, and the `q` that is kept is the one that the state
-is in equilibrium with. Where the surface is stuck, `g` and `q` are vectors, the displacement and a traction, until
-what is left of the displacement is 5e-8 m. Motion knows no augmentation: there a stuck node gives way by its load over
-`k A`. With friction `f`, a force of at most `f A p` against the tangential
-displacement `s` since the reference: right while a load grows, without memory of a path. Pressure and direction are
-there those of the last augmentation, which is repeated until they do not change, or of the last time step: so the friction has an energy,
+equilibrium `q` becomes `<k g + q>` until what is left of `g` is small, and the `q` that is kept is the one that the
+state is in equilibrium with. Where the surface is stuck, `g` and `q` are vectors, the displacement and a traction,
+until what is left of the displacement is 5e-8 m. Motion knows no augmentation: there a stuck node gives way by its
+load over `k A`.
+
+With friction `f`, a force of at most `f A p` against the tangential displacement `s` since the reference: right while
+a load grows, without memory of a path. Pressure and direction are there those of the last augmentation, which is
+repeated until they are those of the state to 0.1 %, or of the last time step: so the friction has an energy,
 `f A p (sqrt(s^2 + d^2) - d)`, with `d` = 0.1 mm, over which it builds up.
 """
 
