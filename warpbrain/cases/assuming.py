@@ -69,7 +69,8 @@ def assume(case: Case, said: str) -> Case:
         raise InputError(f"{said}: {missing[0]} is missing{f' [{says.unit}]' if says.unit else ''}: {says.doc}")
     others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
     try:
-        made = mechanism.of_case(values, Facts(left_by(others, named.mesh), case.gravity_axis, case.density))
+        left = left_by(others, named.mesh)
+        made = mechanism.of_case(values, Facts(named.mesh, case.gravity_axis, case.density, left))
     except ParameterError as error:
         raise InputError(f"{said}: {error.key}: {error}") from None
     except InputError as error:
