@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from warpbrain.cases.case import Case
-from warpbrain.cases.parts.mechanisms import in_si
+from warpbrain.cases.parts.mechanisms import in_si, left_by
 from warpbrain.cases.parts.named import Named
 from warpbrain.errors import InputError
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Says
@@ -67,13 +67,14 @@ def assume(case: Case, said: str) -> Case:
     if missing:
         says = mechanism.parameters()[missing[0]]
         raise InputError(f"{said}: {missing[0]} is missing{f' [{says.unit}]' if says.unit else ''}: {says.doc}")
+    others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
     try:
-        made = mechanism.of_case(values, Facts(named.mesh, case.gravity_axis, case.density))
+        left = left_by(others, named.mesh)
+        made = mechanism.of_case(values, Facts(named.mesh, case.gravity_axis, case.density, left))
     except ParameterError as error:
         raise InputError(f"{said}: {error.key}: {error}") from None
     except InputError as error:
         raise InputError(f"{said}: {error}") from None
-    others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
     return replace(case, mesh=named.mesh, mechanisms=(*others, made))
 
 

@@ -141,11 +141,14 @@ class Facts:
     gravity_axis : (float, float, float) or None
     density : float
         [kg/m3]
+    left : TetMesh or None
+        What of it is left by mechanisms that remove elements, on which all others act; None: the whole.
     """
 
     mesh: TetMesh
     gravity_axis: tuple[float, float, float] | None = None
     density: float = 1211.5
+    left: TetMesh | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,7 +227,7 @@ class Mechanism(Ramped, abc.ABC):
             If a parameter makes no sense in this case.
         """
         made = cls(**values)
-        made.check(facts.mesh)
+        made.check(facts.mesh if facts.left is None else facts.left)
         return made
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.ramps import read_ramp
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
-from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Says
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing, Says
 from warpbrain.physics.mechanisms import mechanisms
 
 #: What to do where something of the case itself is missing.
@@ -35,15 +37,15 @@ def read_mechanisms(
     density : float
         [kg/m3]
     """
-    found: list[Mechanism] = []
+    found: dict[int, Mechanism] = {}
     kinds: set[str] = set()
-    for table in context.lists(MECHANISM):
-        if table.variant is None:
-            continue
-        mechanism = mechanisms()[table.variant]
-        if table.variant in kinds and not mechanism.several:
-            table.problem("kind", f"a second '{table.variant}': it would act twice")
-        kinds.add(table.variant)
+    # all others act on what is left by those that remove elements
+    tables = [(place, t.variant, t) for place, t in enumerate(context.lists(MECHANISM)) if t.variant is not None]
+    for place, kind, table in sorted(tables, key=lambda entry: not issubclass(mechanisms()[entry[1]], Removing)):
+        mechanism = mechanisms()[kind]
+        if kind in kinds and not mechanism.several:
+            table.problem("kind", f"a second '{kind}': it would act twice")
+        kinds.add(kind)
         ramp = read_ramp(table)
         if named is None or ramp is None or not all(table.has(name) for name in mechanism.required()):
             continue
@@ -55,12 +57,21 @@ def read_mechanisms(
         if any(value is None for value in values.values()):
             continue
         try:
-            found.append(mechanism.of_case(values | {"ramp": ramp}, Facts(named.mesh, axis, density)))
+            facts = Facts(named.mesh, axis, density, left_by(found.values(), named.mesh))
+            found[place] = mechanism.of_case(values | {"ramp": ramp}, facts)
         except ParameterError as error:
             _note(context, table, error)
         except InputError as error:
             table.problem("kind", str(error))
-    return tuple(found)
+    return tuple(found[place] for place in sorted(found))
+
+
+def left_by(acting: Iterable[Mechanism], mesh: TetMesh) -> TetMesh:
+    """What is left of a mesh by those mechanisms that remove elements."""
+    for mechanism in acting:
+        if isinstance(mechanism, Removing):
+            mesh, _ = mechanism.remaining(mesh)
+    return mesh
 
 
 def _value(context: Context, table: Reading, named: Named, name: str, says: Says) -> Any:
