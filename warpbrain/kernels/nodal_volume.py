@@ -40,12 +40,12 @@ class NodalVolumeKernels:
     gather : wp.Kernel
         ``(first, parts, of_elements) -> g``, one thread for a node of a patch.
     diagonal : wp.Kernel
-        ``(first, entries, patches, c, g) -> blocks``, one thread for a node.
+        ``(first, entries, patches, c, g) -> g in the order of nodes, blocks``, one thread for a node.
     taken_up : wp.Kernel
         ``(first, nodes, c, g, columns, x) -> change of p_a``, one thread for a patch.
     push : wp.Kernel
-        ``(first, entries, patches, g, change, diagonal, columns, rows, x, factor, scale) -> y``, one thread for a node:
-        without the diagonal blocks, added to `y`.
+        ``(first, patches, g in the order of nodes, change, diagonal, columns, rows, x, factor, scale) -> y``, one
+        thread for a node: without the diagonal blocks, added to `y`.
     """
 
     moments: Any
@@ -201,13 +201,16 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
         patches: wp.array[int],
         c: wp.array[scalar],
         g: wp.array[vec3],
+        by_node: wp.array[vec3],
         blocks: wp.array2d[mat33],
     ):
         b = wp.tid()
         found = mat33()
         for k in range(first[b], first[b + 1]):
-            entry = entries[k]
-            found += wp.outer(c[patches[entry]] * g[entry], g[entry])
+            own = g[entries[k]]
+            # every product with a vector reads this, one after the other
+            by_node[k] = own
+            found += wp.outer(c[patches[k]] * own, own)
         blocks[b, 0] = found
 
     @wp.kernel(module=module)
@@ -230,9 +233,8 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
     @wp.kernel(module=module)
     def push(
         first: wp.array[int],
-        entries: wp.array[int],
         patches: wp.array[int],
-        g: wp.array[vec3],
+        by_node: wp.array[vec3],
         change: wp.array[scalar],
         own: wp.array2d[mat33],
         columns: wp.array[vec3],
@@ -245,8 +247,7 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
         b = wp.tid()
         found = -(own[b, 0] * wp.cw_mul(columns[b], x[b]))
         for k in range(first[b], first[b + 1]):
-            entry = entries[k]
-            found += change[patches[entry]] * g[entry]
+            found += change[patches[k]] * by_node[k]
         y[b] += factor * scale[0] * wp.cw_mul(rows[b], found)
 
     return NodalVolumeKernels(moments, pressures, forces, tangents, gather, diagonal, taken_up, push)

@@ -171,8 +171,9 @@ class PatchStiffnessTerm(Term):
         self._part_first, self._parts = ints(np.r_[starts, len(parts)]), ints(parts)
         self._patch_first = ints(np.searchsorted(patches, np.arange(volumes.count + 1)))
         self._node_first = ints(np.searchsorted(nodes[entries], np.arange(size + 1)))
-        self._patches, self._nodes, self._entries = ints(patches), ints(nodes), ints(entries)
-        self._g = wp.zeros(len(starts), dtype=p.vec3, device=device)
+        self._nodes, self._entries, self._patches = ints(nodes), ints(entries), ints(patches[entries])
+        # in the order of patches, and in that of nodes
+        self._g, self._by_node = (wp.zeros(len(starts), dtype=p.vec3, device=device) for _ in range(2))
         self._change = wp.zeros(volumes.count, dtype=p.scalar, device=device)
         self._one = wp.ones(1, dtype=p.scalar, device=device)
 
@@ -191,8 +192,10 @@ class PatchStiffnessTerm(Term):
         k, size = self._kernels, len(self.stencils)
         of_elements = self._volumes.of_elements.flatten()
         self._launch(k.gather, len(self._g), self._part_first, self._parts, of_elements, self._g)
-        inputs = (self._node_first, self._entries, self._patches, self._volumes.curvature, self._g, self.blocks)
-        self._launch(k.diagonal, size, *inputs)
+        self._launch(
+            k.diagonal, size, self._node_first, self._entries, self._patches, self._volumes.curvature, self._g,
+            self._by_node, self.blocks,
+        )  # fmt: skip
 
     def add_stiffness(
         self,
@@ -208,16 +211,16 @@ class PatchStiffnessTerm(Term):
         inputs = (self._patch_first, self._nodes, self._volumes.curvature, self._g, columns, x, self._change)
         self._launch(k.taken_up, self._volumes.count, *inputs)
         self._launch(
-            k.push, size, self._node_first, self._entries, self._patches, self._g, self._change, self.blocks, columns,
-            rows, x, self.body.precision.scalar(factor), self._one if scale is None else scale, y,
+            k.push, size, self._node_first, self._patches, self._by_node, self._change, self.blocks, columns, rows, x,
+            self.body.precision.scalar(factor), self._one if scale is None else scale, y,
         )  # fmt: skip
 
     def stiffness(self) -> Any:
         """What is not in blocks, as a SciPy matrix (3 n, 3 n) [N/m]."""
         from scipy.sparse import block_diag, csr_matrix, diags
 
-        g = self._g.numpy().astype(np.float64)
-        columns = 3 * self._nodes.numpy()[:, None] + np.arange(3)
+        g = self._by_node.numpy().astype(np.float64)
+        columns = 3 * self._nodes.numpy()[self._entries.numpy(), None] + np.arange(3)
         shape = (self._volumes.count, 3 * len(self.stencils))
         G = csr_matrix((g.ravel(), (np.repeat(self._patches.numpy(), 3), columns.ravel())), shape)
         own = block_diag(list(self.blocks.numpy()[:, 0].astype(np.float64)))
