@@ -13,7 +13,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.simulation.model import ELEMENTS, Material
+from warpbrain.simulation.model import ELEMENTS, QUADRATIC, Material
 from warpbrain.simulation.system import System
 
 #: One of each kind that acts within a system.

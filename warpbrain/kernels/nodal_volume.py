@@ -1,14 +1,14 @@
 """Kernels of a volume ratio that quadratic tetrahedra share at their corners; see `warpbrain.simulation.mixed`.
 
 A patch is the elements of one tissue around one corner a. With its shape function `L_a` and quadrature points of weight
-`w` (`warpbrain.kernels.ten_nodes`), its volume is `M_a = sum w L_a J`, and the derivative of that by the displacement of
-node b is `g_ab = sum w L_a cof(F) grad N_b`. An energy `E(M_a)` of each patch has
+`w` (`warpbrain.kernels.ten_nodes`), its volume is `M_a = sum w L_a J`, and the derivative of that by the displacement
+of node b is `g_ab = sum w L_a cof(F) grad N_b`. An energy `E(M_a)` of each patch has
 
     f_b  = sum w p cof(F) grad N_b,                      p = sum_a L_a p_a,   p_a = dE/dM_a
     K_bc = sum w p [F (grad N_c x grad N_b)]_x  +  sum_a c_a g_ab (x) g_ac,   c_a = d2E/dM_a2
 
-where `[v]_x` is the matrix of `v x`, from the derivative of the cofactor. The last sum couples every two nodes of a patch.
-It is not assembled: of it there are diagonal blocks, for preconditioners, and products with vectors.
+where `[v]_x` is the matrix of `v x`, from the derivative of the cofactor. The last sum couples every two nodes of a
+patch. It is not assembled: of it there are diagonal blocks, for preconditioners, and products with vectors.
 """
 
 from dataclasses import dataclass

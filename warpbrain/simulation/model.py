@@ -166,15 +166,11 @@ class Model:
         """Raise `InputError` if something acts that knows nothing of the midside nodes that the elements have."""
         if self.elements not in QUADRATIC:
             return
-        following = [m for m in self.mechanisms if isinstance(m, Following)]
-        acting: list[Load | Mechanism] = [*self.loads, *following]
-        for each in acting:
-            if not each.quadratic:
-                name = getattr(each, "kind", type(each).__name__)
-                raise InputError(
-                    f"{name}: cannot act on elements '{self.elements}', whose midside nodes it does not know: expected tet4 or "
-                    "tet4-averaged"
-                )
+        for name in unaware_of_midsides(self):
+            raise InputError(
+                f"{name}: cannot act on elements '{self.elements}', whose midside nodes it does not know: expected "
+                "tet4 or tet4-averaged"
+            )
 
     @cached_property
     def quadratic(self) -> QuadraticMesh | None:
@@ -244,6 +240,13 @@ class Model:
         for load, forces in zip(self.loads, self._unit_forces, strict=True):
             total += load.factor(time) * (left * forces if load.by_volume else forces)
         return total
+
+
+def unaware_of_midsides(model: Model) -> list[str]:
+    """Names of what acts and cannot act on elements with midside nodes."""
+    following = [m for m in model.mechanisms if isinstance(m, Following)]
+    acting: list[Load | Mechanism] = [*model.loads, *following]
+    return [getattr(each, "kind", type(each).__name__) for each in acting if not each.quadratic]
 
 
 def _with_midsides(mesh: QuadraticMesh, constrained: Bools, prescribed: Floats) -> tuple[Bools, Floats]:
