@@ -1,7 +1,7 @@
 """How far elements lock in nearly incompressible tissue, and which a model has if nobody asks for others.
 
-The figures are those of `python bench/elements.py` (docs/solvers.md): a block of irregular tetrahedra, three through its
-height, that bends under its weight, beside P2-P1 elements of scikit-fem on the same mesh.
+The figures are those of `python bench/elements.py` (docs/solvers.md): a block of irregular tetrahedra, three through
+its height, that bends under its weight, beside P2-P1 elements of scikit-fem on the same mesh.
 """
 
 from __future__ import annotations

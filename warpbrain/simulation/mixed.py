@@ -5,10 +5,13 @@ around a corner a with its linear shape function `L_a` as weight,
 
     Pi = sum_e int_e Psi'(F) dV + sum_a V_a k_a U(theta_a),    theta_a = int L_a J dV / V_a,    V_a = int L_a dV
 
-This is the three-field functional of Simo, Taylor and Pister (1985) with volume ratio and pressure `p_a = k_a U'(theta_a)`
-at corners, whose matrix of `L_a L_b` is lumped: so each is known from the displacement, and what is left is a potential
-of displacements alone. There is one volume ratio for each corner, where `tet10` has four for each element: that many lock
-where elements are irregular and nearly incompressible.
+This is the three-field functional of Simo, Taylor and Pister (1985) with volume ratio and pressure
+`p_a = k_a U'(theta_a)` at corners, whose matrix of `L_a L_b` is lumped: so each is known from the displacement, and
+what is left is a potential of displacements alone. There is one volume ratio for each corner, where `tet10` has four for
+each element: that many lock where elements are irregular and nearly incompressible.
+
+Of laws of the coupled formulation `Psi'` is what is left without `lam`, which resists a change of volume too, as two
+thirds of the shear modulus do: at each point, which is no more than a percent stiffer.
 
 Where parts of a tissue are stiffer than others, `1 / k_a` is the mean of `1 / k`: as for one pressure in all of them.
 The tangent (`warpbrain.kernels.nodal_volume`) is consistent and symmetric. What couples all nodes of a patch is not
