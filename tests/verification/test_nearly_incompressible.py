@@ -38,8 +38,10 @@ def error(elements: str, poisson: float, formulation: str, device: str) -> float
     return float(np.vdot(force, u)) / reference(poisson) - 1.0
 
 
-@pytest.mark.parametrize(("formulation", "bound"), [("coupled", 1e-2), ("uncoupled", 1e-3)])
-@pytest.mark.parametrize("poisson", [0.499, 0.4999])
+@pytest.mark.parametrize(
+    ("poisson", "formulation", "bound"),
+    [(0.499, "uncoupled", 1e-3), (0.4999, "uncoupled", 1e-4), (0.4999, "coupled", 1e-2)],
+)
 def test_mixed_ones_do_not_lock(poisson: float, formulation: str, bound: float, device: str, verify: Row) -> None:
     """Three elements through the height; `tet10` is 14 and 20 % too stiff there. Strains are 1e-3 at most.
 

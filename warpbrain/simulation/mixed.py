@@ -7,8 +7,8 @@ around a corner a with its linear shape function `L_a` as weight,
 
 This is the three-field functional of Simo, Taylor and Pister (1985) with volume ratio and pressure
 `p_a = k_a U'(theta_a)` at corners, whose matrix of `L_a L_b` is lumped: so each is known from the displacement, and
-what is left is a potential of displacements alone. There is one volume ratio for each corner, where `tet10` has four for
-each element: that many lock where elements are irregular and nearly incompressible.
+what is left is a potential of displacements alone. There is one volume ratio for each corner, where `tet10` has four
+for each element: that many lock where elements are irregular and nearly incompressible.
 
 Of laws of the coupled formulation `Psi'` is what is left without `lam`, which resists a change of volume too, as two
 thirds of the shear modulus do: at each point, which is no more than a percent stiffer.
@@ -98,7 +98,8 @@ class NodalVolumeTerm(Term):
         """
 
         def total(values: Floats) -> Floats:
-            return np.bincount(self._patches.ravel(), self._shares * np.repeat(values, 4), self.count)
+            found = np.bincount(self._patches.ravel(), self._shares * np.repeat(values, 4), self.count)
+            return found.astype(np.float64)
 
         self._volumes = total(growth)
         with np.errstate(divide="ignore"):

@@ -114,7 +114,7 @@ class Model:
         Histories of prescribed displacements, which end at `prescribed`.
     damping : Damping
     elements : str
-        One of `ELEMENTS`: plain linear tetrahedra, linear ones that do not lock (`warpbrain.simulation.averaged`),
+        One of `ELEMENTS`: plain linear tetrahedra, linear ones that lock less (`warpbrain.simulation.averaged`),
         quadratic ones with straight sides (`warpbrain.mesh.quadratic`), or these with a pressure of their own, which
         do not lock either (`warpbrain.simulation.mixed`).
 
