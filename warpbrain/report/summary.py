@@ -9,8 +9,8 @@ from typing import Any
 
 from warpbrain import __version__
 from warpbrain.cases.case import Case
-from warpbrain.simulation.locking import largest_poisson, locking_sentences
-from warpbrain.simulation.model import Model
+from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
+from warpbrain.simulation.model import Model, unaware_of_midsides
 from warpbrain.simulation.result import Result
 
 #: How the node sets are called where users read them.
@@ -32,6 +32,9 @@ _LEFT_OUT = (
 
 def left_out(model: Model, instead: str | None = None) -> list[str]:
     """What a model leaves out, a sentence each; `instead` as of `locking_sentences`."""
+    unaware = unaware_of_midsides(model)
+    if instead is None and unaware and largest_poisson(model) > NEARLY_INCOMPRESSIBLE:
+        instead = f"{', '.join(unaware)} cannot act on tet10-mixed, which do not lock"
     return [_LEFT_OUT, *locking_sentences(model.elements, largest_poisson(model), instead)]
 
 

@@ -77,7 +77,7 @@ def locking_sentences(elements: str, poisson: float, instead: str | None = None)
     )
     return [
         f"near-incompressible tissue is stiffer on {kind} than it is: at nu = {nearest:g} a coarse block of irregular "
-        f"ones bends {100.0 * stiffer:.0f} % less than of P2-P1 elements; {instead}"
+        f"ones bends {100.0 * stiffer:.0f} % less than one of P2-P1 elements; {instead}"
     ]
 
 
@@ -86,5 +86,5 @@ def on_linear_elements(poisson: float, what: str) -> list[str]:
     if poisson <= NEARLY_INCOMPRESSIBLE:
         return []
     return locking_sentences(
-        "tet4", poisson, f"{what} has no other elements: moduli that it names are too low by as much"
+        "tet4", poisson, f"{what} has no other elements: on such a mesh the moduli that it names are too low by as much"
     )
