@@ -44,6 +44,7 @@ class MeshArrays:
     node_sets: Mapping[str, NDArray[np.bool_]]
     element_sets: Mapping[str, NDArray[np.bool_]]
     element_vectors: Mapping[str, NDArray[np.float64]]
+    cut: NDArray[np.int32]
 
 
 def fresh_arrays(mesh: TetMesh, number: int) -> MeshArrays:
@@ -67,6 +68,7 @@ def fresh_arrays(mesh: TetMesh, number: int) -> MeshArrays:
         {name: members.copy() for name, members in mesh.node_sets.items()},
         {name: turned(members) for name, members in mesh.element_sets.items()},
         {name: turned(vectors) for name, vectors in mesh.element_vectors.items()},
+        mesh.cut.copy(),
     )
 
 
