@@ -12,6 +12,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.parts.mechanisms import in_si
 from warpbrain.cases.parts.named import Named
 from warpbrain.errors import InputError
+from warpbrain.physics.composition import require_composable, require_left
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Says
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.problems import Problems
@@ -34,7 +35,8 @@ def assume(case: Case, said: str) -> Case:
     Raises
     ------
     InputError
-        If there is no such mechanism or key, a value is not one, or something needed is missing.
+        If there is no such mechanism or key, a value is not one, something needed is missing, or the mechanism has no
+        meaning together with one that the case has.
 
     Examples
     --------
@@ -74,7 +76,12 @@ def assume(case: Case, said: str) -> Case:
     except InputError as error:
         raise InputError(f"{said}: {error}") from None
     others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
-    return replace(case, mesh=named.mesh, mechanisms=(*others, made))
+    acting = (*others, made)
+    try:
+        require_composable(acting, require_left(acting, named.mesh))
+    except InputError as error:
+        raise InputError(f"{said}: {error}") from None
+    return replace(case, mesh=named.mesh, mechanisms=acting)
 
 
 def _key(said: str, mechanism: type[Mechanism], word: str) -> str:

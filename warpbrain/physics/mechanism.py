@@ -1,4 +1,4 @@
-"""What a mechanism is: a piece of physics that a case can assume, in one file with four faces.
+"""What a mechanism is: a piece of physics that a case can assume, in one file with five faces.
 
 1. what it is: `kind`, `sentence` and `detail`;
 2. its parameters, the fields of the class made by `parameter`: unit, limits, what is expected of them and where that
@@ -6,7 +6,9 @@
 3. what it does: a mechanism is also one or several of `Load` (forces that do not follow the deformation), `Following`
    (a term with forces that do), `Weakening` (softer or stiffer elements), `Emptying` (lighter ones), `Growing` (larger
    or smaller ones), `Substituting` (another law) and `Removing` (fewer elements);
-4. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), an `example`, and how it
+4. how it enters the total potential (`enters`), so what it means together with others (`together`), and which of them
+   it excludes (`excludes`): see `warpbrain.physics.potential`;
+5. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), an `example`, and how it
    may act where a case does not declare it (`proposals`).
 
 Its derivatives by its parameters are nobody's work: `warpbrain.simulation.beside` differences what it does. For that a
@@ -34,6 +36,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.ramp import Ramped
 from warpbrain.physics.term import Following
@@ -163,6 +166,10 @@ class Mechanism(Ramped, abc.ABC):
     sentence: ClassVar[str]
     #: What `--with` says of it on the case `phantom-loaded`: its picture in the docs and its cost are of this.
     example: ClassVar[str]
+    #: How it enters the total potential.
+    enters: ClassVar[Enters]
+    #: What it means together with other kinds, by kind, where the total potential leaves something open.
+    together: ClassVar[Mapping[str, str]] = {}
     #: Kinds of mechanisms that have nearly the same effect.
     confused_with: ClassVar[tuple[str, ...]] = ()
     #: What must be observed to tell it from others, in words; empty: one deformed state is enough.
@@ -242,6 +249,19 @@ class Mechanism(Ramped, abc.ABC):
     def held(self, mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Nodes (k,), repeated if need be, and directions (k, 3) in which it holds them."""
         return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+
+    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+        """Elements (m,) whose tissue carries what it does, so that it means nothing without them; none by default."""
+        return np.zeros(len(mesh.tetrahedra), dtype=bool)
+
+    def excludes(self, other: Mechanism, mesh: TetMesh) -> str:
+        """Why it and another one have no meaning together on a mesh; empty if they have."""
+        return ""
+
+    @classmethod
+    def excluded(cls, other: type[Mechanism]) -> str:
+        """Where it excludes mechanisms of another kind, in words; empty if nowhere."""
+        return ""
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
 from warpbrain.mesh import QuadraticMesh, TetMesh
+from warpbrain.physics.composition import require_composable
 from warpbrain.physics.laws import Law
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Emptying, Following, Mechanism
@@ -120,6 +121,8 @@ class Model:
     InputError
         If a tissue has no material, an array has the wrong shape or holds NaN, the density is not positive, or
         something acts that the elements cannot have.
+    CompositionError
+        If two mechanisms have no meaning together.
     """
 
     mesh: TetMesh
@@ -137,6 +140,8 @@ class Model:
         if self.elements not in ELEMENTS:
             raise InputError(f"elements = {self.elements!r}: expected one of {', '.join(ELEMENTS)}")
         self._require_quadratic()
+        acting = [each for each in (*self.mechanisms, *self.loads) if isinstance(each, Mechanism)]
+        require_composable(acting, self.mesh)
         shape = self.node_mesh.points.shape
         constrained = np.zeros(shape, dtype=bool) if self.constrained is None else np.asarray(self.constrained)
         prescribed = np.zeros(shape) if self.prescribed is None else np.asarray(self.prescribed, dtype=np.float64)
@@ -211,15 +216,19 @@ class Model:
         """The mechanisms that take tissue out little by little."""
         return [mechanism for mechanism in self.mechanisms if isinstance(mechanism, Emptying)]
 
+    def remaining_parts(self, scales: Sequence[float]) -> Floats:
+        """Part (m,) of each element that is left, with a scale from 0 to 1 for each of `emptying`."""
+        part = np.ones(len(self.mesh.tetrahedra))
+        for mechanism, scale in zip(self.emptying, scales, strict=True):
+            part *= mechanism.remaining_part(self.mesh, scale)
+        return part
+
     def remaining_share(self, scales: Sequence[float]) -> Floats:
         """Share (n,) of the volume around each node that is left, with a scale from 0 to 1 for each of `emptying`."""
         if not self.emptying:
             return np.ones(len(self.constrained))
-        part = np.ones(len(self.mesh.tetrahedra))
-        for mechanism, scale in zip(self.emptying, scales, strict=True):
-            part *= mechanism.remaining_part(self.mesh, scale)
         nodes = self.quadratic or self.mesh
-        return np.asarray(nodes.lumped(part * self.mesh.volumes) / nodes.node_volumes)
+        return np.asarray(nodes.lumped(self.remaining_parts(scales) * self.mesh.volumes) / nodes.node_volumes)
 
     @property
     def mass(self) -> float:
