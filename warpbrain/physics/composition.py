@@ -88,7 +88,9 @@ def pairs() -> list[Pair]:
 def _pair(one: type[Mechanism], other: type[Mechanism]) -> Pair:
     kinds = (one.kind, other.kind)
     if one is other and not one.several:
-        return Pair(kinds, "", "", f"a second {one.kind}: it would act twice")
+        return Pair(
+            kinds, "", "", f"a case has one {one.kind}, a second one would act twice; that of `--with` takes its place"
+        )
     remark = one.together.get(other.kind, "") or other.together.get(one.kind, "")
     refused = one.excluded(other) or other.excluded(one)
     return Pair(kinds, potential([one.enters, other.enters]), remark, refused)

@@ -1,6 +1,7 @@
 """A region that is stiffer or softer than the tissue around it: a tumour, a scar.
 
-All moduli of an element are multiplied by `exp(s w)`, `w` how much it belongs to the region and `exp(s)` the ratio.
+All moduli of an element are multiplied by `exp(s w)`, `w` how much it belongs to the region and `exp(s)` the ratio:
+those of its law, of fibres and of viscosity. A residual stress is no modulus.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Viscoelasticity: stress that relaxes, as a Prony series on the isochoric part (Holzapfel 2000, section 6.10).
 
-The case's law is what is left after a long time. Each branch adds a second Piola-Kirchhoff stress `q_i` that follows
-the isochoric neo-Hookean stress of the tissue's shear modulus at rest, `S = mu0 J^(-2/3) (I - I1/3 C^-1)`:
+`F` is the elastic one where tissue swells, and an inclusion multiplies these stresses too. The case's law is what is
+left after a long time. Each branch adds a second Piola-Kirchhoff stress `q_i` that follows the isochoric neo-Hookean
+stress of the tissue's shear modulus at rest, `S = mu0 J^(-2/3) (I - I1/3 C^-1)`:
 
     dq_i/dt + q_i/tau_i = beta_i dS/dt
     q_i(t + h) = exp(-h/tau_i) q_i(t) + beta_i exp(-h/(2 tau_i)) (S(t + h) - S(t))
