@@ -328,8 +328,8 @@ class System:
             group.parameters.assign(self._parameters(law_type, members))
             for term in group.averaged:
                 term.set_elements(self._parameters(law_type, members, averaged_modulus), self.stiffness_factors)
-        for term in self._following:
-            term.take_moduli()
+        for following in self._following:
+            following.take_moduli()
 
     def _place_fields(self) -> None:
         p, n, m = self.precision, self.size, self.elements
@@ -710,9 +710,9 @@ class System:
                 elements, patch, stress = term.stress(self.u)
                 np.add.at(found, elements, 0.25 * (1.0 - PART) * stress[patch])
         found *= self.stiffness_factors[:, None, None]
-        for term in self.terms:
-            if term.elements is not None:
-                found[term.elements] += self._mean_stress(term, term.elements)
+        for added in self.terms:
+            if added.elements is not None:
+                found[added.elements] += self._mean_stress(added, added.elements)
         return found
 
     def _mean_stress(self, term: Term, elements: NDArray[np.integer]) -> Floats:
