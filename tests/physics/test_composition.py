@@ -203,6 +203,26 @@ def test_what_swells_freely_is_without_stress(elements: str, device: str, verify
     verify(f"free swelling with {', '.join(kinds)} ({elements}): no stress", "closed form", float(error), 1e-12)
 
 
+def test_swelling_in_time_strains_no_branch(device: str) -> None:
+    """What remembers sees the elastic stress, of each time by the growth of that time."""
+    swelling = mechanisms()["swelling"](amount=0.3, ramp=[(0.0, 0.0), (2.0, 1.0)])
+    model = model_of([swelling, mechanisms()["viscoelasticity"](**EXAMPLES["viscoelasticity"][0])])
+    system = System(model, device)
+    system.set_time_step(STEP)
+    for time in (0.5, 1.0, 2.0):
+        system.set_load(time=time)
+        system.u.assign((np.cbrt(1.0 + 0.15 * time) - 1.0) * model.mesh.points)
+        system.evaluate_forces()
+        system.gather_forces()
+        assert np.abs(system.internal.numpy()).max() < 1e-12 * MU
+        system.advance()
+
+
+def test_what_says_a_law_does_so_in_any_order() -> None:
+    both = acting_in("asymmetry", "compressibility")
+    assert model_of(both).materials == model_of(both[::-1]).materials
+
+
 @pytest.mark.parametrize("elements", ELEMENTS)
 @pytest.mark.parametrize("kind", ["asymmetry", "compressibility", "fibres", "swelling", "viscoelasticity"])
 def test_an_inclusion_multiplies_all_moduli(kind: str, elements: str, device: str, verify: Row) -> None:

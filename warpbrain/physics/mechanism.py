@@ -311,7 +311,7 @@ class Weakening(Protocol):
 
 @runtime_checkable
 class Emptying(Protocol):
-    """A mechanism that takes tissue away little by little, and its weight and mass with it."""
+    """A mechanism that takes tissue away little by little, and with it all that it does: weight, mass and tension."""
 
     def factor(self, time: float = math.inf) -> float:
         """Its scale at a time [s]; by default long after its ramp."""
