@@ -587,7 +587,7 @@ class System:
             self.stiffness_factors *= softer.stiffness_factor(mesh, scale)
         if emptying:
             left = scales[len(growing) + len(weakening) :]
-            self.remaining_parts = self.model.remaining_parts(left)
+            self.remaining_parts = self.model.remaining_part(left)
             self.mass.assign(self.model.node_masses * self.model.remaining_share(left))
         # a kernel multiplies all that an element does by its volume
         self.volume.assign((PART if self._averages else 1.0) * self.stiffness_factors * self._volumes)
