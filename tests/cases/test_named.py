@@ -5,17 +5,21 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from folders import block, write_folder
+from folders import SIDE, block, write_folder
 from shapes import room
 
 from warpbrain.cases.assuming import assume
 from warpbrain.cases.case import Case
 from warpbrain.cases.reading import read_case
+from warpbrain.cases.writing import write_case
 from warpbrain.errors import InputError
+from warpbrain.mesh import face_vectors, wall_nodes
 from warpbrain.physics.directions import element_directions
 from warpbrain.physics.mechanisms.contact import Contact
 from warpbrain.physics.mechanisms.fibres import Fibres
 from warpbrain.physics.mechanisms.gravity import Gravity
+from warpbrain.physics.mechanisms.pressure import Pressure
+from warpbrain.simulation.finer import FinerCase
 from warpbrain.simulation.of_case import model_of
 
 COUNT = len(block().tetrahedra)
@@ -181,3 +185,65 @@ def test_a_head_that_is_turned(tmp_path):
     assert "90.0 degrees" in said.detail()
     with pytest.raises(InputError, match=r"direction: found .*not all zero"):
         assume(free, "gravity:level=10,direction=0/0/0")
+
+
+WALL = '[[mechanism]]\nkind = "pressure"\nnodes = "{name}"\nvalue = 30.0\n\n'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{resection}[[mechanism]]\nkind = "pressure"\nnodes = "{name}"\nvalue = 30.0\n',
+        # in any order
+        '[[mechanism]]\nkind = "pressure"\nnodes = "{name}"\nvalue = 30.0\n{resection}',
+        '{resection}[[boundary]]\nname = "fluid"\nkind = "pressure"\nnodes = "{name}"\nvalue = 30.0\n',
+        # what users chose themselves
+        '{resection}[[boundary]]\nname = "fluid"\nkind = "pressure"\nnodes = "margin"\nvalue = 30.0\n',
+        '{resection}[[mechanism]]\nkind = "pressure"\nnodes = "margin"\nvalue = 30.0\n',
+    ],
+)
+def test_the_wall_of_a_resection_can_be_pressed(tmp_path, text):
+    resection = '[[mechanism]]\nkind = "resection"\nelements = "corner"\n'
+    folder = write_folder(tmp_path, ("[body]", text.format(resection=resection, name="corner") + "\n[body]"))
+    margin = wall_nodes(block(), "corner")
+    add_arrays(folder, margin=margin.astype(np.uint8))
+    case = read_case(folder)
+    model, _ = model_of(case)
+    (pressure,) = model.mechanisms
+    assert isinstance(pressure, Pressure)
+    faces = pressure.faces(model.mesh)
+    expected = 3.0 * (0.5 * SIDE) ** 2
+    assert np.linalg.norm(face_vectors(model.mesh.points, faces), axis=1).sum() == pytest.approx(expected)
+    # and on a mesh of half the size
+    finer, _ = model_of(FinerCase(case).case)
+    finer_faces = pressure.faces(finer.mesh)
+    assert np.linalg.norm(face_vectors(finer.mesh.points, finer_faces), axis=1).sum() == pytest.approx(expected)
+
+
+def test_the_wall_of_a_resection_can_be_pressed_from_the_command_line(tmp_path):
+    case = read_case(write_folder(tmp_path / "case"))
+    without = assume(case, "resection:elements=stiff")
+    pressed = assume(without, "pressure:nodes=stiff,value=30")
+    model, _ = model_of(pressed)
+    faces = pressed.mechanisms[-1].faces(model.mesh)
+    assert np.linalg.norm(face_vectors(model.mesh.points, faces), axis=1).sum() == pytest.approx(SIDE**2)
+    # it is written and read again
+    write_case(tmp_path / "again", pressed)
+    again, _ = model_of(read_case(tmp_path / "again"))
+    assert len(again.mechanisms[-1].faces(again.mesh)) == len(faces)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (WALL.format(name="corner"), "once that is taken out by a resection"),
+        (WALL.format(name="nowhere"), "the mesh has no node set 'nowhere'"),
+        ('[[boundary]]\nname = "a"\nkind = "pressure"\nnodes = "corner"\nvalue = 1.0\n', "take out 'corner'"),
+        ('[[boundary]]\nname = "a"\nkind = "sliding"\nnodes = "middle"\n', "holds no face of the surface"),
+    ],
+)
+def test_a_wall_of_what_is_still_there_is_none(tmp_path, text, expected):
+    folder = write_folder(tmp_path, ("[body]", text + "\n[body]"))
+    add_arrays(folder, middle=np.all(np.abs(block().points - 0.5 * SIDE) < 1e-9, axis=1).astype(np.uint8))
+    with pytest.raises(InputError, match=expected):
+        read_case(folder)

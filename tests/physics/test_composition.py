@@ -14,7 +14,7 @@ from verification_rows import Row
 from warpbrain.mesh import TetMesh, boundary_faces
 from warpbrain.physics.composition import CompositionError, pairs, require_composable, require_left
 from warpbrain.physics.laws import NeoHookean
-from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanism import Facts, Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.regions import elements_with
 from warpbrain.simulation.assumed import with_mechanisms
@@ -257,6 +257,17 @@ def test_a_stress_is_that_of_the_energy(device: str) -> None:
     own = np.einsum("e,eij,eaj->eai", model.mesh.volumes, system.stresses(), gradients)
     np.add.at(nodal, model.mesh.tetrahedra, own)
     assert largest(nodal, forces) < 1e-12
+
+
+def test_levels_are_counted_from_the_whole_anatomy() -> None:
+    """A resection of the lowest part does not move the fluid."""
+    mesh = body()
+    lower = mesh.points[mesh.tetrahedra].min(axis=1)[:, 2] < 0.1
+    mesh = replace(mesh, element_sets={"gone": lower})
+    facts = Facts(mesh, (0.0, 0.0, -1.0), DENSITY, (mechanisms()["resection"](elements="gone"),))
+    assert facts.left.points[:, 2].min() > mesh.points[:, 2].min() + 0.1
+    found = mechanisms()["gravity"].of_case({"csf_level": 0.5}, facts)
+    assert found.lowest == mesh.points[:, 2].min()
 
 
 # -- refused --------------------------------------------------------------------------------------------------------

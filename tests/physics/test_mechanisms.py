@@ -23,7 +23,7 @@ EXAMPLES: dict[str, dict] = {
     "inclusion": {"ratio": 3.0, "elements": "half"},
     "fibres": {"direction": (1.0, 2.0, 0.5), "stiffness": 500.0, "exponent": 2.0, "dispersion": 0.1},
     "falx": {"nodes": "all", "stiffness": 2e3, "thickness": 0.1},
-    # what acts on tissue that is taken out has no meaning: these are apart
+    # inside: the load on a wall that is open has no energy (mechanisms/test_cavity_wall.py); pores are apart from it
     "cavity": {"elements": "inside", "pressure": 150.0, "left": 0.2},
     "drainage": {
         "permeability": 1e-9,

@@ -13,7 +13,7 @@ from warpbrain.cases.parts.mechanisms import in_si
 from warpbrain.cases.parts.named import Named
 from warpbrain.errors import InputError
 from warpbrain.physics.composition import require_composable, require_left
-from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Says
+from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing, Says
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.problems import Problems
 
@@ -69,13 +69,15 @@ def assume(case: Case, said: str) -> Case:
     if missing:
         says = mechanism.parameters()[missing[0]]
         raise InputError(f"{said}: {missing[0]} is missing{f' [{says.unit}]' if says.unit else ''}: {says.doc}")
+    others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
+    removing = tuple(there for there in others if isinstance(there, Removing))
+    facts = Facts(named.mesh, case.gravity_axis, case.density, removing)
     try:
-        made = mechanism.of_case(values, Facts(named.mesh, case.gravity_axis, case.density))
+        made = mechanism.of_case(values, facts)
     except ParameterError as error:
         raise InputError(f"{said}: {error.key}: {error}") from None
     except InputError as error:
         raise InputError(f"{said}: {error}") from None
-    others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
     acting = (*others, made)
     try:
         require_composable(acting, require_left(acting, named.mesh))

@@ -10,7 +10,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.format.parsing import parse_toml
 from warpbrain.cases.format.tables import CASE, TABLES
 from warpbrain.cases.parts.anatomy import read_anatomy
-from warpbrain.cases.parts.boundaries import check_together, read_boundaries
+from warpbrain.cases.parts.boundaries import check_faces, check_together, read_boundaries
 from warpbrain.cases.parts.context import Context
 from warpbrain.cases.parts.mechanisms import read_mechanisms
 from warpbrain.cases.parts.named import Named
@@ -109,6 +109,7 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     except CompositionError as error:
         problems.add(file, "[[mechanism]]", str(error), "see docs/mechanisms/pairs.md")
     left = case.remaining[0]
+    check_faces(context, left, boundaries)
     for recording in recordings:
         if isinstance(recording, PointsRecording):
             check_points_inside(recording, left, file.parent / recording.file, problems)

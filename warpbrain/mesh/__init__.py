@@ -7,19 +7,23 @@ from warpbrain.mesh.files import MeshInFile, read_mesh, read_mesh_file, write_me
 from warpbrain.mesh.half_space import integrals_above, integrals_of_shapes, integrals_on_plane, summed_at_nodes
 from warpbrain.mesh.integrals import surface_forces, volume_forces
 from warpbrain.mesh.ordering import ordered
+from warpbrain.mesh.patches import patch_around
 from warpbrain.mesh.quadratic import QuadraticMesh
 from warpbrain.mesh.quality import Quality, components, dihedral_angles, measure
 from warpbrain.mesh.surface import (
     boundary_faces,
     closed_surfaces,
     face_vectors,
+    faces_of,
     interface_faces,
     node_areas,
     nodes_of,
     pinched_nodes,
+    rim_edges,
     split_boundary,
     tangents,
     vertex_normals,
+    wall_nodes,
 )
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 
@@ -34,6 +38,7 @@ __all__ = [
     "components",
     "dihedral_angles",
     "face_vectors",
+    "faces_of",
     "integrals_above",
     "integrals_of_shapes",
     "integrals_on_plane",
@@ -42,14 +47,17 @@ __all__ = [
     "node_areas",
     "nodes_of",
     "ordered",
+    "patch_around",
     "pinched_nodes",
     "read_mesh",
     "read_mesh_file",
+    "rim_edges",
     "split_boundary",
     "summed_at_nodes",
     "surface_forces",
     "tangents",
     "vertex_normals",
     "volume_forces",
+    "wall_nodes",
     "write_mesh",
 ]

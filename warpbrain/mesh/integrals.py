@@ -67,12 +67,16 @@ def volume_forces(mesh: TetMesh | QuadraticMesh, density: Field) -> Floats:
     return _summed(mesh, mesh.elements, _points_on(corners, bary), sizes, shape_values(bary), density)
 
 
-def surface_forces(mesh: TetMesh | QuadraticMesh, traction: Field) -> Floats:
-    """Forces (n, 3) [N] of a force on the boundary [Pa], by a rule of degree 4 on each triangle."""
+def surface_forces(
+    mesh: TetMesh | QuadraticMesh, traction: Field, triangles: NDArray[np.integer] | slice = slice(None)
+) -> Floats:
+    """Forces (n, 3) [N] of a force on the boundary [Pa], or on some of its triangles, by a rule of degree 4 on each."""
     bary, _ = triangle_rule()
     if isinstance(mesh, TetMesh):
-        return _summed(mesh, mesh.boundary, *mesh.boundary_rule, bary, traction)
-    return _summed(mesh, mesh.faces, *mesh.corners.boundary_rule, shape_values(bary), traction)
+        faces, shapes, (at, sizes) = mesh.boundary, bary, mesh.boundary_rule
+    else:
+        faces, shapes, (at, sizes) = mesh.faces, shape_values(bary), mesh.corners.boundary_rule
+    return _summed(mesh, faces[triangles], at[:, triangles], sizes[:, triangles], shapes, traction)
 
 
 def rule_on_boundary(mesh: TetMesh) -> tuple[Floats, Floats]:

@@ -51,16 +51,13 @@ class QuadraticMesh:
     def __post_init__(self) -> None:
         node_mesh, ends = refined(self.corners)
         corners = np.sort(self.corners.tetrahedra, axis=1)
-        elements = np.concatenate([corners, self._midsides(ends, corners[:, EDGES])], axis=1)
+        elements = np.concatenate([corners, _middles(len(self.corners.points), ends, corners[:, EDGES])], axis=1)
         for name, value in (("node_mesh", node_mesh), ("ends", ends), ("elements", elements.astype(np.int32))):
             object.__setattr__(self, name, value)
 
-    def _midsides(self, ends: Ints, edges: NDArray[np.integer]) -> NDArray[np.int64]:
+    def middles(self, edges: NDArray[np.integer]) -> NDArray[np.int64]:
         """Node in the middle of each edge (..., 2), its ends ascending."""
-        factors = np.array([len(self.corners.points), 1])
-        first = len(self.corners.points)
-        found = np.searchsorted(ends[first:].astype(np.int64) @ factors, edges.astype(np.int64) @ factors)
-        return np.asarray(first + found, dtype=np.int64)
+        return _middles(len(self.corners.points), self.ends, edges)
 
     @property
     def points(self) -> Floats:
@@ -96,7 +93,7 @@ class QuadraticMesh:
         """Triangles (k, 3) of corners with their midside nodes, (k, 6)."""
         corners = np.asarray(triangles)
         sides = np.sort(corners[:, [[0, 1], [0, 2], [1, 2]]], axis=2)
-        return np.concatenate([corners, self._midsides(self.ends, sides)], axis=1).astype(np.int32)
+        return np.concatenate([corners, self.middles(sides)], axis=1).astype(np.int32)
 
     def inherited(self, members: Bools) -> Bools:
         """A set of corners (n,) as a set of all nodes (N,), by the rule of `warpbrain.mesh.refinement.inherited`."""
@@ -111,3 +108,10 @@ class QuadraticMesh:
         found = np.zeros((len(self.corners.points), forces.shape[1]))
         np.add.at(found, self.ends, 0.5 * forces[:, None, :])
         return found
+
+
+def _middles(corners: int, ends: Ints, edges: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Node in the middle of each edge (..., 2), its ends ascending, of all nodes with their `ends`, corners first."""
+    factors = np.array([corners, 1])
+    found = np.searchsorted(ends[corners:].astype(np.int64) @ factors, edges.astype(np.int64) @ factors)
+    return np.asarray(corners + found, dtype=np.int64)

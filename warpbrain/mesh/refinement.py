@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.mesh.quality import EDGES
-from warpbrain.mesh.surface import nodes_of
+from warpbrain.mesh.surface import in_rows, nodes_of
 from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
 
 #: Corners 0 to 3 and the midpoints of edges 01, 02, 03, 12, 13, 23 as 4 to 9: what is cut off at each corner.
@@ -43,13 +44,32 @@ def refined(mesh: TetMesh) -> tuple[TetMesh, Ints]:
     element_vectors = {name: np.repeat(vectors, 8, axis=0) for name, vectors in mesh.element_vectors.items()}
     tissue = np.repeat(mesh.tissue, 8)
     finer = TetMesh(points, children, tissue, {}, element_sets, element_vectors)
+    finer = replace(finer, cut=_finer_cut(mesh.cut, ends, finer)) if len(mesh.cut) else finer
     return finer.with_node_sets(inherited_sets(mesh.node_sets, ends, finer)), ends
 
 
+def _finer_cut(cut: Ints, ends: Ints, finer: TetMesh) -> Ints:
+    """Triangles of the finer boundary that lie in triangles of a cut: four of each."""
+    faces = finer.boundary
+    # of a part at a corner the ends are a, a, a, b, a, c; of that in the middle a, b, b, c, c, a
+    own = np.sort(ends[faces].reshape(-1, 6), axis=1)
+    first, last = own[:, :1], own[:, -1:]
+    between = np.where((own != first) & (own != last), own, -1).max(axis=1, keepdims=True)
+    return np.asarray(faces[in_rows(np.concatenate([first, between, last], axis=1), cut)])
+
+
 def inherited_sets(sets: Mapping[str, Bools], ends: Ints, finer: TetMesh) -> dict[str, Bools]:
-    """Sets of nodes of a mesh on the finer one, by the rule of `inherited`."""
-    surface = nodes_of(finer.boundary, len(ends))
-    return {name: inherited(members, ends, surface) for name, members in sets.items()}
+    """Sets of nodes of a mesh on the finer one, by the rule of `inherited`.
+
+    The wall of a cut stays one: a set that has no node of the surface beside it gains none (`faces_of`).
+    """
+    surface, cut = nodes_of(finer.boundary, len(ends)), nodes_of(finer.cut, len(ends))
+
+    def where(members: Bools) -> Bools:
+        beside = members & (surface & ~cut)[: len(members)]
+        return surface if beside.any() or not (members & cut[: len(members)]).any() else cut
+
+    return {name: inherited(members, ends, where(members)) for name, members in sets.items()}
 
 
 def inherited(members: Bools, ends: Ints, surface: Bools) -> Bools:

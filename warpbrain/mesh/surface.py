@@ -105,6 +105,58 @@ def interface_faces(tetrahedra: ArrayLike, tissue: ArrayLike) -> Ints:
     return _corners(tetrahedra, owner)
 
 
+def in_rows(faces: ArrayLike, others: ArrayLike) -> Bools:
+    """Which of some triangles (b, 3) are among others (k, 3), whatever the order of their nodes: (b,) bool."""
+    rows = [np.sort(np.asarray(triangles, dtype=np.int64).reshape(-1, 3), axis=1) for triangles in (faces, others)]
+    number = np.unique(np.concatenate(rows), axis=0, return_inverse=True)[1].ravel()
+    return np.asarray(np.isin(number[: len(rows[0])], number[len(rows[0]) :]))
+
+
+def faces_of(mesh: TetMesh, members: Bools) -> Ints:
+    """Triangles of the boundary that a set of nodes holds.
+
+    A triangle of the surface beside a cut can have all its nodes on the cut's rim. It is no part of the wall: where all
+    members on the boundary are nodes of the cut, the set has triangles of the cut alone.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    members : (n,) bool array
+
+    Returns
+    -------
+    (k, 3) int32 array
+        Node ids, oriented outwards: triangles all of whose nodes are members.
+    """
+    faces = mesh.boundary
+    held = faces[members[faces].all(axis=1)]
+    beside = members & nodes_of(faces, len(members)) & ~nodes_of(mesh.cut, len(members))
+    if not len(mesh.cut) or beside.any():
+        return held
+    return np.asarray(held[in_rows(held, mesh.cut)])
+
+
+def rim_edges(faces: ArrayLike) -> NDArray[np.int64]:
+    """Edges at which an oriented surface ends.
+
+    Parameters
+    ----------
+    faces : (b, 3) array
+        Triangles, all oriented to one side.
+
+    Returns
+    -------
+    (k, 2) int64 array
+        Edges that triangles do not run along as often one way as the other: none on a closed surface, even one that
+        touches itself.
+    """
+    triangles = np.asarray(faces, dtype=np.int64)
+    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    edges, number = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
+    along = np.bincount(number.ravel(), weights=np.where(sides[:, 0] < sides[:, 1], 1.0, -1.0), minlength=len(edges))
+    return np.asarray(edges[along != 0.0])
+
+
 def closed_surfaces(faces: ArrayLike) -> Ints:
     """Number of the edge-connected surface each triangle belongs to.
 
@@ -202,6 +254,11 @@ def nodes_of(faces: ArrayLike, count: int) -> Bools:
     members = np.zeros(count, dtype=bool)
     members[np.asarray(faces).ravel()] = True
     return members
+
+
+def wall_nodes(mesh: TetMesh, elements: str) -> Bools:
+    """Nodes (n,) of the wall that taking out an element set leaves: of its faces with tetrahedra that stay."""
+    return nodes_of(interface_faces(mesh.tetrahedra, mesh.element_sets[elements]), len(mesh.points))
 
 
 def face_vectors(points: ArrayLike, faces: ArrayLike) -> Floats:

@@ -108,6 +108,8 @@ class TetMesh:
         Named sets of tetrahedra.
     element_vectors : mapping of str to (m, 3) array
         Named vectors of tetrahedra, such as directions of fibres; what is not known may be zero or not finite.
+    cut : (k, 3) array
+        Triangles of the boundary, oriented outwards, that were inside until tetrahedra were taken out; see `without`.
 
     Raises
     ------
@@ -127,6 +129,7 @@ class TetMesh:
     node_sets: Mapping[str, Bools] = field(default_factory=dict)
     element_sets: Mapping[str, Bools] = field(default_factory=dict)
     element_vectors: Mapping[str, Floats] = field(default_factory=dict)
+    cut: Ints = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int32))
 
     def __post_init__(self) -> None:
         points = np.asarray(self.points, dtype=np.float64)
@@ -148,6 +151,7 @@ class TetMesh:
         object.__setattr__(self, "node_sets", _sets(self.node_sets, len(points), "node"))
         object.__setattr__(self, "element_sets", _sets(self.element_sets, count, "element"))
         object.__setattr__(self, "element_vectors", _vectors(self.element_vectors, count))
+        object.__setattr__(self, "cut", _frozen(_integers(self.cut, "triangles of a cut")))
 
     def __repr__(self) -> str:
         labels = ", ".join(map(str, self.labels))
@@ -159,7 +163,7 @@ class TetMesh:
     def __reduce__(self) -> tuple[Any, ...]:
         # a mapping proxy cannot be pickled, and meshes travel to worker processes
         named = (dict(self.node_sets), dict(self.element_sets), dict(self.element_vectors))
-        return (TetMesh, (self.points, self.tetrahedra, self.tissue, *named))
+        return (TetMesh, (self.points, self.tetrahedra, self.tissue, *named, self.cut))
 
     @cached_property
     def labels(self) -> tuple[int, ...]:
@@ -253,7 +257,8 @@ class TetMesh:
         Returns
         -------
         mesh : TetMesh
-            What remains; nodes that belonged to removed tetrahedra only are gone; sets and vectors are restricted.
+            What remains; nodes that belonged to removed tetrahedra only are gone; sets and vectors are restricted. The
+            faces that it shared with what was removed are its `cut`, with those of an earlier one that are left.
         node_ids : (n',) int32 array
             Id in this mesh of every node of the new one.
         element_ids : (m',) int32 array
@@ -277,11 +282,17 @@ class TetMesh:
         return mesh, node_ids, element_ids
 
     def _left(self, kept: Bools) -> tuple[TetMesh, Ints, Ints]:
+        from warpbrain.mesh.surface import FACES, in_rows, interface_faces
+
         element_ids = np.flatnonzero(kept).astype(np.int32)
         tetrahedra = self.tetrahedra[element_ids]
         node_ids = np.unique(tetrahedra).astype(np.int32)
         new_id = np.full(len(self.points), -1, dtype=np.int32)
         new_id[node_ids] = np.arange(len(node_ids), dtype=np.int32)
+        # faces that a removed tetrahedron had of an earlier cut have no other owner
+        gone = self.tetrahedra[~kept][:, FACES].reshape(-1, 3)
+        earlier = self.cut[~in_rows(self.cut, gone)]
+        cut = new_id[np.concatenate([interface_faces(self.tetrahedra, ~kept), earlier])]
         mesh = TetMesh(
             self.points[node_ids],
             new_id[tetrahedra],
@@ -289,6 +300,7 @@ class TetMesh:
             {name: members[node_ids] for name, members in self.node_sets.items()},
             {name: members[element_ids] for name, members in self.element_sets.items()},
             {name: vectors[element_ids] for name, vectors in self.element_vectors.items()},
+            cut,
         )
         # of all who ask
         node_ids.setflags(write=False)

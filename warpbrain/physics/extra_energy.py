@@ -1,6 +1,6 @@
-"""A term whose energy is added to that of tetrahedra: fibres, residual stress, the fluid in a cavity.
+"""A term whose energy is added to that of tetrahedra: fibres, residual stress.
 
-What is part of the tissue is an energy of the elastic deformation `F_e = F F_g^-1` on the grown volume, times a factor
+It is part of the tissue: an energy of the elastic deformation `F_e = F F_g^-1` on the grown volume, times a factor
 of each element: that on its moduli, or the part of it that is left.
 """
 
@@ -29,8 +29,7 @@ class ExtraEnergy:
     energy, stress, moduli : wp.func
     goes_with : str
         ``"moduli"``: times the factor on the moduli of an element (fibres); ``"tissue"``: times the part of it that is
-        left (a tension, which is no modulus); ``"space"``: it is no energy of the tissue but of what fills the place of
-        it, so that neither that nor growth changes it.
+        left (a tension, which is no modulus).
     """
 
     key: str
@@ -66,8 +65,7 @@ class ExtraEnergyTerm(Term):
         scalar = body.precision.scalar
         kernels = extra_kernels if body.quadratic is None else quadratic_extra_kernels
         self._kernels = kernels(code.key, code.energy, code.stress, code.moduli, body.precision)
-        if code.goes_with != "space":
-            self.elements, self.of_moduli = elements, code.goes_with == "moduli"
+        self.elements, self.of_moduli = elements, code.goes_with == "moduli"
         self._elements = self.array(elements, int)
         self._volume = self.array(body.mesh.volumes[elements], scalar)
         self._stretch = self.array(np.ones(len(elements)), scalar)
@@ -76,8 +74,7 @@ class ExtraEnergyTerm(Term):
         self._energies = wp.zeros(len(elements), dtype=scalar, device=body.device)
 
     def take_moduli(self) -> None:
-        if self.elements is None:
-            return
+        assert self.elements is not None
         body = self.body
         factor = body.stiffness_factors if self.of_moduli else body.remaining_parts
         self._volume.assign((factor * body.mesh.volumes)[self.elements])

@@ -26,6 +26,7 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
@@ -144,11 +145,23 @@ class Facts:
     gravity_axis : (float, float, float) or None
     density : float
         [kg/m3]
+    removing : tuple of Mechanism
+        What else the case assumes that removes elements.
     """
 
     mesh: TetMesh
     gravity_axis: tuple[float, float, float] | None = None
     density: float = 1211.5
+    removing: tuple[Mechanism, ...] = ()
+
+    @cached_property
+    def left(self) -> TetMesh:
+        """What is left of the anatomy, on which all others act."""
+        mesh = self.mesh
+        for mechanism in self.removing:
+            assert isinstance(mechanism, Removing)
+            mesh, _ = mechanism.remaining(mesh)
+        return mesh
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,8 +244,22 @@ class Mechanism(Ramped, abc.ABC):
             If a parameter makes no sense in this case.
         """
         made = cls(**values)
-        made.check(facts.mesh)
+        made.check_in(facts)
         return made
+
+    def check_in(self, facts: Facts) -> None:
+        """Raise `ParameterError` if a parameter makes no sense in what is left of the anatomy of a case."""
+        try:
+            self.check(facts.left)
+        except ParameterError as error:
+            if not facts.removing:
+                raise
+            try:
+                self.check(facts.mesh)
+            except ParameterError:
+                raise error from None
+            both = f"{facts.removing[0].kind} and {self.kind} cannot act together"
+            raise ParameterError(error.key, f"{both}: in the tissue that is left {error}") from None
 
     @property
     def everywhere(self) -> bool:

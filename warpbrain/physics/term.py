@@ -67,6 +67,10 @@ class Body(Protocol):
         """Gradients of the shape functions of nodes 1 to 3 as rows, (m,) mat33 [1/m]."""
 
     @property
+    def constrained(self) -> NDArray[np.bool_]:
+        """Components (n, 3) of the displacement that are prescribed."""
+
+    @property
     def movable(self) -> NDArray[np.bool_]:
         """Nodes (n,) of which some component is not prescribed."""
 

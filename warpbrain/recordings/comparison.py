@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.mesh.surface import boundary_faces
+from warpbrain.mesh.surface import faces_of
 from warpbrain.mesh.tet_mesh import TetMesh
 from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.location import Location, locate
@@ -245,8 +245,7 @@ def faces_of_set(mesh: TetMesh, name: str, who: str) -> Ints:
     if name not in mesh.node_sets:
         known = ", ".join(sorted(mesh.node_sets)) or "none"
         raise InputError(f"{who}: the mesh has no node set '{name}', found {known}")
-    faces = boundary_faces(mesh.tetrahedra)
-    faces = faces[mesh.node_sets[name][faces].all(axis=1)]
+    faces = faces_of(mesh, mesh.node_sets[name])
     if len(faces) == 0:
         raise InputError(f"{who}: no boundary triangle of the mesh has all its nodes in the set '{name}'")
     return faces

@@ -3,10 +3,11 @@
     Pi = sum_a V_a (Psi(F_a) - s Psi'(F_a)) + s sum_e V_e Psi'(F_e)
 
 `F_a` is the mean of the deformation gradients of the elements of one tissue around node a, weighted by a quarter of
-their volumes, `V_a` that volume. `Psi'` is the law with a volumetric modulus of at most `KEPT` shear moduli, `s` a
-small part. The first sum alone does not lock, and bends better than linear tetrahedra do, but has modes that alternate
-from element to element without energy; the elements' own part gives them some. Energies are linear in the volumetric
-modulus, so the first sum is the law with another one, times 1 - s.
+their volumes, `V_a` that volume. What is taken out little by little has means of its own: with those of what stays it
+would hold the wall of a cavity, however little of it is left. `Psi'` is the law with a volumetric modulus of at most
+`KEPT` shear moduli, `s` a small part. The first sum alone does not lock, and bends better than linear tetrahedra do,
+but has modes that alternate from element to element without energy; the elements' own part gives them some. Energies
+are linear in the volumetric modulus, so the first sum is the law with another one, times 1 - s.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from warpbrain.kernels.averaged_gradient import averaged_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
+from warpbrain.physics.mechanism import Emptying
 from warpbrain.physics.term import Body, Term
 from warpbrain.simulation.model import Material
 
@@ -144,10 +146,10 @@ class AveragedTerm(Term):
         return float(self._density.numpy().astype(np.float64) @ self._volumes)
 
 
-def node_patches(tetrahedra: NDArray[np.integer], tissue: NDArray[np.integer]) -> Iterator[tuple[int, Ints, Ints]]:
-    """Label, elements and nodes of every patch: the elements of one tissue around each node."""
+def node_patches(tetrahedra: NDArray[np.integer], kind: NDArray[np.integer]) -> Iterator[tuple[int, Ints, Ints]]:
+    """Kind, elements and nodes of every patch: the elements of one kind (of those of each, (m,)) around each node."""
     corner_nodes = tetrahedra.ravel()
-    labels = np.repeat(tissue, 4)
+    labels = np.repeat(kind, 4)
     order = np.lexsort((np.arange(len(corner_nodes)), labels, corner_nodes))
     keys = np.stack([corner_nodes[order], labels[order]], axis=1)
     starts = np.flatnonzero(np.r_[True, np.any(keys[1:] != keys[:-1], axis=1)])
@@ -156,11 +158,16 @@ def node_patches(tetrahedra: NDArray[np.integer], tissue: NDArray[np.integer]) -
         yield int(keys[start, 1]), elements, np.unique(tetrahedra[elements])
 
 
-def averaged_terms(body: Body, labels: Sequence[int], kernels: ElementKernels) -> list[AveragedTerm]:
+def averaged_terms(
+    body: Body, labels: Sequence[int], kernels: ElementKernels, emptying: Sequence[Emptying] = ()
+) -> list[AveragedTerm]:
     """The patches of some tissues that have one law: a term for each number of nodes."""
+    left = [mechanism.remaining_part(body.mesh, 1.0) for mechanism in emptying]
+    rows = np.stack([body.mesh.tissue.astype(np.float64), *left], axis=1)
+    kinds, kind = np.unique(rows, axis=0, return_inverse=True)
     families: dict[int, list[tuple[Ints, Ints]]] = {}
-    for label, elements, nodes in node_patches(body.tetrahedra, body.mesh.tissue):
-        if label in labels:
+    for number, elements, nodes in node_patches(body.tetrahedra, kind.ravel()):
+        if int(kinds[number, 0]) in labels:
             families.setdefault(len(nodes), []).append((nodes, elements))
     return [
         AveragedTerm(body, np.array([nodes for nodes, _ in patches]), [elements for _, elements in patches], kernels)

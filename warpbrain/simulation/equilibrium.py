@@ -9,10 +9,11 @@ interior can follow. Linear systems are solved inexactly while far from the solu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
@@ -285,8 +286,10 @@ class EquilibriumSolver:
         """Solve again until constraints that penalties stand for are met."""
         for _ in range(self.options.max_augmentations):
             self.system.u.assign(u)
+            before = self.system.remembered()
             closer = [term.augment(self.system.u) for term in self.system.terms]
             if not any(closer):
+                self._keep(before)
                 return u, energy, residual
             try:
                 u, energy, residual = self._newton(u, 1.0, full, target)
@@ -295,6 +298,13 @@ class EquilibriumSolver:
         raise SolveError(
             f"a contact is not closed after {self.options.max_augmentations} augmentations: give it a larger penalty"
         )
+
+    def _keep(self, remembered: Sequence[tuple[wp.array, ...]]) -> None:
+        """Let terms remember what the state is in equilibrium with, not what another augmentation would have."""
+        if any(remembered):
+            self.system.recall(remembered)
+            self.system.evaluate_forces()
+            self.system.gather_forces()
 
     def _no_equilibrium(self, done: float, step: float, why: str) -> str:
         """The last word on a load that found no equilibrium."""

@@ -185,7 +185,7 @@ class System:
             device_law = grown(device_law) if self._growing else device_law
             linear = self.quadratic is None
             kernels = device_law.kernels(self.precision) if linear else quadratic_kernels(device_law, self.precision)
-            averaged = averaged_terms(self, list(materials), kernels) if self._averages else []
+            averaged = averaged_terms(self, list(materials), kernels, self.model.emptying) if self._averages else []
             parameters = self._array(self._parameters(law_type, materials), self.precision.scalar)
             groups.append(ElementGroup(kernels, self._array(members, int), parameters, averaged))
         return groups
@@ -637,6 +637,11 @@ class System:
                 term.evaluate_forces(self.u)
                 np.add.at(total, term.stencils, term.forces.numpy())
         return total
+
+    @property
+    def constrained(self) -> NDArray[np.bool_]:
+        """Components (n, 3) of the displacement that are prescribed."""
+        return self.model.constrained
 
     @property
     def movable(self) -> NDArray[np.bool_]:

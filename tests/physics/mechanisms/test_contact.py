@@ -86,13 +86,60 @@ def test_a_block_that_only_slides_is_stretched():
     assert np.abs(x[:, 2] - 1.1 * mesh.points[:, 2]).max() < 2e-5
 
 
-def test_what_is_stuck_does_not_move():
+@pytest.mark.parametrize("penalty", [5.0, 50.0])
+def test_what_is_stuck_does_not_move(penalty, device, verify):
+    mesh = on_table(distorted_inside(3))
+    model = pressed(mesh, 0.1, state="fixed", penalty=penalty)
+    system = System(model, device)
+    state = solve_equilibrium(system)
+    below = mesh.node_sets["below"]
+    slip = np.linalg.norm(state.u[below], axis=1).max()
+    verify(f"slip of what is stuck, penalty {penalty:g}", "zero", slip, 1e-7, "m")
+    held = replace(model, constrained=model.constrained | below[:, None], mechanisms=())
+    expected = solve_equilibrium(System(held, device))
+    assert np.abs(state.u - expected.u).max() < 1e-7
+    # and what holds it is the reaction of nodes that are held
+    above = mesh.node_sets["above"]
+    reaction, exact = (found.internal[above].sum(axis=0)[2] for found in (state, expected))
+    assert reaction == pytest.approx(exact, rel=1e-5)
+
+
+def test_what_is_stuck_can_be_moved_where_its_place_is_given(device):
     mesh = on_table(cube(2))
-    model = pressed(mesh, 0.1, state="fixed", penalty=1e4)
-    u = solve_equilibrium(System(model, "cpu")).u
-    constrained = model.constrained | mesh.node_sets["below"][:, None]
-    expected = solve_equilibrium(System(replace(model, constrained=constrained, mechanisms=()), "cpu")).u
-    assert np.abs(u - expected).max() < 1e-4
+    model = pressed(mesh, 0.1, state="fixed")
+    moved = np.flatnonzero(mesh.node_sets["below"])[4]
+    constrained, prescribed = model.constrained.copy(), model.prescribed.copy()
+    constrained[moved, 0], prescribed[moved, 0] = True, 0.02
+    u = solve_equilibrium(System(replace(model, constrained=constrained, prescribed=prescribed), device)).u
+    assert u[moved, 0] == 0.02
+    others = mesh.node_sets["below"].copy()
+    others[moved] = False
+    assert max(np.abs(u[others]).max(), np.abs(u[moved, 1:]).max()) < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("state", "friction"), [("fixed", 0.0), ("sliding", 0.0), ("lifting", 0.0), ("lifting", 0.3), ("sliding", 0.3)]
+)
+def test_a_state_is_in_equilibrium_with_the_pressures_that_are_kept(state, friction, device):
+    mesh = on_table(cube(2))
+    model = pressed(mesh, 0.1, state=state, friction=friction)
+    constrained = model.constrained.copy()
+    above = mesh.node_sets["above"]
+    constrained[above] = True
+    prescribed = np.where(above[:, None], [0.02, 0.0, -0.1], 0.0)
+    model = replace(model, constrained=constrained, prescribed=prescribed)
+    system = System(model, device)
+    found = solve_equilibrium(system)
+    again = forces_at(system, found.u)
+    np.testing.assert_allclose(again, found.internal, atol=1e-12 * np.abs(found.internal).max())
+    left = np.linalg.norm((model.external_forces() - again)[~constrained])
+    scale = np.linalg.norm(again) + np.linalg.norm(model.external_forces())
+    assert left / scale == pytest.approx(found.residual, rel=1e-3, abs=1e-14) and found.residual <= 1e-8
+    (term,) = system.terms
+    if friction > 0.0:
+        # what rubs is what presses
+        pressing, pressure = term.pressing(), np.maximum(term.stiffness * term.gaps(system.u) + term.pressures(), 0.0)
+        assert np.abs(pressing - pressure).max() < 2e-3 * pressure.max()
 
 
 def test_a_frictionless_slide_loses_no_energy():
@@ -141,7 +188,8 @@ def test_a_node_that_is_held_beyond_the_wall_is_left_there(device):
 
 @pytest.mark.parametrize("friction", [0.0, 0.4])
 @pytest.mark.parametrize(
-    ("state", "augmented"), [("fixed", False), ("sliding", False), ("lifting", False), ("lifting", True)]
+    ("state", "augmented"),
+    [("fixed", False), ("fixed", True), ("sliding", False), ("lifting", False), ("lifting", True)],
 )
 def test_forces_are_the_slope_of_the_energy_and_the_tangent_that_of_the_forces(state, augmented, friction, device):
     mesh = distorted(cube(3), 0.05)

@@ -15,7 +15,7 @@ from warpbrain.cases.parts.closed_surfaces import read_closed_surface
 from warpbrain.cases.parts.context import Context
 from warpbrain.cases.parts.node_sets import NodeSets
 from warpbrain.cases.parts.ramps import read_ramp
-from warpbrain.mesh import TetMesh, boundary_faces, components
+from warpbrain.mesh import TetMesh, components, faces_of
 from warpbrain.recordings.tables import read_table
 from warpbrain.recordings.text import collected
 
@@ -32,21 +32,21 @@ def read_boundaries(context: Context, sets: NodeSets | None) -> tuple[Boundary, 
         names.add(name)
         if table.variant is None:
             continue
-        boundary = _READERS[table.variant](context, table, sets, {"name": name, "nodes": nodes or ""})
+        boundary = _READERS[table.variant](context, table, {"name": name, "nodes": nodes or ""})
         if boundary is not None and nodes is not None:
             boundaries.append(boundary)
     return tuple(boundaries)
 
 
-def _fixed(context: Context, table: Reading, sets: NodeSets | None, common: dict[str, str]) -> Boundary:
+def _fixed(context: Context, table: Reading, common: dict[str, str]) -> Boundary:
     return Fixed(**common)
 
 
-def _sliding(context: Context, table: Reading, sets: NodeSets | None, common: dict[str, str]) -> Boundary | None:
-    return Sliding(**common) if _has_faces(table, sets, common["nodes"]) else None
+def _sliding(context: Context, table: Reading, common: dict[str, str]) -> Boundary:
+    return Sliding(**common)
 
 
-def _displaced(context: Context, table: Reading, sets: NodeSets | None, common: dict[str, str]) -> Boundary | None:
+def _displaced(context: Context, table: Reading, common: dict[str, str]) -> Boundary | None:
     value = table.get("value")
     if isinstance(value, str):
         if table.has("ramp"):
@@ -79,7 +79,7 @@ def _triples(values: Any) -> tuple[tuple[float, float, float], ...]:
     return tuple((float(x), float(y), float(z)) for x, y, z in values)
 
 
-def _forced(context: Context, table: Reading, sets: NodeSets | None, common: dict[str, str]) -> Boundary | None:
+def _forced(context: Context, table: Reading, common: dict[str, str]) -> Boundary | None:
     ramp = read_ramp(table)
     if not table.has("total") or ramp is None:
         return None
@@ -87,14 +87,14 @@ def _forced(context: Context, table: Reading, sets: NodeSets | None, common: dic
     return Forced(**common, total=(x, y, z), ramp=ramp)
 
 
-def _pressed(context: Context, table: Reading, sets: NodeSets | None, common: dict[str, str]) -> Boundary | None:
+def _pressed(context: Context, table: Reading, common: dict[str, str]) -> Boundary | None:
     ramp = read_ramp(table)
-    if not table.has("value") or ramp is None or not _has_faces(table, sets, common["nodes"]):
+    if not table.has("value") or ramp is None:
         return None
     return Pressed(**common, value=float(table.get("value")), ramp=ramp)
 
 
-def _contact(context: Context, table: Reading, sets: NodeSets | None, common: dict[str, str]) -> Boundary | None:
+def _contact(context: Context, table: Reading, common: dict[str, str]) -> Boundary | None:
     path = context.path(table, "surface")
     if path is None:
         return None
@@ -112,15 +112,17 @@ _READERS = {
 }
 
 
-def _has_faces(table: Reading, sets: NodeSets | None, nodes: str) -> bool:
-    """Whether the nodes hold at least one face of the surface."""
-    if sets is None or not nodes:
-        return False
-    members = sets.members(nodes)
-    if members[boundary_faces(sets.found.mesh.tetrahedra)].all(axis=1).any():
-        return True
-    table.problem("nodes", f"node set '{nodes}' holds no face of the surface, which '{table.variant}' acts on")
-    return False
+def check_faces(context: Context, left: TetMesh, boundaries: tuple[Boundary, ...]) -> None:
+    """Note boundaries that act on faces of the surface, of what is `left` after a resection, and have none there."""
+    for boundary in boundaries:
+        if isinstance(boundary, Sliding | Pressed) and not len(faces_of(left, left.node_sets[boundary.nodes])):
+            wall = boundary.nodes in left.element_sets
+            context.problems.add(
+                context.file,
+                f"[[boundary]] '{boundary.name}' nodes",
+                f"node set '{boundary.nodes}' holds no face of the surface, which '{boundary.kind}' acts on",
+                f"take out '{boundary.nodes}' by a [[mechanism]] resection" if wall else "",
+            )
 
 
 def check_together(context: Context, mesh: TetMesh, boundaries: tuple[Boundary, ...]) -> None:

@@ -13,7 +13,7 @@ from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.ramps import read_ramp
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
-from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Says
+from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing, Says
 from warpbrain.physics.mechanisms import mechanisms
 
 #: What to do where something of the case itself is missing.
@@ -35,15 +35,15 @@ def read_mechanisms(
     density : float
         [kg/m3]
     """
-    found: list[Mechanism] = []
+    found: dict[int, Mechanism] = {}
     kinds: set[str] = set()
-    for table in context.lists(MECHANISM):
-        if table.variant is None:
-            continue
-        mechanism = mechanisms()[table.variant]
+    # all others act on what is left by those that remove elements
+    tables = [(place, table) for place, table in enumerate(context.lists(MECHANISM)) if table.variant is not None]
+    for place, table in sorted(tables, key=lambda entry: not _removes(entry[1].variant)):
+        mechanism = mechanisms()[str(table.variant)]
         if table.variant in kinds and not mechanism.several:
             table.problem("kind", f"a second '{table.variant}': it would act twice")
-        kinds.add(table.variant)
+        kinds.add(str(table.variant))
         ramp = read_ramp(table)
         if named is None or ramp is None or not all(table.has(name) for name in mechanism.required()):
             continue
@@ -55,12 +55,17 @@ def read_mechanisms(
         if any(value is None for value in values.values()):
             continue
         try:
-            found.append(mechanism.of_case(values | {"ramp": ramp}, Facts(named.mesh, axis, density)))
+            facts = Facts(named.mesh, axis, density, tuple(m for m in found.values() if isinstance(m, Removing)))
+            found[place] = mechanism.of_case(values | {"ramp": ramp}, facts)
         except ParameterError as error:
             _note(context, table, error)
         except InputError as error:
             table.problem("kind", str(error))
-    return tuple(found)
+    return tuple(found[place] for place in sorted(found))
+
+
+def _removes(kind: str | None) -> bool:
+    return issubclass(mechanisms()[str(kind)], Removing)
 
 
 def _value(context: Context, table: Reading, named: Named, name: str, says: Says) -> Any:

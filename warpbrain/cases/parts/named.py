@@ -12,7 +12,7 @@ from warpbrain.cases.case import Tissue
 from warpbrain.cases.parts.closed_surfaces import read_closed_surface
 from warpbrain.cases.parts.directions import ENDINGS, read_directions
 from warpbrain.frame import Frame
-from warpbrain.mesh import TetMesh
+from warpbrain.mesh import TetMesh, wall_nodes
 from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.problems import Problems
 
@@ -24,7 +24,8 @@ class Named:
     Attributes
     ----------
     mesh : TetMesh
-        The whole anatomy; it gains an element set for each tissue that is named as one, and vectors for each file.
+        The whole anatomy; it gains an element set for each tissue that is named as one, the nodes of the wall of each
+        element set that is named as a node set, and vectors for each file.
     tissues : mapping of int to Tissue
     frame : Frame
         Of the files.
@@ -53,6 +54,8 @@ class Named:
         """
         if kind == "element set" and name not in self.mesh.element_sets:
             self._take_tissue(name)
+        if kind == "node set" and name not in self.mesh.node_sets:
+            self._take_wall(name)
         if kind == "surface":
             path = path_of()
             return None if path is None else read_closed_surface(path, name, self.frame, self.problems)
@@ -69,3 +72,10 @@ class Named:
         if labels:
             members = np.isin(self.mesh.tissue, labels)
             self.mesh = replace(self.mesh, element_sets={**self.mesh.element_sets, name: members})
+
+    def _take_wall(self, name: str) -> None:
+        if name not in self.mesh.element_sets:
+            self._take_tissue(name)
+        if name in self.mesh.element_sets:
+            wall = wall_nodes(self.mesh, name)
+            self.mesh = self.mesh.with_node_sets({**self.mesh.node_sets, name: wall})

@@ -1,4 +1,4 @@
-"""The node sets that a case's tables name: arrays of the mesh, or files of node numbers."""
+"""The node sets that a case's tables name: arrays of the mesh, walls of its element sets, or files of node numbers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.format.table import Reading
 from warpbrain.cases.parts.context import Context
-from warpbrain.mesh import MeshInFile, TetMesh
+from warpbrain.mesh import MeshInFile, TetMesh, wall_nodes
 from warpbrain.problems import Problems
 from warpbrain.recordings.text import collected, lines_of, read_text, shown, without_comment
 
@@ -26,7 +26,7 @@ class NodeSets:
     context : Context
     found : MeshInFile
     added : dict
-        Sets that came from files.
+        Sets that came from files, and walls of element sets.
     """
 
     context: Context
@@ -41,6 +41,9 @@ class NodeSets:
         if name.lower().endswith(".csv"):
             return self._from_file(table, key)
         sets = self.found.mesh.node_sets
+        if name not in sets and name in self.found.mesh.element_sets:
+            self.added[name] = wall_nodes(self.found.mesh, name)
+            return name
         if name not in sets:
             known = ", ".join(sorted(sets)) or "none"
             table.problem(key, f"the mesh has no node set '{name}' (it has {known})", "a point array, non-zero: member")
@@ -66,7 +69,7 @@ class NodeSets:
         return self.added[name] if name in self.added else self.found.mesh.node_sets[name]
 
     def mesh(self) -> TetMesh:
-        """The mesh with the sets that came from files."""
+        """The mesh with the sets that were added."""
         mesh = self.found.mesh
         if not self.added:
             return mesh

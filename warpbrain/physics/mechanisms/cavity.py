@@ -1,13 +1,15 @@
-"""A cavity that opens: tissue is taken out little by little, and fluid presses on the walls.
+"""A cavity that opens: tissue is taken out little by little, and fluid presses on its wall.
 
 The elements of the set stay, with their moduli, weight and mass multiplied by `1 - s (1 - r)`, `s` from 0 to 1 over the
 load and `r` what is left of them. What is taken out has the velocity that it had, so it does not push what stays. No
 element turns inside out, so walls that meet lean on each other through what is left between them: the contact through
-a third medium of Wriggers, Schroeder and Schwarz (2013). A fluid at the pressure `p` is the energy
+a third medium of Wriggers, Schroeder and Schwarz (2013).
 
-    -p J,   P = -p cof F
-
-of these elements: the same pressure on every wall, following it.
+A fluid at the pressure `p` presses on the wall, the faces between the set and the tissue that stays, and follows it:
+the load of `pressure` on the wall of a `resection`, which is the limit for `r` to 0. A set that reaches the surface of
+the body has an open wall, and the faces of the set on that surface carry nothing: what closes the opening (skull,
+dura, a dressing) bears the fluid there. What the rim of an open wall does is said in `pressure`: if it moves, the load
+has no energy, the skew part of the tangent along it is left out, and Newton's method converges linearly.
 
 What other mechanisms add to the law of these elements (fibres, residual stress, viscosity) is taken out with them. What
 acts on them (a pressure or a traction on their faces, fluid in their pores) would act on nothing, and is refused.
@@ -15,43 +17,18 @@ acts on them (a pressure or a traction on their faces, fluid in their pores) wou
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.kernels.invariants import cofactor
-from warpbrain.mesh import TetMesh
+from warpbrain.mesh import TetMesh, interface_faces
 from warpbrain.physics.expectation import Normal
-from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
-from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanisms.pressure import PressureTerm
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
-from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
-
-
-@wp.func
-def _energy(F: Any, data: wp.array2d[Any], e: int):
-    J = wp.determinant(F)
-    return data[e, 0] * (type(J)(1.0) - J)
-
-
-@wp.func
-def _stress(F: Any, data: wp.array2d[Any], e: int):
-    return -data[e, 0] * cofactor(F)
-
-
-@wp.func
-def _moduli(F: Any, g: Any, h: Any, data: wp.array2d[Any], e: int):
-    cof = cofactor(F)
-    c = cof * g
-    d = cof * h
-    return -data[e, 0] / wp.determinant(F) * (wp.outer(c, d) - wp.outer(d, c))
-
-
-_CODE = ExtraEnergy("cavity", _energy, _stress, _moduli, "space")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,14 +40,14 @@ class Cavity(Mechanism):
     elements : str
         Element set.
     pressure : float
-        Of the fluid in the cavity [Pa], relative to outside.
+        Of the fluid in the cavity [Pa], relative to that on the rest of the surface.
     left : float
         Part of stiffness, weight and mass that is left in the end.
     """
 
     elements: str = parameter("Element set that is taken out.", default="resection", kind="element set")
     pressure: float = parameter(
-        "Pressure of the fluid in the cavity, relative to outside.",
+        "Pressure of the fluid on the wall of the cavity, relative to that on the rest of the surface.",
         default=0.0,
         unit="Pa",
         expectation=Normal(0.0, 200.0),
@@ -100,6 +77,19 @@ class Cavity(Mechanism):
             raise NotTestableError("needs an element set 'resection' of tissue that is still there")
         return [Proposal.of_one(lambda _share: cls(), 1.0, 0.3, "switch", region="resection")]
 
+    def check(self, mesh: TetMesh) -> None:
+        super().check(mesh)
+        self.wall(mesh)
+
+    def wall(self, mesh: TetMesh) -> NDArray[np.int32]:
+        """Triangles (k, 3) between the set and the tissue that stays, oriented into the cavity."""
+        faces = interface_faces(mesh.tetrahedra, mesh.element_sets[self.elements])
+        if not len(faces):
+            raise ParameterError(
+                "elements", f"element set '{self.elements}' touches no tissue that stays, so a cavity there has no wall"
+            )
+        return faces
+
     def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
         """See `warpbrain.physics.mechanism.Weakening`."""
         return self.remaining_part(mesh, scale)
@@ -123,7 +113,6 @@ class Cavity(Mechanism):
             return ""
         return f"where {other.kind} acts on tissue that the cavity takes out: nothing would be left to act on"
 
-    def bind(self, body: Body) -> ExtraEnergyTerm:
+    def bind(self, body: Body) -> PressureTerm:
         """See `warpbrain.physics.term.Following`."""
-        elements = elements_of(body.mesh, self.elements)
-        return ExtraEnergyTerm(body, _CODE, elements, np.full((len(elements), 1), self.pressure), self.factor)
+        return PressureTerm(body, self.wall(body.mesh), self.pressure, self.factor)

@@ -10,10 +10,14 @@ energy, and from it the force and tangent
 
 `<p> = max(0, p)` where it can lift off, `p` where it only slides, `k` a penalty [Pa/m] and `q` the pressure that
 augmentation has found so far (Wriggers, Computational Contact Mechanics, 2nd ed., sections 6.3 and 6.7): in an
-equilibrium `q` becomes `<k g + q>` until what is left of `g` is small. Where the surface is stuck the distance is that
-from where the node was, in all directions. With friction `f`, a force of at most `f A p` against the tangential
-displacement `s` since the reference: right while a load grows, without memory of a path. Pressure and direction are
-there those of the last augmentation, or of the last time step: so the friction has an energy,
+equilibrium `q` becomes `<k g + q>` until what is left of `g` is small, and the `q` that is kept is the one that the
+state is in equilibrium with. Where the surface is stuck, `g` and `q` are vectors, the displacement and a traction,
+until what is left of the displacement is 5e-8 m. Motion knows no augmentation: there a stuck node gives way by its
+load over `k A`.
+
+With friction `f`, a force of at most `f A p` against the tangential displacement `s` since the reference: right while
+a load grows, without memory of a path. Pressure and direction are there those of the last augmentation, which is
+repeated until they are those of the state to 0.1 %, or of the last time step: so the friction has an energy,
 `f A p (sqrt(s^2 + d^2) - d)`, with `d` = 0.1 mm, over which it builds up.
 """
 
@@ -29,7 +33,7 @@ from numpy.typing import NDArray
 from warpbrain.kernels.distance_field import smooth_distance
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
-from warpbrain.mesh import TetMesh, node_areas, vertex_normals
+from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
 from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
@@ -41,8 +45,10 @@ from warpbrain.physics.term import Body, Term
 STATES = ("fixed", "sliding", "lifting")
 #: Tangential displacement [m] over which friction builds up.
 _SLIP = 1e-4
-#: Distance that is left [m] at which augmentation ends.
-_NEAR = 1e-5
+#: Distance that is left [m] at which augmentation ends, and displacement of what is stuck.
+_NEAR, _STUCK = 1e-5, 5e-8
+#: Part of the largest pressure by which those of friction may differ from those of the state.
+_SETTLED = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,8 +147,7 @@ class Contact(Mechanism):
         """Points [m] and outward triangles of the surface it touches."""
         if self.surface is not None:
             return self.surface.points, self.surface.outward
-        own = mesh.boundary
-        own = own[mesh.node_sets[self.nodes][own].all(axis=1)]
+        own = faces_of(mesh, mesh.node_sets[self.nodes])
         if not len(own):
             raise ParameterError("nodes", f"node set '{self.nodes}' holds no face of the surface")
         return mesh.points, own
@@ -161,7 +166,7 @@ class Contact(Mechanism):
 class ContactTerm(Term):
     """`Contact` on a device; a stencil is a node."""
 
-    memory = ("_found", "_pressing", "_directions")
+    memory = ("_found", "_pressing", "_directions", "_tractions")
     lasting = ("_field",)
 
     def __init__(self, body: Body, contact: Contact) -> None:
@@ -186,7 +191,7 @@ class ContactTerm(Term):
         self.take_moduli()
         self._area = self.array(area, precision.scalar)
         self._nodes = self.array(members, int)
-        self._movable = body.movable[members]
+        self._movable, self._free = body.movable[members], ~body.constrained[members]
         self._points = self.array(body.mesh.points, precision.vec3)
         count = len(members)
         self._start = wp.zeros(count, dtype=precision.scalar, device=device)
@@ -196,6 +201,7 @@ class ContactTerm(Term):
         self._found = wp.zeros(count, dtype=precision.scalar, device=device)
         self._pressing = wp.zeros(count, dtype=precision.scalar, device=device)
         self._directions = wp.zeros(count, dtype=precision.vec3, device=device)
+        self._tractions = wp.zeros(count, dtype=precision.vec3, device=device)
         self._gaps = wp.zeros(count, dtype=precision.scalar, device=device)
         self._energies = wp.zeros(count, dtype=precision.scalar, device=device)
         self._kernels = _kernels(precision)
@@ -214,7 +220,7 @@ class ContactTerm(Term):
         inputs = [
             self._nodes, self._points, self._area, self._start, self._field.coefficients, self._field.origin,
             scalar(self._field.spacing), STATES.index(self.mechanism.state), self._numbers,
-            self._found, self._pressing, self._directions, u, *outputs,
+            self._found, self._pressing, self._directions, self._tractions, u, *outputs,
         ]  # fmt: skip
         wp.launch(kernel, dim=len(self.stencils), inputs=inputs, device=self.body.device)
 
@@ -238,9 +244,13 @@ class ContactTerm(Term):
         """Pressure (k,) [Pa] that augmentation has found on each node."""
         return self._found.numpy().astype(np.float64)
 
+    def pressing(self) -> NDArray[np.float64]:
+        """Pressure (k,) [Pa] on each node that friction goes with."""
+        return self._pressing.numpy().astype(np.float64)
+
     def augment(self, u: wp.array) -> bool:
         if self.mechanism.state == "fixed":
-            return False
+            return self._hold(u)
         gaps, found = self.gaps(u), self.pressures()
         pressure = self.stiffness * gaps + found
         if self.mechanism.state == "lifting":
@@ -248,9 +258,21 @@ class ContactTerm(Term):
         # no pressure brings a node nearer whose place is prescribed
         pressure = np.where(self._movable, pressure, found)
         self._found.assign(pressure)
+        rubbing = self.pressing()
         self._press(u, pressure)
         # what is left of the distance where the surface is touched
-        return bool(np.abs(pressure - found).max() > _NEAR * self.stiffness)
+        if np.abs(pressure - found).max() > _NEAR * self.stiffness:
+            return True
+        pressing = np.maximum(pressure, 0.0)
+        return self.mechanism.friction > 0.0 and bool(
+            np.abs(pressing - rubbing).max() > _SETTLED * pressing.max() > 0.0
+        )
+
+    def _hold(self, u: wp.array) -> bool:
+        """Take what holds nodes now as their tractions (k, 3) [Pa]; whether they moved too far for it."""
+        moved = np.where(self._free, u.numpy().astype(np.float64)[self.stencils[:, 0]], 0.0)
+        self._tractions.assign(self._tractions.numpy() + self.stiffness * moved)
+        return bool(np.linalg.norm(moved, axis=1).max() > _STUCK)
 
     def advance(self, u: wp.array) -> None:
         if self.mechanism.friction != 0.0:
@@ -265,6 +287,7 @@ class ContactTerm(Term):
     def forget(self) -> None:
         self._found.zero_()
         self._pressing.zero_()
+        self._tractions.zero_()
 
 
 def _edge(points: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
@@ -294,6 +317,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         found: wp.array[scalar],
         pressing: wp.array[scalar],
         directions: wp.array[vec3],
+        tractions: wp.array[vec3],
         u: wp.array[vec3],
         out: wp.array2d[vec3],
     ):
@@ -302,7 +326,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         friction = numbers[1]
         d = u[nodes[t]]
         if state == 0:
-            out[t, 0] = area[t] * k * d
+            out[t, 0] = area[t] * (k * d + tractions[t])
             return
         g, slope, _H = distance(points[nodes[t]] + d, coefficients, origin, spacing)
         pressure = k * (g - start[t]) + found[t]
@@ -326,6 +350,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         found: wp.array[scalar],
         pressing: wp.array[scalar],
         directions: wp.array[vec3],
+        tractions: wp.array[vec3],
         u: wp.array[vec3],
         out: wp.array2d[mat33],
     ):
@@ -364,6 +389,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         found: wp.array[scalar],
         pressing: wp.array[scalar],
         directions: wp.array[vec3],
+        tractions: wp.array[vec3],
         u: wp.array[vec3],
         out: wp.array[scalar],
         gaps: wp.array[scalar],
@@ -374,7 +400,8 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         d = u[nodes[t]]
         if state == 0:
             gaps[t] = wp.length(d)
-            out[t] = scalar(0.5) * area[t] * k * wp.dot(d, d)
+            q = k * d + tractions[t]
+            out[t] = scalar(0.5) * area[t] / k * wp.dot(q, q)
             return
         g, _slope, _H = distance(points[nodes[t]] + d, coefficients, origin, spacing)
         gaps[t] = g - start[t]

@@ -2,7 +2,9 @@
 
     f_a = t int N_a w(|X - c| / R) dA,    w(r) = 1/2 (1 + cos(pi r)) for r < 1, else 0
 
-on the reference surface; `t` keeps its direction (a dead load).
+on the reference surface; `t` keeps its direction (a dead load). Of the surface within the radius it acts on one piece:
+what hangs together with the point nearest to the centre and faces the same way as there
+(`warpbrain.mesh.patches.patch_around`), not the far side of a thin body, nor a ventricle's wall below.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.mesh import QuadraticMesh, TetMesh, surface_forces
+from warpbrain.mesh import QuadraticMesh, TetMesh, patch_around, surface_forces
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
@@ -78,8 +80,7 @@ class Traction(Load, Mechanism):
             raise ParameterError("centre", "no face of the surface lies within the radius of this point")
 
     def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
-        nodes, _ = _patch(mesh, tuple(map(float, self.centre)), float(self.radius))
-        return elements_with(mesh, mesh.boundary[np.isin(mesh.boundary, nodes).all(axis=1)])
+        return elements_with(mesh, mesh.boundary[patch_around(mesh.points, mesh.boundary, self.centre, self.radius)])
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
@@ -116,14 +117,15 @@ def _patch(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Nodes of a patch, and areas [m2] with which a traction at its centre acts on them: a scan asks for them often."""
 
+    corners = mesh if isinstance(mesh, TetMesh) else mesh.corners
+    triangles = patch_around(corners.points, corners.boundary, centre, radius)
+
     def profile(points: NDArray[np.float64]) -> NDArray[np.float64]:
-        away = points - np.array(centre)
-        square = np.einsum("ki,ki->k", away, away)
-        near = np.flatnonzero(square < radius**2)
+        away = np.minimum(np.linalg.norm(points - np.array(centre), axis=1) / radius, 1.0)
         found = np.zeros(points.shape)
-        found[near, 0] = 0.5 * (1.0 + np.cos(np.pi * np.sqrt(square[near]) / radius))
+        found[:, 0] = 0.5 * (1.0 + np.cos(np.pi * away))
         return found
 
-    areas = surface_forces(mesh, profile)[:, 0]
+    areas = surface_forces(mesh, profile, triangles)[:, 0]
     nodes = np.flatnonzero(areas)
     return nodes, areas[nodes]
