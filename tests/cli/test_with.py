@@ -107,6 +107,32 @@ def test_elements_that_do_not_lock_move_more(tmp_path):
     assert largest(tmp_path / "tet10") > 1.05 * largest(tmp_path / "tet4")
 
 
+@pytest.mark.parametrize(
+    ("asked", "elements", "expected"),
+    [
+        ((), "tet10-mixed", "elements  tet10-mixed: nu = 0.495 is above 0.49, where tet4 and tet10 lock"),
+        (
+            ("--with", "viscoelasticity:moduli=1000,times=1"),
+            "tet4-averaged",
+            "viscoelasticity cannot act on tet10-mixed, which do not lock",
+        ),
+        (("--mesh-error",), "tet4-averaged", "not tet10-mixed because of --mesh-error"),
+        (("--mesh-error", "elements"), "tet4", "stiffer on linear tetrahedra than it is: at nu = 0.49 a"),
+        (("--elements", "tet10"), "tet10", "stiffer on elements tet10 than it is: at nu = 0.49 a"),
+    ],
+)
+def test_nearly_incompressible_tissue_has_elements_that_do_not_lock(tmp_path, asked, elements, expected):
+    """If nobody asks for others; then they say by how much they lock."""
+    out = tmp_path / "out"
+    done = run(write_folder(tmp_path / "case"), "--poisson", "0.495", *asked, "--out", out)
+    assert done.status == 0, done.err
+    assert expected in done.out
+    case = json.loads((out / "summary.json").read_text(encoding="utf-8"))["case"]
+    assert case["elements"] == elements
+    assert (case["elements_chosen"] == "asked for") == ("--elements" in asked)
+    assert (case["elements_chosen"] in done.out) == (elements in ("tet10-mixed", "tet4-averaged"))
+
+
 def test_what_knows_no_midside_nodes_is_refused(tmp_path):
     said = ("--with", "viscoelasticity:moduli=1000,times=1", "--elements", "tet10")
     done = run(write_folder(tmp_path / "case"), *said, "--out", tmp_path / "out")
@@ -114,7 +140,8 @@ def test_what_knows_no_midside_nodes_is_refused(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_the_error_of_quadratic_elements_is_not_known(tmp_path):
-    said = ("--mesh-error", "--elements", "tet10", "--out", tmp_path / "out")
+@pytest.mark.parametrize("elements", ["tet10", "tet10-mixed"])
+def test_the_error_of_quadratic_elements_is_not_known(tmp_path, elements):
+    said = ("--mesh-error", "--elements", elements, "--out", tmp_path / "out")
     done = run(write_folder(tmp_path / "case"), *said)
-    assert done.status == 2 and "--mesh-error: is not known of --elements tet10" in done.err, done.err
+    assert done.status == 2 and f"--mesh-error: is not known of --elements {elements}" in done.err, done.err

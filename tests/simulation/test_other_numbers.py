@@ -27,7 +27,7 @@ from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.physics.term import Term
 from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.dynamics import Simulator
-from warpbrain.simulation.model import ELEMENTS, Material, Model
+from warpbrain.simulation.model import ELEMENTS, QUADRATIC, Material, Model
 from warpbrain.simulation.system import System
 
 FIRST: tuple[Mechanism, ...] = (
@@ -87,7 +87,7 @@ def at(system: System) -> np.ndarray:
 def places_on(elements: str) -> list[int]:
     """Those of the mechanisms that can act on elements."""
     alters = [place for place, m in enumerate(FIRST) if m.quadratic or not isinstance(m, Following)]
-    return alters if elements == "tet10" else [*range(len(FIRST))]
+    return alters if elements in QUADRATIC else [*range(len(FIRST))]
 
 
 @pytest.mark.parametrize(

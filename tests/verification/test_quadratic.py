@@ -10,7 +10,7 @@ from warpbrain.kernels.precision import SINGLE, Precision
 from warpbrain.mesh import surface_forces
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.model import Material
+from warpbrain.simulation.model import QUADRATIC, Material
 from warpbrain.simulation.system import System
 
 REGULAR = cube(2)
@@ -18,19 +18,24 @@ MESH = distorted(REGULAR, 0.08, tissues=2)
 every_material = pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS.keys())
 
 
-def quadratic(material: Material, device: str, precision: str = "double") -> System:
-    return System(model_of(MESH, material, material, elements="tet10"), device, precision)
+@pytest.fixture(params=QUADRATIC)
+def elements(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+def quadratic(material: Material, elements: str, device: str, precision: str = "double") -> System:
+    return System(model_of(MESH, material, material, elements=elements), device, precision)
 
 
 # -- what is exact ------------------------------------------------------------------------------------------------
 
 
 @every_material
-def test_patch(material: Material, precision: Precision, device: str) -> None:
+def test_patch(material: Material, elements: str, precision: Precision, device: str) -> None:
     """A linear displacement: no force inside, and the law's stress everywhere."""
     if precision is SINGLE and material not in (MATERIALS["neo-hookean, coupled"], MATERIALS["ogden -20, uncoupled"]):
         pytest.skip("two laws tell what single precision does to the element")
-    system = quadratic(material, device, precision.name)
+    system = quadratic(material, elements, device, precision.name)
     nodes = system.quadratic
     F = random_gradients(1, 0.2, seed=11)[0]
     u = nodes.points @ (F - np.eye(3)).T
@@ -45,16 +50,16 @@ def test_patch(material: Material, precision: Precision, device: str) -> None:
 
 
 @every_material
-def test_rotation_is_free_of_forces(material: Material, device: str) -> None:
-    system = quadratic(material, device)
+def test_rotation_is_free_of_forces(material: Material, elements: str, device: str) -> None:
+    system = quadratic(material, elements, device)
     R = random_rotations(1, seed=12)[0]
     forces = forces_at(system, system.quadratic.points @ (R - np.eye(3)).T + 0.1)
     assert np.abs(forces).max() <= 1e-12 * material.volumetric_modulus
 
 
 @every_material
-def test_forces_and_tangents_are_derivatives(material: Material, device: str) -> None:
-    system = quadratic(material, device)
+def test_forces_and_tangents_are_derivatives(material: Material, elements: str, device: str) -> None:
+    system = quadratic(material, elements, device)
     rng = np.random.default_rng(3)
     u, d = 0.02 * rng.uniform(-1.0, 1.0, (system.size, 3)), rng.normal(size=(system.size, 3))
     h = 2e-6

@@ -108,7 +108,7 @@ def _ensemble(options: argparse.Namespace) -> None:
     say(described["title"])
     say(f"  mesh      {described['nodes']} nodes, {described['tetrahedra']} tetrahedra")
     say(*(f"  assumed   {sentence}" for sentence in case.assumptions), sep="\n")
-    say(*(f"  left out  {sentence}" for sentence in tables.left_out(model.elements)), sep="\n")
+    say(*(f"  left out  {sentence}" for sentence in tables.left_out(model, "an ensemble has no others")), sep="\n")
     say(f"  samples   {len(samples)}: {chosen}; {course}, {options.precision} precision")
 
     out = options.out or Path(f"warpbrain-ensemble-{safe_name(case.name)}-{options.tissue}")

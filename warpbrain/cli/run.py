@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from warpbrain.cases.case import Case
     from warpbrain.cases.drawn import FromPrior
     from warpbrain.simulation.mesh_error import MeshError
+    from warpbrain.simulation.model import Model
     from warpbrain.simulation.observation import Observed
     from warpbrain.simulation.result import Result
     from warpbrain.simulation.system import System
@@ -68,10 +69,10 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
     add(
         "--elements",
-        choices=("tet4", "tet4-averaged", "tet10"),
-        default="tet4",
-        help="plain tetrahedra (default); averaged gradients, which do not lock in nearly incompressible tissue; or "
-        "quadratic tetrahedra, with nodes in the middle of edges",
+        choices=("tet4", "tet4-averaged", "tet10", "tet10-mixed"),
+        help="plain tetrahedra (default up to nu = 0.49); averaged gradients, which lock less; quadratic tetrahedra, "
+        "with nodes in the middle of edges; or these with a continuous linear pressure (P2-P1), which do not lock in "
+        "nearly incompressible tissue (default above, where what acts allows it)",
     )
     add(
         "--mesh-error",
@@ -135,8 +136,8 @@ def _run(options: argparse.Namespace) -> None:
 
         run_specimen.run(options, case, say, prior)
         return
-    model = replace(model_of(case)[0], elements=options.elements)
-    described = tables.describe_case(case, model)
+    model, chosen = _with_elements(options, model_of(case)[0])
+    described = tables.describe_case(case, model, chosen)
     say(*tables.case_lines(described), *prior_lines(prior), sep="\n")
     system = System(model, options.device, options.precision)
     out = output_folder(options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}"))
@@ -191,6 +192,18 @@ def _run(options: argparse.Namespace) -> None:
     say("", f"written to {out}: {', '.join(files)}", sep="\n")
 
 
+def _with_elements(options: argparse.Namespace, model: Model) -> tuple[Model, str | None]:
+    """The model with the elements that were asked for, or with those that it needs, and why these."""
+    from warpbrain.simulation.locking import choose_elements
+
+    if options.elements is not None:
+        return replace(model, elements=options.elements), None
+    if options.mesh_error == "elements":
+        return model, "--mesh-error elements is about them"
+    choice = choose_elements(model, ("--mesh-error",) if options.mesh_error is not None else ())
+    return replace(model, elements=choice.elements), choice.reason
+
+
 def _silent(*_values: object, **_options: object) -> None:
     """Stands for `print` where nothing is to be said."""
 
@@ -203,10 +216,10 @@ def _check(options: argparse.Namespace) -> None:
         raise InputError(f"--poisson {options.poisson:g}: expected a number in the open interval (-1, 0.5)")
     if not 0.0 < options.tolerance < 1.0:
         raise InputError(f"--tolerance {options.tolerance:g}: expected a number between 0 and 1")
-    if options.mesh_error is not None and options.elements == "tet10":
-        raise InputError("--mesh-error: is not known of --elements tet10: expected tet4 or tet4-averaged")
-    if options.mesh_error == "elements" and options.elements != "tet4":
-        raise InputError(f"--mesh-error elements: {options.elements} do not lock: --mesh-error size says what is left")
+    if options.mesh_error is not None and options.elements in ("tet10", "tet10-mixed"):
+        raise InputError(f"--mesh-error: is not known of --elements {options.elements}: expected tet4 or tet4-averaged")
+    if options.mesh_error == "elements" and options.elements == "tet4-averaged":
+        raise InputError("--mesh-error elements: compares with tet4-averaged: --mesh-error size says what is left")
     run_slowly.check(options)
     options.moduli = parse_moduli(options.mu)
     for name, value in (("--sample", options.sample), ("--seed", options.seed)):

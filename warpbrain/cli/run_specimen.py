@@ -57,7 +57,7 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior
         rig.check(recording)
     system = rig.system
     in_time = any(rig.follows_time(recording) for recording in tests)
-    described = text.describe_specimen(case, rig.specimen, system.model, in_time)
+    described = text.describe_specimen(case, rig.specimen, system.model, in_time, rig.chosen)
     say(*text.specimen_lines(described), *prior_lines(prior), sep="\n")
     out = output_folder(options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}"))
     say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
@@ -104,8 +104,10 @@ def _tests(options: argparse.Namespace, case: Case) -> list[TestRecording]:
             raise InputError(
                 f"{option}: {case.path} has a [specimen], whose tests are quasi-static: there is no motion"
             )
-    if options.elements == "tet10":
-        raise InputError(f"--elements tet10: {case.path} has a [specimen], whose tests have linear elements only")
+    if options.elements in ("tet10", "tet10-mixed"):
+        raise InputError(
+            f"--elements {options.elements}: {case.path} has a [specimen], whose tests have linear elements only"
+        )
     tests = [recording for recording in case.recordings if isinstance(recording, TestRecording)]
     if not tests:
         raise InputError(f"{case.path}: no [[recording]] of kind 'test': nothing is imposed on the [specimen]")

@@ -30,6 +30,7 @@ from warpbrain.diagnosis.time_courses import main_courses
 from warpbrain.diagnosis.tissue_prior import declared, tissue_prior
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.simulation.locking import on_linear_elements
 from warpbrain.threads import beside
 
 Floats = NDArray[np.float64]
@@ -175,7 +176,7 @@ class BaseFinder:
         self._prior = beside(lambda: tissue_prior(states.case, states.parameters))
         self._spacing, self._mesh_error, self._bare = spacing, mesh_error, without_nuisances
         self._listener = listener
-        self._remarks: list[str] = []
+        self._remarks = on_linear_elements(states.case.poisson, "a diagnosis")
 
     @cached_property
     def prior(self) -> Gaussian:

@@ -30,6 +30,7 @@ from warpbrain.estimation.registration import Registration
 from warpbrain.estimation.target import Target
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
+from warpbrain.simulation.locking import on_linear_elements
 
 Floats = NDArray[np.float64]
 
@@ -155,7 +156,7 @@ class Estimation:
         self.listener = listener or Listener()
         self.seconds: dict[str, float] = {}
         self._device = device
-        self._remarks: list[str] = []
+        self._remarks = on_linear_elements(case.poisson, "an estimate")
         # what is wrong with recordings is known before anything is computed
         self.observations = Observations.to_fit(case)
         self._remarks += self.observations.remarks

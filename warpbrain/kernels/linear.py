@@ -228,6 +228,9 @@ class ConjugateGradient:
         One of `PRECONDITIONERS`.
     watch_curvature : bool
         Track the smallest curvature of the search directions, to tell an indefinite matrix.
+    beyond : callable, optional
+        ``beyond(x, factor, y)`` adds to `y` a factor times the product of `x` with what belongs to `A` and is in no
+        block, whose diagonal blocks are in the matrix (and are taken off again there).
     """
 
     def __init__(
@@ -242,10 +245,11 @@ class ConjugateGradient:
         max_iterations: int,
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
+        beyond: Callable[[wp.array, float, wp.array], None] | None = None,
     ) -> None:
         if preconditioner not in PRECONDITIONERS:
             raise ValueError(f"preconditioner {preconditioner!r}: expected one of {', '.join(PRECONDITIONERS)}")
-        self._matrix = matrix
+        self._matrix, self._beyond = matrix, beyond
         self._diagonal = diagonal
         self._precision = precision
         self._kernels = linear_kernels(precision)
@@ -327,6 +331,8 @@ class ConjugateGradient:
             inputs=[A.offsets, A.columns, A.values, x, y, z, scalar(alpha), scalar(beta)],
             device=self._device,
         )
+        if self._beyond is not None:
+            self._beyond(x, alpha, z)
 
     def _apply_diagonal(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         scalar = self._precision.scalar

@@ -47,7 +47,7 @@ def describe_mesh_error(error: MeshError, elements: str, observed: Observed, wit
 def _how(error: MeshError, elements: str) -> str:
     ways = []
     if elements == "tet4":
-        ways.append("elements of averaged gradients on the same mesh, which do not lock")
+        ways.append("elements of averaged gradients on the same mesh, which lock less")
     if error.size is not None:
         ways.append("such elements of half the size, whose difference is taken for three quarters of what is left")
     return f"compared with {' and '.join(ways)}"

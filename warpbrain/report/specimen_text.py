@@ -14,7 +14,8 @@ from warpbrain.cases.specimen import Specimen
 from warpbrain.recordings.comparison import Comparison
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.summary import describe_case
+from warpbrain.report.summary import describe_case, elements_lines
+from warpbrain.simulation.locking import largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.specimen import SHOWN, TestResult
 
@@ -63,22 +64,29 @@ class Tested:
     comparison: Comparison
 
 
-def describe_specimen(case: Case, specimen: Specimen, model: Model, in_time: bool = False) -> dict[str, Any]:
+def describe_specimen(
+    case: Case, specimen: Specimen, model: Model, in_time: bool = False, chosen: str | None = None
+) -> dict[str, Any]:
     """Specimen and assumptions, with units; the keys of `describe_case` and those of the specimen.
 
     `in_time`: tests are followed through their times, since what acts has a memory or a ramp.
     """
-    locks = specimen.grips == "glued" and model.elements == "tet4"
+    if specimen.grips != "glued":
+        locking = []
+    elif model.elements == "tet4":
+        locking = [_LOCKING]
+    else:
+        locking = locking_sentences(model.elements, largest_poisson(model), "a specimen has none that lock less")
     left_out = f"{_EARLIER if in_time else _RATE}; {_LEFT_OUT}"
     return {
-        **describe_case(case, model),
+        **describe_case(case, model, chosen),
         "specimen": {
             "shape": specimen.shape,
             "size_mm": [MILLIMETRES * length for length in specimen.size],
             "grips": specimen.grips,
         },
         "assumptions": [_GRIPS[specimen.grips], _IN_TIME if in_time else _ELASTIC, *case.assumptions],
-        "left_out": [left_out, _LOCKING] if locks else [left_out],
+        "left_out": [left_out, *locking],
     }
 
 
@@ -91,6 +99,7 @@ def specimen_lines(said: Mapping[str, Any]) -> list[str]:
         f"  mesh      {said['nodes']} nodes, {said['tetrahedra']} tetrahedra"
         if specimen["grips"] == "glued"
         else "  mesh      one element: the state is homogeneous",
+        *(elements_lines(said) if specimen["grips"] == "glued" else []),
     ]
     lines += [
         f"  tissue {label}  {tissue['name']}: {tissue['law']} ({tissue['formulation']}), "

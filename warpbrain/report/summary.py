@@ -9,7 +9,8 @@ from typing import Any
 
 from warpbrain import __version__
 from warpbrain.cases.case import Case
-from warpbrain.simulation.model import Model
+from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
+from warpbrain.simulation.model import Model, unaware_of_midsides
 from warpbrain.simulation.result import Result
 
 #: How the node sets are called where users read them.
@@ -27,16 +28,14 @@ _LEFT_OUT = (
     "unless assumed above: contact with the skull away from the nodes that are fixed; falx and tentorium; pressure of "
     "fluid in ventricles and cavity; viscosity other than damping; direction of fibres; flow of fluid through tissue"
 )
-#: Said of elements that lock. The figures: docs/verification.md.
-_LOCKING = (
-    "near-incompressible tissue is stiffer on linear tetrahedra than it is: at nu = 0.45 Cook's membrane loses 6 % of "
-    "its displacement at 32 elements a side and 36 % at 8; warpbrain run --mesh-error says what it is in a case"
-)
 
 
-def left_out(elements: str) -> list[str]:
-    """What a model with a kind of elements leaves out, a sentence each."""
-    return [_LEFT_OUT, _LOCKING] if elements == "tet4" else [_LEFT_OUT]
+def left_out(model: Model, instead: str | None = None) -> list[str]:
+    """What a model leaves out, a sentence each; `instead` as of `locking_sentences`."""
+    unaware = unaware_of_midsides(model)
+    if instead is None and unaware and largest_poisson(model) > NEARLY_INCOMPRESSIBLE:
+        instead = f"{', '.join(unaware)} cannot act on tet10-mixed, which do not lock"
+    return [_LEFT_OUT, *locking_sentences(model.elements, largest_poisson(model), instead)]
 
 
 def machine() -> dict[str, str]:
@@ -50,8 +49,8 @@ def machine() -> dict[str, str]:
     }
 
 
-def describe_case(case: Case, model: Model) -> dict[str, Any]:
-    """Anatomy and assumptions of a case, with units."""
+def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[str, Any]:
+    """Anatomy and assumptions of a case, with units; `chosen` says why the elements were, if nobody asked for them."""
     return {
         "name": case.name,
         "title": case.title,
@@ -60,6 +59,7 @@ def describe_case(case: Case, model: Model) -> dict[str, Any]:
         "nodes": len(model.mesh.points),
         "tetrahedra": len(model.mesh.tetrahedra),
         "elements": model.elements,
+        "elements_chosen": "asked for" if chosen is None else chosen,
         "midside_nodes": len(model.node_mesh.points) - len(model.mesh.points),
         "volume_cm3": 1e6 * model.mesh.volume,
         "volume_before_resection_cm3": 1e6 * case.mesh.volume,
@@ -77,7 +77,7 @@ def describe_case(case: Case, model: Model) -> dict[str, Any]:
             for label, tissue in sorted(case.tissues.items())
         },
         "assumptions": list(case.assumptions),
-        "left_out": left_out(model.elements),
+        "left_out": left_out(model),
         "remarks": list(case.remarks),
     }
 
@@ -128,6 +128,7 @@ def case_lines(summary: Mapping[str, Any]) -> list[str]:
             else ""
         )
     )
+    lines += elements_lines(summary)
     for label, tissue in summary["tissues"].items():
         lines.append(
             f"  tissue {label}  {tissue['name']}: {tissue['law']} ({tissue['formulation']}), "
@@ -137,6 +138,13 @@ def case_lines(summary: Mapping[str, Any]) -> list[str]:
     lines += [f"  remark    {sentence}" for sentence in summary["remarks"]]
     lines += [f"  left out  {sentence}" for sentence in summary["left_out"]]
     return lines
+
+
+def elements_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Why there are other elements than plain ones that nobody asked for, as printed."""
+    if summary["elements"] == "tet4" or summary["elements_chosen"] == "asked for":
+        return []
+    return [f"  elements  {summary['elements']}: {summary['elements_chosen']}"]
 
 
 def displacement_lines(summary: Mapping[str, Any]) -> list[str]:

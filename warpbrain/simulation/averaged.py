@@ -1,4 +1,4 @@
-"""Tetrahedra that do not lock: nodally averaged deformation gradients, stabilised (Puso and Solberg 2006).
+"""Tetrahedra that lock less: nodally averaged deformation gradients, stabilised (Puso and Solberg 2006).
 
     Pi = sum_a V_a (Psi(F_a) - s Psi'(F_a)) + s sum_e V_e Psi'(F_e)
 

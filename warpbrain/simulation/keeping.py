@@ -24,8 +24,11 @@ def kept_for(device: Any) -> KeptFactors | None:
 def with_kept(system: System, captured: LinearSolver, factors: KeptFactors, tolerance: float) -> LinearSolver:
     """A solver that is helped by what `kept_for` gave for the device of a system, or the captured one.
 
-    On a GPU systems in single precision, and those with unknowns beside the displacement, are for that one.
+    On a GPU systems in single precision, and those with unknowns beside the displacement, are for that one; on any
+    device those of which part is in no matrix.
     """
+    if not system.assembled:
+        return captured
     if not isinstance(factors, KeptInverse):
         return FactoredSolver(system, captured, factors, tolerance)
     if isinstance(captured, CoupledSolver) or system.precision.name != "double":

@@ -2,7 +2,7 @@
 
     E = L + M,   L = u'_h - u_h,   M = 4/3 (u'_(h/2) - u'_h)
 
-`u_h` is the state, `u'_h` the same state of averaged gradients (`warpbrain.simulation.averaged`), which do not lock, on
+`u_h` is the state, `u'_h` the same state of averaged gradients (`warpbrain.simulation.averaged`), which lock less, on
 the same mesh, `u'_(h/2)` on elements of half the size. `L` is what locks; also what plain elements bend less well than
 averaged ones. `M` is what is left of the error of averaged elements if it falls with the square of the size
 (Richardson's extrapolation, with 2^2 / (2^2 - 1)). Of a state that is of averaged elements already `L` is zero.

@@ -22,7 +22,9 @@ Bools = NDArray[np.bool_]
 
 
 #: Kinds of elements; the default first.
-ELEMENTS = ("tet4", "tet4-averaged", "tet10")
+ELEMENTS = ("tet4", "tet4-averaged", "tet10", "tet10-mixed")
+#: Those with nodes in the middle of edges.
+QUADRATIC = ("tet10", "tet10-mixed")
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,9 @@ class Model:
         Histories of prescribed displacements, which end at `prescribed`.
     damping : Damping
     elements : str
-        One of `ELEMENTS`: plain linear tetrahedra, linear ones that do not lock (`warpbrain.simulation.averaged`), or
-        quadratic ones with straight sides (`warpbrain.mesh.quadratic`).
+        One of `ELEMENTS`: plain linear tetrahedra, linear ones that lock less (`warpbrain.simulation.averaged`),
+        quadratic ones with straight sides (`warpbrain.mesh.quadratic`), or these with a pressure of their own, which
+        do not lock either (`warpbrain.simulation.mixed`).
 
     Raises
     ------
@@ -166,22 +169,18 @@ class Model:
 
     def _require_quadratic(self) -> None:
         """Raise `InputError` if something acts that knows nothing of the midside nodes that the elements have."""
-        if self.elements != "tet10":
+        if self.elements not in QUADRATIC:
             return
-        following = [m for m in self.mechanisms if isinstance(m, Following)]
-        acting: list[Load | Mechanism] = [*self.loads, *following]
-        for each in acting:
-            if not each.quadratic:
-                name = getattr(each, "kind", type(each).__name__)
-                raise InputError(
-                    f"{name}: cannot act on elements 'tet10', whose midside nodes it does not know: expected tet4 or "
-                    "tet4-averaged"
-                )
+        for name in unaware_of_midsides(self):
+            raise InputError(
+                f"{name}: cannot act on elements '{self.elements}', whose midside nodes it does not know: expected "
+                "tet4 or tet4-averaged"
+            )
 
     @cached_property
     def quadratic(self) -> QuadraticMesh | None:
         """The mesh with midside nodes; None if elements have none."""
-        return QuadraticMesh(self.mesh) if self.elements == "tet10" else None
+        return QuadraticMesh(self.mesh) if self.elements in QUADRATIC else None
 
     @property
     def node_mesh(self) -> TetMesh:
@@ -257,6 +256,13 @@ class Model:
             at_nodes = summed_at_nodes(nodes, part * forces) if isinstance(load, BodyForce) else forces
             total += load.factor(time) * at_nodes
         return total
+
+
+def unaware_of_midsides(model: Model) -> list[str]:
+    """Names of what acts and cannot act on elements with midside nodes."""
+    following = [m for m in model.mechanisms if isinstance(m, Following)]
+    acting: list[Load | Mechanism] = [*model.loads, *following]
+    return [getattr(each, "kind", type(each).__name__) for each in acting if not each.quadratic]
 
 
 def _with_midsides(mesh: QuadraticMesh, constrained: Bools, prescribed: Floats) -> tuple[Bools, Floats]:

@@ -225,7 +225,7 @@ class Corrections:
 
 def several_solver(system: System, count: int, tolerance: float, max_cg: int) -> SeveralSolver:
     """A solver for a system's matrix, with what terms add to it of their own, and several right-hand sides."""
-    if system.coupled:
+    if system.coupled or not system.assembled:
         return InTurn(system, tolerance, max_cg)
     return BlockConjugateGradient(
         system.matrix, system.diagonal, count, system.precision, tolerance=tolerance, max_iterations=max_cg

@@ -28,6 +28,7 @@ from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.history import History, history_of
+from warpbrain.simulation.locking import choose_elements
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System
 
@@ -118,8 +119,8 @@ class Rig:
     device, precision
         As of `System`.
     options : EquilibriumOptions, optional
-    elements : str
-        As of `Model`, of glued specimens.
+    elements : str, optional
+        As of `Model`, of glued specimens; by default as `choose_elements` says.
 
     Attributes
     ----------
@@ -140,14 +141,19 @@ class Rig:
         device: str | None = None,
         precision: str = "double",
         options: EquilibriumOptions | None = None,
-        elements: str = "tet4",
+        elements: str | None = None,
     ) -> None:
         self.case = case
         self.specimen = specimen_of(case)
         glued = self.specimen.grips == "glued"
         mesh = case.mesh if glued else _homogeneous(case.mesh.volume, self.specimen.size[2])
         model = _model(case, self.specimen, mesh)
-        self.system = System(replace(model, elements=elements) if glued else model, device, precision)
+        #: Why the elements of a glued specimen were chosen; None if they were asked for.
+        self.chosen: str | None = None
+        if glued and elements is None:
+            choice = choose_elements(model, ("the specimen",))
+            elements, self.chosen = choice.elements, choice.reason
+        self.system = System(replace(model, elements=elements) if glued and elements else model, device, precision)
         self.solver = EquilibriumSolver(self.system, options)
         self._top = mesh.node_sets["top"]
         self._area = mesh.volume / self.specimen.size[2]

@@ -28,6 +28,7 @@ from warpbrain.physics.mechanism import Following, Growing, Weakening
 from warpbrain.physics.term import Term
 from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, averaged_terms, own_modulus
 from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
+from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.placed import placed_mesh, placed_pattern
 
@@ -63,6 +64,10 @@ def _code(material: Material) -> tuple[type[Law], str, int]:
 
 def _volumetric_modulus(material: Material) -> float:
     return material.volumetric_modulus
+
+
+def _no_modulus(_material: Material) -> float:
+    return 0.0
 
 
 @dataclass(frozen=True)
@@ -136,10 +141,14 @@ class System:
         self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
         self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
         # of what alters elements, as they are now; None: not known yet
-        alters = self._growing or self._weakening or model.emptying or self._averages
+        alters = self._growing or self._weakening or model.emptying or self._averages or self._mixes
         self._scales: tuple[float, ...] | None = None if alters else ()
         self.groups = self._group_elements()
         self.terms += [term for group in self.groups for term in group.averaged]
+        self._volumes_at_nodes: NodalVolumeTerm | None = None
+        self._beyond_blocks: PatchStiffnessTerm | None = None
+        if self._mixes:
+            self._place_volumes()
         self._coupled = [term for term in self.terms if term.coupling is not None]
         self._place_pattern()
         self._place_fields()
@@ -194,6 +203,17 @@ class System:
     def _averages(self) -> bool:
         return self.model.elements == "tet4-averaged"
 
+    @property
+    def _mixes(self) -> bool:
+        return self.model.elements == "tet10-mixed"
+
+    def _place_volumes(self) -> None:
+        formulations = {label: m.formulation == "coupled" for label, m in self.model.materials.items()}
+        self._volumes_at_nodes = NodalVolumeTerm(self, self._by_element(formulations).astype(bool))
+        # in this order: the second takes its numbers from the first
+        self._beyond_blocks = PatchStiffnessTerm(self._volumes_at_nodes)
+        self.terms += [self._volumes_at_nodes, self._beyond_blocks]
+
     @staticmethod
     def _grouped(model: Model) -> dict[tuple[type[Law], str], dict[int, Material]]:
         """Materials of the tissues of the mesh by what they are launched with."""
@@ -212,6 +232,8 @@ class System:
         """Parameters by element; 1 where it is of no tissue of the group."""
         if modulus is None:
             modulus = own_modulus if self._averages else _volumetric_modulus
+            # all of it acts on the volumes at corners
+            modulus = _no_modulus if self._mixes else modulus
         rows = law_type.parameter_rows([material.law for material in materials.values()])
         # the last column, where something grows, is the growth stretch
         parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self._growing)))
@@ -328,6 +350,9 @@ class System:
             group.parameters.assign(self._parameters(law_type, members))
             for term in group.averaged:
                 term.set_elements(self._parameters(law_type, members, averaged_modulus), self.stiffness_factors)
+        if self._volumes_at_nodes is not None:
+            growth = self.growth_stretches**3
+            self._volumes_at_nodes.set_elements(self.volumetric_moduli, self.stiffness_factors, growth)
         for following in self._following:
             following.take_moduli()
 
@@ -340,6 +365,7 @@ class System:
         self.u, self.internal, self.external = vectors(), vectors(), vectors()
         self.load, self.solution, self.increment = vectors(), vectors(), vectors()
         self.coupling_root = wp.ones(1, dtype=p.scalar, device=self.device)
+        self._stiffness_factor = wp.ones(1, dtype=p.scalar, device=self.device)
         self.free = self._array(1.0 - self.model.constrained, p.vec3)
         self._all_components = self._array(np.ones((n, 3)), p.vec3)
         self._flat_forces = wp.zeros(len(self.corners), dtype=p.vec3, device=self.device)
@@ -409,9 +435,12 @@ class System:
     def assemble(self, k: float, m: float, coupling: float | None = None) -> None:
         """`matrix = k K + m M` from the element blocks, constrained rows and columns replaced by the identity.
 
-        What of `K` is not in blocks counts `coupling` times, `k` times if absent: the linear solver adds it.
+        What of `K` is not in blocks is added by the linear solver: `k` times too, but what unknowns of a term's own do
+        to it `coupling` times, if that is given.
         """
         scalar = self.precision.scalar
+        if self._beyond_blocks is not None:
+            self._stiffness_factor.fill_(k)
         if self._coupled:
             self.coupling_root.fill_(math.sqrt(k if coupling is None else coupling))
         self._launch(
@@ -439,7 +468,8 @@ class System:
         self.free = free
         # the values are gathered into the same array again
         values = self.matrix.values.numpy().astype(np.float64)
-        return bsr_matrix((values, self.matrix.columns.numpy(), self.matrix.offsets.numpy()))
+        K = bsr_matrix((values, self.matrix.columns.numpy(), self.matrix.offsets.numpy()))
+        return K if self._beyond_blocks is None else K + self._beyond_blocks.stiffness()
 
     @property
     def coupled(self) -> bool:
@@ -447,19 +477,35 @@ class System:
         return any(term.coupled for term in self._coupled)
 
     def add_coupling(self, x: wp.array, factor: float, y: wp.array) -> None:
-        """Add to `y` a factor times what of `K x` is not in blocks; constrained components are left out."""
-        for term in self.terms:
+        """Add to `y` a factor times what unknowns of a term's own do to `K x`; constrained components are left out."""
+        for term in self._coupled:
             term.add_stiffness(x, factor, y, self.free, self.free)
+
+    @property
+    def assembled(self) -> bool:
+        """Whether all of the stiffness is in blocks, unknowns of a term's own apart."""
+        return self._beyond_blocks is None
+
+    def _add_beyond_blocks(self, x: wp.array, factor: float, y: wp.array) -> None:
+        """Add to `y` a factor times what is not in the matrix of the last `assemble`, but for couplings."""
+        assert self._beyond_blocks is not None
+        self._beyond_blocks.add_stiffness(x, factor, y, self.free, self.free, self._stiffness_factor)
+
+    def _add_all_beyond_blocks(
+        self, increment: wp.array, sign: float, k: float, coupling: float | None, columns: wp.array, rows: wp.array
+    ) -> None:
+        """Add to `load` what of `sign k K increment` is not in blocks, of couplings `coupling` times if given."""
+        for term in self.terms:
+            factor = k if term.coupling is None or coupling is None else coupling
+            if factor != 0.0:
+                term.add_stiffness(increment, sign * factor, self.load, columns, rows)
 
     def subtract_constrained_load(self, increment: wp.array, k: float, coupling: float | None = None) -> None:
         """`load -= k K increment` on the free components, for increments of the constrained ones.
 
-        What of `K` is not in blocks counts `coupling` times, `k` times if absent.
+        What unknowns of a term's own do to it counts `coupling` times, `k` times if absent.
         """
-        for term in self.terms if coupling != 0.0 else ():
-            term.add_stiffness(
-                increment, -(k if coupling is None else coupling), self.load, self._all_components, self.free
-            )
+        self._add_all_beyond_blocks(increment, -1.0, k, coupling, self._all_components, self.free)
         self._launch(
             self._kernels.constrained_load,
             self.size,
@@ -478,7 +524,7 @@ class System:
     def stiffness_times(self, increment: Floats, k: float = 1.0, coupling: float | None = None) -> Floats:
         """`k K increment` [N] on every component, constrained ones included, shape (n, 3).
 
-        What of `K` is not in blocks counts `coupling` times, `k` times if absent.
+        What unknowns of a term's own do to it counts `coupling` times, `k` times if absent.
         """
         self.increment.assign(increment)
         self.load.zero_()
@@ -496,9 +542,7 @@ class System:
             self.precision.scalar(-k),
             self.load,
         )
-        factor = k if coupling is None else coupling
-        for term in self.terms if factor != 0.0 else ():
-            term.add_stiffness(self.increment, factor, self.load, self._all_components, self._all_components)
+        self._add_all_beyond_blocks(self.increment, 1.0, k, coupling, self._all_components, self._all_components)
         return self.load.numpy().astype(np.float64)
 
     def linear_solver(
@@ -523,6 +567,7 @@ class System:
             max_iterations=max_iterations,
             preconditioner=preconditioner,
             watch_curvature=watch_curvature,
+            beyond=None if self.assembled else self._add_beyond_blocks,
         )
         if not self._coupled:
             return conjugate_gradient
@@ -715,6 +760,10 @@ class System:
                 elements, patch, stress = term.stress(self.u)
                 np.add.at(found, elements, 0.25 * (1.0 - PART) * stress[patch])
         found *= self.stiffness_factors[:, None, None]
+        if self._volumes_at_nodes is not None:
+            F = self.deformation_gradients()
+            cofactors = np.linalg.det(F)[:, None, None] * np.linalg.inv(F).transpose(0, 2, 1)
+            found += self._volumes_at_nodes.pressures(self.u)[:, None, None] * cofactors
         for added in self.terms:
             if added.elements is not None:
                 found[added.elements] += self._mean_stress(added, added.elements)

@@ -1,0 +1,253 @@
+"""Kernels of a volume ratio that quadratic tetrahedra share at their corners; see `warpbrain.simulation.mixed`.
+
+A patch is the elements of one tissue around one corner a. With its shape function `L_a` and quadrature points of weight
+`w` (`warpbrain.kernels.ten_nodes`), its volume is `M_a = sum w L_a J`, and the derivative of that by the displacement
+of node b is `g_ab = sum w L_a cof(F) grad N_b`. An energy `E(M_a)` of each patch has
+
+    f_b  = sum w p cof(F) grad N_b,                      p = sum_a L_a p_a,   p_a = dE/dM_a
+    K_bc = sum w p [F (grad N_c x grad N_b)]_x  +  sum_a c_a g_ab (x) g_ac,   c_a = d2E/dM_a2
+
+where `[v]_x` is the matrix of `v x`, from the derivative of the cofactor. The last sum couples every two nodes of a
+patch. It is not assembled: of it there are diagonal blocks, for preconditioners, and products with vectors.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warpbrain.kernels.invariants import cofactor
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.ten_nodes import FAR, NEAR, POINTS, UNROLL, gradient_at, shape_gradient
+
+
+@dataclass(frozen=True)
+class NodalVolumeKernels:
+    """Kernels of one precision.
+
+    Attributes
+    ----------
+    moments : wp.Kernel
+        ``(nodes, inverse_edges, volume, u) -> moments``, what an element adds to `M_a` of its corners.
+    pressures : wp.Kernel
+        ``(first, corners, moments, volumes, moduli, logarithmic) -> ratio, p, c``, one thread for a patch.
+    forces : wp.Kernel
+        ``(nodes, patches, inverse_edges, volume, p, u) -> forces``, one thread for an element.
+    tangents : wp.Kernel
+        The same with blocks, and the parts of an element of `g_ab`.
+    gather : wp.Kernel
+        ``(first, parts, of_elements) -> g``, one thread for a node of a patch.
+    diagonal : wp.Kernel
+        ``(first, entries, patches, c, g) -> g in the order of nodes, blocks``, one thread for a node.
+    taken_up : wp.Kernel
+        ``(first, nodes, c, g, columns, x) -> change of p_a``, one thread for a patch.
+    push : wp.Kernel
+        ``(first, patches, g in the order of nodes, change, diagonal, columns, rows, x, factor, scale) -> y``, one
+        thread for a node: without the diagonal blocks, added to `y`.
+    """
+
+    moments: Any
+    pressures: Any
+    forces: Any
+    tangents: Any
+    gather: Any
+    diagonal: Any
+    taken_up: Any
+    push: Any
+
+
+@wp.func
+def _weight(corner: int, point: int, w: Any):
+    """`w L_a` of a corner at a quadrature point."""
+    if corner == point:
+        return type(w)(NEAR) * w
+    return type(w)(FAR) * w
+
+
+@wp.func
+def _pressure_at(p: wp.array[Any], patches: wp.array2d[int], e: int, point: int, w: Any):
+    """`w p` at a quadrature point."""
+    found = w - w
+    for a in range(4):
+        found += _weight(a, point, w) * p[patches[e, a]]
+    return found
+
+
+@cache
+def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
+    """Make (once) the kernels of a precision."""
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = compiled_module(f"nodal_volume_{precision.name}", unroll=UNROLL)
+    share = wp.constant(scalar(1.0 / POINTS))
+    vec4 = wp.types.vector(4, scalar)
+
+    @wp.kernel(module=module)
+    def moments(
+        nodes: wp.array2d[int],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array2d[scalar],
+    ):
+        e = wp.tid()
+        found = vec4()
+        for point in range(POINTS):
+            J = wp.determinant(gradient_at(u, nodes, e, point, inverse_edges[e]))
+            for a in range(4):
+                found[a] += _weight(a, point, share * volume[e]) * J
+        for a in range(4):
+            out[e, a] = found[a]
+
+    @wp.kernel(module=module)
+    def pressures(
+        first: wp.array[int],
+        corners: wp.array[int],
+        moments: wp.array2d[scalar],
+        volumes: wp.array[scalar],
+        moduli: wp.array[scalar],
+        logarithmic: wp.array[int],
+        ratio: wp.array[scalar],
+        p: wp.array[scalar],
+        c: wp.array[scalar],
+    ):
+        a = wp.tid()
+        sum = scalar(0.0)
+        for k in range(first[a], first[a + 1]):
+            sum += moments[corners[k] // 4, corners[k] % 4]
+        theta = sum / volumes[a]
+        one = scalar(1.0)
+        slope = theta - one
+        curvature = one
+        if logarithmic[a] == 1:
+            slope = wp.log(theta) / theta
+            curvature = (one - wp.log(theta)) / (theta * theta)
+        ratio[a] = theta
+        p[a] = moduli[a] * slope
+        c[a] = moduli[a] * curvature / volumes[a]
+
+    @wp.kernel(module=module)
+    def forces(
+        nodes: wp.array2d[int],
+        patches: wp.array2d[int],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        p: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array2d[vec3],
+    ):
+        e = wp.tid()
+        G = inverse_edges[e]
+        for point in range(POINTS):
+            cof = cofactor(gradient_at(u, nodes, e, point, G))
+            cof = _pressure_at(p, patches, e, point, share * volume[e]) * cof
+            for b in range(10):
+                f = cof * shape_gradient(b, point, G)
+                if point > 0:
+                    f += out[e, b]
+                out[e, b] = f
+
+    @wp.kernel(module=module)
+    def tangents(
+        nodes: wp.array2d[int],
+        patches: wp.array2d[int],
+        inverse_edges: wp.array[mat33],
+        volume: wp.array[scalar],
+        p: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array2d[vec3],
+        blocks: wp.array2d[mat33],
+        of_elements: wp.array2d[vec3],
+    ):
+        e = wp.tid()
+        G = inverse_edges[e]
+        w = share * volume[e]
+        for point in range(POINTS):
+            F = gradient_at(u, nodes, e, point, G)
+            cof = cofactor(F)
+            wp_at = _pressure_at(p, patches, e, point, w)
+            for b in range(10):
+                g = shape_gradient(b, point, G)
+                normal = cof * g
+                f = wp_at * normal
+                if point > 0:
+                    f += out[e, b]
+                out[e, b] = f
+                for a in range(4):
+                    part = _weight(a, point, w) * normal
+                    if point > 0:
+                        part += of_elements[e, 10 * a + b]
+                    of_elements[e, 10 * a + b] = part
+                for c in range(b, 10):
+                    K = wp_at * wp.skew(F * wp.cross(shape_gradient(c, point, G), g))
+                    block = b * (19 - b) // 2 + c
+                    if point > 0:
+                        K += blocks[e, block]
+                    blocks[e, block] = K
+
+    @wp.kernel(module=module)
+    def gather(first: wp.array[int], parts: wp.array[int], of_elements: wp.array[vec3], g: wp.array[vec3]):
+        k = wp.tid()
+        found = vec3()
+        for part in range(first[k], first[k + 1]):
+            found += of_elements[parts[part]]
+        g[k] = found
+
+    @wp.kernel(module=module)
+    def diagonal(
+        first: wp.array[int],
+        entries: wp.array[int],
+        patches: wp.array[int],
+        c: wp.array[scalar],
+        g: wp.array[vec3],
+        by_node: wp.array[vec3],
+        blocks: wp.array2d[mat33],
+    ):
+        b = wp.tid()
+        found = mat33()
+        for k in range(first[b], first[b + 1]):
+            own = g[entries[k]]
+            # every product with a vector reads this, one after the other
+            by_node[k] = own
+            found += wp.outer(c[patches[k]] * own, own)
+        blocks[b, 0] = found
+
+    @wp.kernel(module=module)
+    def taken_up(
+        first: wp.array[int],
+        nodes: wp.array[int],
+        c: wp.array[scalar],
+        g: wp.array[vec3],
+        columns: wp.array[vec3],
+        x: wp.array[vec3],
+        change: wp.array[scalar],
+    ):
+        a = wp.tid()
+        found = scalar(0.0)
+        for k in range(first[a], first[a + 1]):
+            b = nodes[k]
+            found += wp.dot(g[k], wp.cw_mul(columns[b], x[b]))
+        change[a] = c[a] * found
+
+    @wp.kernel(module=module)
+    def push(
+        first: wp.array[int],
+        patches: wp.array[int],
+        by_node: wp.array[vec3],
+        change: wp.array[scalar],
+        own: wp.array2d[mat33],
+        columns: wp.array[vec3],
+        rows: wp.array[vec3],
+        x: wp.array[vec3],
+        factor: scalar,
+        scale: wp.array[scalar],
+        y: wp.array[vec3],
+    ):
+        b = wp.tid()
+        found = -(own[b, 0] * wp.cw_mul(columns[b], x[b]))
+        for k in range(first[b], first[b + 1]):
+            found += change[patches[k]] * by_node[k]
+        y[b] += factor * scale[0] * wp.cw_mul(rows[b], found)
+
+    return NodalVolumeKernels(moments, pressures, forces, tangents, gather, diagonal, taken_up, push)
