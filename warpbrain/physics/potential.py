@@ -9,8 +9,8 @@ no modulus. A law says `Psi`. What is beside the tissue (a wall, a membrane, a f
 displacement, and of neither `F_e`, `w` nor `c`. A mechanism has one place here (`Mechanism.enters`), and the system,
 which knows no mechanism by name, adds them up: forces are the slope of this sum, tangents its curvature, and in a
 time step what remembers stands for the potential of the step. What a pair means follows; what would have no meaning
-excludes each other (`warpbrain.physics.composition`). Quadratic elements have it at each of their points; of elements
-that do not lock a patch around a node has the mean of `J_g^(1/3)` of its elements, and its volume times their `c w`.
+excludes each other (`warpbrain.physics.composition`). Quadratic elements have it at each of their points; of averaged
+elements a patch around a node has the mean of `J_g^(1/3)` of its elements, and its volume times their `c w`.
 """
 
 from __future__ import annotations
