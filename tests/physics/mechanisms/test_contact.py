@@ -139,7 +139,7 @@ def test_a_state_is_in_equilibrium_with_the_pressures_that_are_kept(state, frict
     if friction > 0.0:
         # what rubs is what presses
         pressing, pressure = term.pressing(), np.maximum(term.stiffness * term.gaps(system.u) + term.pressures(), 0.0)
-        assert np.abs(pressing - pressure).max() < 2e-3 * pressure.max()
+        assert np.abs(pressing - pressure).max() <= 1.001e-3 * pressure.max()
 
 
 def test_a_frictionless_slide_loses_no_energy():

@@ -44,7 +44,7 @@ def test_one_side_of_a_slab_is_pressed(height, loaded, elements, verify):
         f"traction on one side of a slab of 20 mm in a ball of 15 mm, centre at {1e3 * height:g} mm, {elements}",
         "integral over a disc, SciPy quad",
         abs(-force[:, 2].sum() / total - 1.0),
-        2e-3,
+        1e-5,
     )
 
 
@@ -101,7 +101,7 @@ def test_a_patch_of_a_brain_is_one_piece_that_faces_one_way(name):
     middles = points[faces].mean(axis=1)
     normals = face_vectors(points, faces)
     more = 0
-    for face in np.random.default_rng(1).choice(len(faces), 60, replace=False):
+    for face in np.random.default_rng(1).choice(len(faces), 30, replace=False):
         centre = middles[face]
         found = patch_around(points, faces, centre, RADIUS)
         assert face in found

@@ -38,12 +38,12 @@ def read_mechanisms(
     found: dict[int, Mechanism] = {}
     kinds: set[str] = set()
     # all others act on what is left by those that remove elements
-    tables = [(place, table) for place, table in enumerate(context.lists(MECHANISM)) if table.variant is not None]
-    for place, table in sorted(tables, key=lambda entry: not _removes(entry[1].variant)):
-        mechanism = mechanisms()[str(table.variant)]
-        if table.variant in kinds and not mechanism.several:
-            table.problem("kind", f"a second '{table.variant}': it would act twice")
-        kinds.add(str(table.variant))
+    tables = [(place, t.variant, t) for place, t in enumerate(context.lists(MECHANISM)) if t.variant is not None]
+    for place, kind, table in sorted(tables, key=lambda entry: not issubclass(mechanisms()[entry[1]], Removing)):
+        mechanism = mechanisms()[kind]
+        if kind in kinds and not mechanism.several:
+            table.problem("kind", f"a second '{kind}': it would act twice")
+        kinds.add(kind)
         ramp = read_ramp(table)
         if named is None or ramp is None or not all(table.has(name) for name in mechanism.required()):
             continue
@@ -62,10 +62,6 @@ def read_mechanisms(
         except InputError as error:
             table.problem("kind", str(error))
     return tuple(found[place] for place in sorted(found))
-
-
-def _removes(kind: str | None) -> bool:
-    return issubclass(mechanisms()[str(kind)], Removing)
 
 
 def _value(context: Context, table: Reading, named: Named, name: str, says: Says) -> Any:
