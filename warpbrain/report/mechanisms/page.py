@@ -48,7 +48,7 @@ def confusions(mechanism: type[Mechanism]) -> list[str]:
     if mechanism.of_specimens:
         lines.append("It acts in specimens too.")
     if issubclass(mechanism, Load | Following) and not mechanism.quadratic:
-        lines.append("It does not act on elements `tet10`.")
+        lines.append("It does not act on elements `tet10` and `tet10-mixed`.")
     if mechanism.needs:
         return [*lines, f"Told apart by {', '.join(mechanism.needs)}."]
     return [*lines, *(["One deformed state tells them apart."] if others else [])]
