@@ -24,6 +24,7 @@ from warpbrain.report.mechanisms.cost import read_costs, sentences
 from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
 from warpbrain.report.mechanisms.index import index
 from warpbrain.report.mechanisms.page import page
+from warpbrain.report.mechanisms.pairs import pairs_page
 from warpbrain.report.mechanisms.picture import INKS, write_picture
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumSolver
@@ -57,6 +58,7 @@ def main() -> None:
     for kind in mechanisms():
         _write(PAGES / f"{kind}.md", page(kind, effects[kind], sentences(costs, kind)))
     _write(PAGES / "index.md", index(effects, costs))
+    _write(PAGES / "pairs.md", pairs_page())
 
 
 def draw(case: Case, kind: str) -> Effect:

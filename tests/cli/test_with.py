@@ -56,6 +56,46 @@ def test_what_makes_no_sense_is_told(tmp_path, said, expected):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        (
+            ("cavity:elements=corner", "pressure:nodes=top,value=3"),
+            "cavity and pressure cannot act together: pressure acts on tissue of the element set 'corner'",
+        ),
+        (
+            ("drainage:permeability=1e-9", "cavity:elements=corner"),
+            "cavity and drainage cannot act together: drainage acts on tissue of the element set 'corner'",
+        ),
+        (
+            ("resection:elements=corner", "inclusion:ratio=3,elements=corner"),
+            "resection and inclusion cannot act together: in the tissue that is left the element set 'corner' is empty",
+        ),
+    ],
+)
+def test_what_has_no_meaning_together_is_refused(tmp_path, said, expected):
+    given = [word for one in said for word in ("--with", one)]
+    done = run(write_folder(tmp_path / "case"), *given, "--out", tmp_path / "out")
+    assert done.status == 2 and expected in done.err and said[1] in done.err, done.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_case_of_what_has_no_meaning_together_is_refused(tmp_path):
+    folder = write_folder(tmp_path / "case")
+    with (folder / "case.toml").open("a", encoding="utf-8") as stream:
+        stream.write('[[mechanism]]\nkind = "cavity"\nelements = "corner"\n')
+        stream.write('[[mechanism]]\nkind = "drainage"\npermeability = 1e-9\n')
+    done = run(folder, "--out", tmp_path / "out")
+    assert done.status == 2 and "cavity and drainage cannot act together: drainage acts on" in done.err, done.err
+
+
+def test_a_boundary_is_refused_too(tmp_path):
+    """A face that is pressed, as a boundary says it, is a pressure."""
+    pressed = ('kind = "force"\ntotal = [0.01, 0.02, -0.05]', 'kind = "pressure"\nvalue = 10.0')
+    done = run(write_folder(tmp_path / "case", pressed), "--with", "cavity:elements=corner", "--out", tmp_path / "out")
+    assert done.status == 2 and "cavity and pressure cannot act together" in done.err, done.err
+
+
 def test_elements_that_do_not_lock_move_more(tmp_path):
     folder = write_folder(tmp_path / "case")
     stiff = ("--poisson", "0.49")

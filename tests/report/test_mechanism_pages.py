@@ -13,6 +13,7 @@ from warpbrain.report.mechanisms.cost import PLAIN, read_costs, reasons, row_of,
 from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
 from warpbrain.report.mechanisms.index import index
 from warpbrain.report.mechanisms.page import page
+from warpbrain.report.mechanisms.pairs import pairs_page
 from warpbrain.report.mechanisms.picture import write_picture
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -44,17 +45,30 @@ def test_a_picture_is_of_the_present_files(kind):
 def test_the_index_has_not_drifted_and_nothing_is_left_behind():
     text = (PAGES / "index.md").read_text(encoding="utf-8")
     assert text == index(EFFECTS, COSTS), MAKE
-    assert {path.stem for path in PAGES.glob("*.md")} == {"index", *mechanisms()}
+    assert {path.stem for path in PAGES.glob("*.md")} == {"index", "pairs", *mechanisms()}
     assert {path.stem for path in FIGURES.glob("mechanism-*.png")} == {f"mechanism-{kind}" for kind in mechanisms()}
     assert set(EFFECTS) == set(mechanisms())
 
 
+def test_the_table_of_pairs_has_not_drifted():
+    assert (PAGES / "pairs.md").read_text(encoding="utf-8") == pairs_page(), MAKE
+
+
+def test_every_pair_is_in_the_table_with_what_it_means_or_why_not():
+    kinds = list(mechanisms())
+    rows = [row.split(" | ") for row in pairs_page().splitlines() if row.startswith("| [")]
+    assert len(rows) == len(kinds) * (len(kinds) + 1) // 2
+    for first, second, formula, said in rows:
+        assert formula or said.startswith("Refused"), (first, second)
+
+
 @pytest.mark.parametrize("kind", mechanisms())
-def test_every_mechanism_has_its_four_faces(kind):
+def test_every_mechanism_has_its_five_faces(kind):
     mechanism = mechanisms()[kind]
     assert mechanism.sentence.endswith(".")
     assert hasattr(mechanism, "example"), f"{kind}: say an example of it on {BASE}"
     assert set(mechanism.confused_with) <= {*mechanisms(), "drainage"}
+    assert set(mechanism.together) <= set(mechanisms())
     for name, says in mechanism.parameters().items():
         assert says.doc.endswith("."), name
     assert assume(find_case(BASE), mechanism.example).mechanisms[-1].kind == kind

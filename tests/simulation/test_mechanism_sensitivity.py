@@ -165,9 +165,19 @@ def with_tissues(plain: Model, acting: list[Mechanism]) -> tuple[Callable[[Float
 
 HELD = ("pressure", "swelling", "traction", "inclusion set", "compressibility")
 ON_A_TABLE = ("contact lifting", "falx", "asymmetry")
+#: What the tissue is made of: fibres and a tension see the growth, and fibres the factor on moduli.
+MADE_OF = ("inclusion", "fibres", "residual-stress", "swelling")
 
 
-@pytest.mark.parametrize(("names", "elements"), [(HELD, "tet4"), (HELD, "tet4-averaged"), (ON_A_TABLE, "tet4")])
+@pytest.mark.parametrize(
+    ("names", "elements"),
+    [
+        (HELD, "tet4"),
+        (HELD, "tet4-averaged"),
+        (ON_A_TABLE, "tet4"),
+        *((MADE_OF, elements) for elements in ("tet4", "tet4-averaged", "tet10")),
+    ],
+)
 def test_together_and_with_tissues(
     names: tuple[str, ...], elements: str, device: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -31,9 +31,9 @@ from warpbrain.simulation.model import ELEMENTS, QUADRATIC, Material, Model
 from warpbrain.simulation.system import System
 
 FIRST: tuple[Mechanism, ...] = (
-    Cavity(elements="half", pressure=10.0),
+    Cavity(elements="other half", pressure=10.0),
     Contact(nodes="below", state="lifting", friction=0.1),
-    Drainage(permeability=1e-4, drained="wall"),
+    Drainage(permeability=1e-4, drained="wall", elements="half"),
     Falx(nodes="wall", stiffness=1e4, thickness=0.1),
     Fibres(direction=(1.0, 0.0, 0.0), stiffness=100.0),
     Inclusion(ratio=2.0, elements="half"),
@@ -43,10 +43,11 @@ FIRST: tuple[Mechanism, ...] = (
     Viscoelasticity(moduli=(1.0,), times=(0.1,)),
 )
 SECOND: tuple[Mechanism, ...] = (
-    Cavity(elements="half", pressure=40.0, left=0.3),
+    Cavity(elements="other half", pressure=40.0, left=0.3),
     Contact(nodes="below", state="lifting", friction=0.0, penalty=20.0),
     Drainage(
         permeability=3e-4,
+        elements="half",
         storage=1e-5,
         drained="wall",
         pressure=20.0,
@@ -71,7 +72,9 @@ def model_of(mechanisms: Sequence[Mechanism], modulus: float = 1000.0, elements:
     mesh = cube(2)
     x, z = mesh.points[:, 0], mesh.points[:, 2]
     half = mesh.points[mesh.tetrahedra].mean(axis=1)[:, 0] > 0.5
-    mesh = replace(mesh, node_sets={"below": z < 1e-9, "wall": x > 1.0 - 1e-9}, element_sets={"half": half})
+    mesh = replace(
+        mesh, node_sets={"below": z < 1e-9, "wall": x > 1.0 - 1e-9}, element_sets={"half": half, "other half": ~half}
+    )
     constrained = np.repeat((z > 1.0 - 1e-9)[:, None], 3, axis=1)
     plain = Model(mesh, {1: Material(NeoHookean(modulus), 0.4)}, 1000.0, constrained, elements=elements)
     return with_mechanisms(plain, mechanisms)

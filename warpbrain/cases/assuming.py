@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from warpbrain.cases.case import Case
-from warpbrain.cases.parts.mechanisms import in_si, left_by
+from warpbrain.cases.parts.mechanisms import in_si
 from warpbrain.cases.parts.named import Named
 from warpbrain.errors import InputError
-from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Says
+from warpbrain.physics.composition import require_composable, require_left
+from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing, Says
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.problems import Problems
 
@@ -34,7 +35,8 @@ def assume(case: Case, said: str) -> Case:
     Raises
     ------
     InputError
-        If there is no such mechanism or key, a value is not one, or something needed is missing.
+        If there is no such mechanism or key, a value is not one, something needed is missing, or the mechanism has no
+        meaning together with one that the case has.
 
     Examples
     --------
@@ -68,14 +70,20 @@ def assume(case: Case, said: str) -> Case:
         says = mechanism.parameters()[missing[0]]
         raise InputError(f"{said}: {missing[0]} is missing{f' [{says.unit}]' if says.unit else ''}: {says.doc}")
     others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
+    removing = tuple(there for there in others if isinstance(there, Removing))
+    facts = Facts(named.mesh, case.gravity_axis, case.density, removing)
     try:
-        left = left_by(others, named.mesh)
-        made = mechanism.of_case(values, Facts(named.mesh, case.gravity_axis, case.density, left))
+        made = mechanism.of_case(values, facts)
     except ParameterError as error:
         raise InputError(f"{said}: {error.key}: {error}") from None
     except InputError as error:
         raise InputError(f"{said}: {error}") from None
-    return replace(case, mesh=named.mesh, mechanisms=(*others, made))
+    acting = (*others, made)
+    try:
+        require_composable(acting, require_left(acting, named.mesh))
+    except InputError as error:
+        raise InputError(f"{said}: {error}") from None
+    return replace(case, mesh=named.mesh, mechanisms=acting)
 
 
 def _key(said: str, mechanism: type[Mechanism], word: str) -> str:

@@ -19,6 +19,7 @@ from warpbrain.cases.parts.recordings import read_recordings
 from warpbrain.cases.parts.tissues import read_body, read_tissues
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
+from warpbrain.physics.composition import CompositionError, require_composable, require_left
 from warpbrain.problems import Problems
 from warpbrain.recordings.inside import check_points_inside, check_surface_near
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
@@ -103,6 +104,10 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     )
     if specimen is None:
         check_together(context, mesh, boundaries)
+    try:
+        require_composable(mechanisms, require_left(mechanisms, mesh))
+    except CompositionError as error:
+        problems.add(file, "[[mechanism]]", str(error), "see docs/mechanisms/pairs.md")
     left = case.remaining[0]
     check_faces(context, left, boundaries)
     for recording in recordings:

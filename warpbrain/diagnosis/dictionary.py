@@ -14,6 +14,7 @@ from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.sensors import spread_points
 from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh, face_vectors, nodes_of
+from warpbrain.physics.composition import CompositionError, require_composable
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.threads import in_threads
@@ -119,10 +120,27 @@ def dictionary_of(case: Case, kinds: Sequence[str] | None = None, instants: int 
     rejected: dict[str, str] = {}
     for kind in asked:
         try:
-            proposals[kind] = tuple(known[kind].proposals(situation))
+            proposals[kind] = _composable(case, situation.mesh, known[kind].proposals(situation))
         except NotTestableError as error:
             rejected[kind] = f"not testable with these data: {error}"
     return Dictionary(situation, proposals, rejected)
+
+
+def _composable(case: Case, mesh: TetMesh, proposals: Sequence[Proposal]) -> tuple[Proposal, ...]:
+    """Those proposals that have a meaning together with what the case assumes; `NotTestableError` if none has."""
+    found, refused = [], ""
+    for proposal in proposals:
+        made = proposal.make(proposal.mean)
+        kept = [own for own in case.mechanisms if own.several or own.kind != made.kind]
+        try:
+            require_composable([*kept, made], mesh)
+        except CompositionError as error:
+            refused = str(error)
+        else:
+            found.append(proposal)
+    if refused and not found:
+        raise NotTestableError(refused)
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)

@@ -205,8 +205,8 @@ class Linearisation:
 
     @cached_property
     def element_forces(self) -> Floats:
-        """Internal forces (m, 4, 3) [N] of the elements."""
-        return _element_forces(self.system, self.u)
+        """Internal forces (m, 4, 3) [N] of the elements that go with their moduli: of laws, fibres and viscosity."""
+        return _element_forces(self.system, self.u, of_moduli=True)
 
     @cached_property
     def growth_forces(self) -> Floats:
@@ -220,6 +220,7 @@ class Linearisation:
             model = self.system.model
             grown = replace(model, mechanisms=(*model.mechanisms, Swelling(amount=amount)))
             beside = System(grown, str(self.system.device), self.system.precision.name)
+            beside.remember_as(self.system)
             sides.append(_element_forces(beside, self.u))
         return (sides[1] - sides[0]) / (2.0 * _GROWTH)
 
@@ -232,8 +233,12 @@ class Linearisation:
         return np.asarray(asked.internal.numpy().astype(np.float64))
 
 
-def _element_forces(system: System, u: Floats) -> Floats:
-    """Internal forces (m, 4, 3) [N] of the elements of a system at a displacement."""
+def _element_forces(system: System, u: Floats, of_moduli: bool = False) -> Floats:
+    """Internal forces (m, 4, 3) [N] of the tissue of a system at a displacement; of its moduli alone, if asked."""
     system.u.assign(u)
     system.evaluate_forces()
-    return np.asarray(system.element_forces.numpy().astype(np.float64))
+    found = system.element_forces.numpy().astype(np.float64)
+    for term in system.terms:
+        if term.elements is not None and (term.of_moduli or not of_moduli):
+            found[term.elements] += term.forces.numpy()
+    return np.asarray(found)

@@ -14,10 +14,12 @@ from warpbrain.cases.case import Case
 from warpbrain.diagnosis.realigned import realigned
 from warpbrain.diagnosis.sensors import Sensors, sensors_at
 from warpbrain.diagnosis.stiffness_field import StiffnessField, stiffness_modes
+from warpbrain.errors import SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.composition import CompositionError
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import Patch
 from warpbrain.simulation.assumed import all_substituted
@@ -238,7 +240,11 @@ class States:
         return self._factors[acting]
 
     def _system(self, hypothesis: Hypothesis) -> System:
-        model, _ = model_of(self.case_of(hypothesis))
+        try:
+            model, _ = model_of(self.case_of(hypothesis))
+        except CompositionError as error:
+            # there is no such state, as of loads without an equilibrium
+            raise SolveError(str(error)) from None
         if hypothesis.field.any():
             field = StiffnessField(log_factor=self.modes @ hypothesis.field)
             model = replace(model, mechanisms=(*model.mechanisms, field))

@@ -1,10 +1,13 @@
 """Kernels of energies that are added to a tetrahedron's own: functions of `F` with a direction or a tensor.
 
-A term brings two device functions of the deformation gradient and of a row of numbers of its element:
+A term brings device functions of the elastic deformation gradient and of a row of numbers of its element:
 
-    energy(F, data, e) -> Psi [Pa]
-    moduli(F, g, h, data, e) -> g . dP/dF . h [Pa/m2] for two gradients of shape functions, symmetric in its use
-    stress(F, data, e) -> P [Pa]
+    energy(F_e, data, e) -> Psi [Pa]
+    moduli(F_e, g, h, data, e) -> g . dP/dF . h [Pa/m2] for two gradients of shape functions, symmetric in its use
+    stress(F_e, data, e) -> P [Pa]
+
+With the growth stretch `s` of an element, `F_e = F/s`, the energy of its reference volume is `s^3 Psi(F/s)`, so
+`P = s^2 P_e` and `dP/dF = s dP_e/dF_e` (as in `warpbrain.physics.laws.grown`).
 """
 
 from functools import cache
@@ -38,6 +41,7 @@ def extra_kernels(key: str, energy: Any, stress: Any, moduli: Any, precision: Pr
         nodes: wp.array[wp.vec4i],
         inverse_edges: wp.array[mat33],
         volume: wp.array[scalar],
+        stretch: wp.array[scalar],
         data: wp.array2d[scalar],
         scale: wp.array[scalar],
         u: wp.array[vec3],
@@ -46,8 +50,9 @@ def extra_kernels(key: str, energy: Any, stress: Any, moduli: Any, precision: Pr
         t = wp.tid()
         e = elements[t]
         G = inverse_edges[e]
-        F = deformation_gradient(u, nodes[e], G)
-        store_forces(scale[0] * volume[t] * stress(F, data, t), G, element_forces, t)
+        s = stretch[t]
+        F = deformation_gradient(u, nodes[e], G) / s
+        store_forces(scale[0] * volume[t] * s * s * stress(F, data, t), G, element_forces, t)
 
     @wp.kernel(module=module)
     def tangents(
@@ -55,6 +60,7 @@ def extra_kernels(key: str, energy: Any, stress: Any, moduli: Any, precision: Pr
         nodes: wp.array[wp.vec4i],
         inverse_edges: wp.array[mat33],
         volume: wp.array[scalar],
+        stretch: wp.array[scalar],
         data: wp.array2d[scalar],
         scale: wp.array[scalar],
         u: wp.array[vec3],
@@ -64,9 +70,10 @@ def extra_kernels(key: str, energy: Any, stress: Any, moduli: Any, precision: Pr
         t = wp.tid()
         e = elements[t]
         G = inverse_edges[e]
-        F = deformation_gradient(u, nodes[e], G)
-        V = scale[0] * volume[t]
-        store_forces(V * stress(F, data, t), G, element_forces, t)
+        s = stretch[t]
+        F = deformation_gradient(u, nodes[e], G) / s
+        V = scale[0] * volume[t] * s
+        store_forces(V * s * stress(F, data, t), G, element_forces, t)
         a, b, c = G[0], G[1], G[2]
         store_blocks(
             V * moduli(F, a, a, data, t),
@@ -85,6 +92,7 @@ def extra_kernels(key: str, energy: Any, stress: Any, moduli: Any, precision: Pr
         nodes: wp.array[wp.vec4i],
         inverse_edges: wp.array[mat33],
         volume: wp.array[scalar],
+        stretch: wp.array[scalar],
         data: wp.array2d[scalar],
         scale: wp.array[scalar],
         u: wp.array[vec3],
@@ -92,8 +100,9 @@ def extra_kernels(key: str, energy: Any, stress: Any, moduli: Any, precision: Pr
     ):
         t = wp.tid()
         e = elements[t]
-        F = deformation_gradient(u, nodes[e], inverse_edges[e])
-        out[t] = scale[0] * volume[t] * energy(F, data, t)
+        s = stretch[t]
+        F = deformation_gradient(u, nodes[e], inverse_edges[e]) / s
+        out[t] = scale[0] * volume[t] * s * s * s * energy(F, data, t)
 
     return forces, tangents, energies
 
@@ -113,6 +122,7 @@ def quadratic_extra_kernels(
         nodes: wp.array2d[int],
         inverse_edges: wp.array[mat33],
         volume: wp.array[scalar],
+        stretch: wp.array[scalar],
         data: wp.array2d[scalar],
         scale: wp.array[scalar],
         u: wp.array[vec3],
@@ -121,9 +131,10 @@ def quadratic_extra_kernels(
         t = wp.tid()
         e = elements[t]
         G = inverse_edges[e]
-        V = share * scale[0] * volume[t]
+        s = stretch[t]
+        V = share * scale[0] * volume[t] * s * s
         for point in range(POINTS):
-            F = gradient_at(u, nodes, e, point, G)
+            F = gradient_at(u, nodes, e, point, G) / s
             add_forces(V * stress(F, data, t), point, G, element_forces, t)
 
     @wp.kernel(module=module)
@@ -132,6 +143,7 @@ def quadratic_extra_kernels(
         nodes: wp.array2d[int],
         inverse_edges: wp.array[mat33],
         volume: wp.array[scalar],
+        stretch: wp.array[scalar],
         data: wp.array2d[scalar],
         scale: wp.array[scalar],
         u: wp.array[vec3],
@@ -141,12 +153,13 @@ def quadratic_extra_kernels(
         t = wp.tid()
         e = elements[t]
         G = inverse_edges[e]
-        V = share * scale[0] * volume[t]
+        s = stretch[t]
+        V = share * scale[0] * volume[t] * s
         axes = wp.identity(n=3, dtype=scalar)
         a, b, c = axes[0], axes[1], axes[2]
         for point in range(POINTS):
-            F = gradient_at(u, nodes, e, point, G)
-            add_forces(V * stress(F, data, t), point, G, element_forces, t)
+            F = gradient_at(u, nodes, e, point, G) / s
+            add_forces(V * s * stress(F, data, t), point, G, element_forces, t)
             add_blocks(
                 V * moduli(F, a, a, data, t),
                 V * moduli(F, a, b, data, t),
@@ -166,6 +179,7 @@ def quadratic_extra_kernels(
         nodes: wp.array2d[int],
         inverse_edges: wp.array[mat33],
         volume: wp.array[scalar],
+        stretch: wp.array[scalar],
         data: wp.array2d[scalar],
         scale: wp.array[scalar],
         u: wp.array[vec3],
@@ -173,10 +187,11 @@ def quadratic_extra_kernels(
     ):
         t = wp.tid()
         e = elements[t]
+        s = stretch[t]
         found = scalar(0.0)
         for point in range(POINTS):
-            F = gradient_at(u, nodes, e, point, inverse_edges[e])
-            found += share * scale[0] * volume[t] * energy(F, data, t)
-        out[t] = found
+            F = gradient_at(u, nodes, e, point, inverse_edges[e]) / s
+            found += energy(F, data, t)
+        out[t] = share * scale[0] * volume[t] * s * s * s * found
 
     return forces, tangents, energies

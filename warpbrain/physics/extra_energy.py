@@ -1,4 +1,8 @@
-"""A term whose energy is added to that of tetrahedra: fibres, residual stress."""
+"""A term whose energy is added to that of tetrahedra: fibres, residual stress.
+
+It is part of the tissue: an energy of the elastic deformation `F_e = F F_g^-1` on the grown volume, times a factor
+of each element: that on its moduli, or the part of it that is left.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +20,23 @@ from warpbrain.physics.term import Body, Term
 
 @dataclass(frozen=True)
 class ExtraEnergy:
-    """Device functions of an added energy; see `warpbrain.kernels.extra_energy`."""
+    """Device functions of an added energy; see `warpbrain.kernels.extra_energy`.
+
+    Attributes
+    ----------
+    key : str
+        Part of the name of the compiled module.
+    energy, stress, moduli : wp.func
+    goes_with : str
+        ``"moduli"``: times the factor on the moduli of an element (fibres); ``"tissue"``: times the part of it that is
+        left (a tension, which is no modulus).
+    """
 
     key: str
     energy: Any
     stress: Any
     moduli: Any
+    goes_with: str = "moduli"
 
 
 class ExtraEnergyTerm(Term):
@@ -50,10 +65,20 @@ class ExtraEnergyTerm(Term):
         scalar = body.precision.scalar
         kernels = extra_kernels if body.quadratic is None else quadratic_extra_kernels
         self._kernels = kernels(code.key, code.energy, code.stress, code.moduli, body.precision)
+        self.elements, self.of_moduli = elements, code.goes_with == "moduli"
         self._elements = self.array(elements, int)
         self._volume = self.array(body.mesh.volumes[elements], scalar)
+        self._stretch = self.array(np.ones(len(elements)), scalar)
+        self.take_moduli()
         self._data = self.array(data, scalar)
         self._energies = wp.zeros(len(elements), dtype=scalar, device=body.device)
+
+    def take_moduli(self) -> None:
+        assert self.elements is not None
+        body = self.body
+        factor = body.stiffness_factors if self.of_moduli else body.remaining_parts
+        self._volume.assign((factor * body.mesh.volumes)[self.elements])
+        self._stretch.assign(body.growth_stretches[self.elements])
 
     def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
         body = self.body
@@ -62,6 +87,7 @@ class ExtraEnergyTerm(Term):
             body.element_nodes,
             body.inverse_edges,
             self._volume,
+            self._stretch,
             self._data,
             self.scale,
             u,

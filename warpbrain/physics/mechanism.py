@@ -1,4 +1,4 @@
-"""What a mechanism is: a piece of physics that a case can assume, in one file with four faces.
+"""What a mechanism is: a piece of physics that a case can assume, in one file with five faces.
 
 1. what it is: `kind`, `sentence` and `detail`;
 2. its parameters, the fields of the class made by `parameter`: unit, limits, what is expected of them and where that
@@ -6,7 +6,9 @@
 3. what it does: a mechanism is also one or several of `Load` (forces that do not follow the deformation), `Following`
    (a term with forces that do), `Weakening` (softer or stiffer elements), `Emptying` (lighter ones), `Growing` (larger
    or smaller ones), `Substituting` (another law) and `Removing` (fewer elements);
-4. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), an `example`, and how it
+4. how it enters the total potential (`enters`), so what it means together with others (`together`), and which of them
+   it excludes (`excludes`): see `warpbrain.physics.potential`;
+5. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), an `example`, and how it
    may act where a case does not declare it (`proposals`).
 
 Its derivatives by its parameters are nobody's work: `warpbrain.simulation.beside` differences what it does. For that a
@@ -24,6 +26,7 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
@@ -34,6 +37,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.ramp import Ramped
 from warpbrain.physics.term import Following
@@ -141,14 +145,23 @@ class Facts:
     gravity_axis : (float, float, float) or None
     density : float
         [kg/m3]
-    left : TetMesh or None
-        What of it is left by mechanisms that remove elements, on which all others act; None: the whole.
+    removing : tuple of Mechanism
+        What else the case assumes that removes elements.
     """
 
     mesh: TetMesh
     gravity_axis: tuple[float, float, float] | None = None
     density: float = 1211.5
-    left: TetMesh | None = None
+    removing: tuple[Mechanism, ...] = ()
+
+    @cached_property
+    def left(self) -> TetMesh:
+        """What is left of the anatomy, on which all others act."""
+        mesh = self.mesh
+        for mechanism in self.removing:
+            assert isinstance(mechanism, Removing)
+            mesh, _ = mechanism.remaining(mesh)
+        return mesh
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,6 +179,10 @@ class Mechanism(Ramped, abc.ABC):
     sentence: ClassVar[str]
     #: What `--with` says of it on the case `phantom-loaded`: its picture in the docs and its cost are of this.
     example: ClassVar[str]
+    #: How it enters the total potential.
+    enters: ClassVar[Enters]
+    #: What it means together with other kinds, by kind, where the total potential leaves something open.
+    together: ClassVar[Mapping[str, str]] = {}
     #: Kinds of mechanisms that have nearly the same effect.
     confused_with: ClassVar[tuple[str, ...]] = ()
     #: What must be observed to tell it from others, in words; empty: one deformed state is enough.
@@ -227,8 +244,22 @@ class Mechanism(Ramped, abc.ABC):
             If a parameter makes no sense in this case.
         """
         made = cls(**values)
-        made.check(facts.mesh if facts.left is None else facts.left)
+        made.check_in(facts)
         return made
+
+    def check_in(self, facts: Facts) -> None:
+        """Raise `ParameterError` if a parameter makes no sense in what is left of the anatomy of a case."""
+        try:
+            self.check(facts.left)
+        except ParameterError as error:
+            if not facts.removing:
+                raise
+            try:
+                self.check(facts.mesh)
+            except ParameterError:
+                raise error from None
+            both = f"{facts.removing[0].kind} and {self.kind} cannot act together"
+            raise ParameterError(error.key, f"{both}: in the tissue that is left {error}") from None
 
     @property
     def everywhere(self) -> bool:
@@ -245,6 +276,19 @@ class Mechanism(Ramped, abc.ABC):
     def held(self, mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Nodes (k,), repeated if need be, and directions (k, 3) in which it holds them."""
         return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+
+    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+        """Elements (m,) whose tissue carries what it does, so that it means nothing without them; none by default."""
+        return np.zeros(len(mesh.tetrahedra), dtype=bool)
+
+    def excludes(self, other: Mechanism, mesh: TetMesh) -> str:
+        """Why it and another one have no meaning together on a mesh; empty if they have."""
+        return ""
+
+    @classmethod
+    def excluded(cls, other: type[Mechanism]) -> str:
+        """Where it excludes mechanisms of another kind, in words; empty if nowhere."""
+        return ""
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
@@ -294,7 +338,7 @@ class Weakening(Protocol):
 
 @runtime_checkable
 class Emptying(Protocol):
-    """A mechanism that takes tissue away little by little, and its weight and mass with it."""
+    """A mechanism that takes tissue away little by little, and with it all that it does: weight, mass and tension."""
 
     def factor(self, time: float = math.inf) -> float:
         """Its scale at a time [s]; by default long after its ramp."""

@@ -70,3 +70,12 @@ def _ball_weights(
 def elements_of(mesh: TetMesh, elements: str) -> NDArray[np.int64]:
     """Ids of the elements of a set; all of them for an empty name."""
     return np.flatnonzero(mesh.element_sets[elements]) if elements else np.arange(len(mesh.tetrahedra))
+
+
+def elements_with(mesh: TetMesh, faces: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """Elements (m,) that have one of some triangles (k, 3) as a face."""
+    corners = np.sort(mesh.tetrahedra, axis=1)[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]]
+    size = len(mesh.points)
+    keys = np.ravel_multi_index(np.moveaxis(corners, -1, 0), (size, size, size))
+    own = np.ravel_multi_index(np.sort(faces, axis=1).T, (size, size, size))
+    return np.asarray(np.isin(keys, own).any(axis=1))

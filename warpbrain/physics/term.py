@@ -82,6 +82,18 @@ class Body(Protocol):
     def shear_moduli(self) -> NDArray[np.float64]:
         """At rest, of each element (m,) [Pa]."""
 
+    @property
+    def stiffness_factors(self) -> NDArray[np.float64]:
+        """Factor (m,) on all moduli of each element, as it is now."""
+
+    @property
+    def remaining_parts(self) -> NDArray[np.float64]:
+        """Part (m,) of each element that is left, as it is now."""
+
+    @property
+    def growth_stretches(self) -> NDArray[np.float64]:
+        """Stretch (m,) of each element without stress, as it is now."""
+
 
 @dataclass(frozen=True)
 class Coupling:
@@ -140,6 +152,12 @@ class Term(abc.ABC):
     conservative: bool = True
     #: Shortest time [s] in which it forgets what was; None if it has no memory.
     forgets_in: float | None = None
+    #: Which elements (k,) its stencils are, where it is part of the tissue's own energy: then it is an energy of the
+    #: elastic deformation, on the grown volume. None: it is something beside the tissue.
+    elements: NDArray[np.integer] | None = None
+    #: Whether its energy goes with the moduli of these elements (fibres, viscosity), not only with how much is left of
+    #: them (a tension).
+    of_moduli: bool = True
     #: Its own unknowns; None if there are none.
     coupling: Coupling | None = None
     #: Names of the arrays that hold what it remembers of earlier steps and augmentations.
@@ -204,7 +222,7 @@ class Term(abc.ABC):
         return {}
 
     def take_moduli(self) -> None:  # noqa: B027
-        """Take the body's moduli, which have changed."""
+        """Take the body's moduli, factors on them, parts that are left and growth, some of which have changed."""
 
     def remembered(self) -> tuple[wp.array, ...]:
         """A copy of what it remembers."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
 from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
+from warpbrain.physics.composition import require_composable
 from warpbrain.physics.laws import Law
 from warpbrain.physics.load import BodyForce, Load
 from warpbrain.physics.mechanism import Emptying, Following, Mechanism
@@ -123,6 +124,8 @@ class Model:
     InputError
         If a tissue has no material, an array has the wrong shape or holds NaN, the density is not positive, or
         something acts that the elements cannot have.
+    CompositionError
+        If two mechanisms have no meaning together.
     """
 
     mesh: TetMesh
@@ -140,6 +143,8 @@ class Model:
         if self.elements not in ELEMENTS:
             raise InputError(f"elements = {self.elements!r}: expected one of {', '.join(ELEMENTS)}")
         self._require_quadratic()
+        acting = [each for each in (*self.mechanisms, *self.loads) if isinstance(each, Mechanism)]
+        require_composable(acting, self.mesh)
         shape = self.node_mesh.points.shape
         constrained = np.zeros(shape, dtype=bool) if self.constrained is None else np.asarray(self.constrained)
         prescribed = np.zeros(shape) if self.prescribed is None else np.asarray(self.prescribed, dtype=np.float64)

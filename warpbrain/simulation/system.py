@@ -109,6 +109,12 @@ class System:
         Lumped masses [kg] of the tissue that is there.
     terms : list of Term
         What else acts with forces that follow the deformation.
+    stiffness_factors : (m,) array
+        Factor on all moduli of each element.
+    remaining_parts : (m,) array
+        Part of each element that is left.
+    growth_stretches : (m,) array
+        Stretch of each element without stress.
     coupling_root : wp.array, shape (1,)
         Root of the factor in the matrix of what of the stiffness is not in blocks.
     seconds : float
@@ -125,6 +131,9 @@ class System:
         self.elements = len(model.mesh.tetrahedra)
         self._kernels = assembly_kernels(self.precision)
         self._place_mesh()
+        # of each element; terms ask for them
+        self.stiffness_factors, self.remaining_parts = np.ones(self.elements), np.ones(self.elements)
+        self.growth_stretches = np.ones(self.elements)
         self._following: list[Term] = [m.bind(self) for m in model.mechanisms if isinstance(m, Following)]
         self.terms = [*self._following]
         self._time_step = math.inf
@@ -134,8 +143,6 @@ class System:
         # of what alters elements, as they are now; None: not known yet
         alters = self._growing or self._weakening or model.emptying or self._averages or self._mixes
         self._scales: tuple[float, ...] | None = None if alters else ()
-        self._weight = np.ones(self.elements)
-        self._growth_stretch: Floats | float = 1.0
         self.groups = self._group_elements()
         self.terms += [term for group in self.groups for term in group.averaged]
         self._volumes_at_nodes: NodalVolumeTerm | None = None
@@ -234,7 +241,7 @@ class System:
             members = np.flatnonzero(self.model.mesh.tissue == label)
             parameters[members, : 1 + len(row)] = (modulus(material), *row)
         if self._growing:
-            parameters[:, -1] = self._growth_stretch
+            parameters[:, -1] = self.growth_stretches
         return parameters
 
     def set_materials(self, materials: Mapping[int, Material]) -> None:
@@ -299,7 +306,6 @@ class System:
             if place in others:
                 others[place].set_time_step(self._time_step)
                 term.adopt(others[place])
-            term.take_moduli()
         if list(before.mechanisms) != list(model.mechanisms):
             self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
             self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
@@ -339,13 +345,16 @@ class System:
         return {place: now for place, (was, now) in enumerate(following) if was is not now and was != now}
 
     def _write_materials(self) -> None:
+        """Let laws and terms have the moduli, factors and growth that elements have now."""
         for group, ((law_type, _), members) in zip(self.groups, self._grouped(self.model).items(), strict=True):
             group.parameters.assign(self._parameters(law_type, members))
             for term in group.averaged:
-                term.set_elements(self._parameters(law_type, members, averaged_modulus), self._weight)
+                term.set_elements(self._parameters(law_type, members, averaged_modulus), self.stiffness_factors)
         if self._volumes_at_nodes is not None:
-            growth = np.ones(self.elements) * self._growth_stretch**3
-            self._volumes_at_nodes.set_elements(self.volumetric_moduli, self._weight, growth)
+            growth = self.growth_stretches**3
+            self._volumes_at_nodes.set_elements(self.volumetric_moduli, self.stiffness_factors, growth)
+        for following in self._following:
+            following.take_moduli()
 
     def _place_fields(self) -> None:
         p, n, m = self.precision, self.size, self.elements
@@ -618,18 +627,19 @@ class System:
             return False
         self._scales = scales
         mesh = self.model.mesh
-        self._weight = np.ones(self.elements)
+        self.stiffness_factors = np.ones(self.elements)
         for softer, scale in zip(weakening, scales[len(growing) :], strict=False):
-            self._weight *= softer.stiffness_factor(mesh, scale)
+            self.stiffness_factors *= softer.stiffness_factor(mesh, scale)
         if emptying:
-            left = self.model.remaining_share(scales[len(growing) + len(weakening) :])
-            self.mass.assign(self.model.node_masses * left)
+            left = scales[len(growing) + len(weakening) :]
+            self.remaining_parts = self.model.remaining_part(left)
+            self.mass.assign(self.model.node_masses * self.model.remaining_share(left))
         # a kernel multiplies all that an element does by its volume
-        self.volume.assign((PART if self._averages else 1.0) * self._weight * self._volumes)
+        self.volume.assign((PART if self._averages else 1.0) * self.stiffness_factors * self._volumes)
         change = np.ones(self.elements)
         for larger, scale in zip(growing, scales, strict=False):
             change *= 1.0 + larger.growth(mesh, scale)
-        self._growth_stretch = np.cbrt(change)
+        self.growth_stretches = np.cbrt(change)
         return True
 
     # -- what terms remember --------------------------------------------------------------------------------------
@@ -732,7 +742,10 @@ class System:
         return np.eye(3) + edges.transpose(0, 2, 1) @ self.shape_gradients
 
     def stresses(self) -> Floats:
-        """First Piola-Kirchhoff stress of each element at `u` [Pa], shape (m, 3, 3)."""
+        """First Piola-Kirchhoff stress of the tissue of each element at `u` [Pa], shape (m, 3, 3).
+
+        What terms add to the law is in it, if it is of the tissue: fibres, tension, viscosity.
+        """
         p = self.precision
         F = self._array(self.deformation_gradients(), p.mat33)
         density = wp.zeros(self.elements, dtype=p.scalar, device=self.device)
@@ -746,8 +759,19 @@ class System:
                 # each of the four patches of an element has a quarter of it
                 elements, patch, stress = term.stress(self.u)
                 np.add.at(found, elements, 0.25 * (1.0 - PART) * stress[patch])
+        found *= self.stiffness_factors[:, None, None]
         if self._volumes_at_nodes is not None:
             F = self.deformation_gradients()
             cofactors = np.linalg.det(F)[:, None, None] * np.linalg.inv(F).transpose(0, 2, 1)
             found += self._volumes_at_nodes.pressures(self.u)[:, None, None] * cofactors
+        for added in self.terms:
+            if added.elements is not None:
+                found[added.elements] += self._mean_stress(added, added.elements)
         return found
+
+    def _mean_stress(self, term: Term, elements: NDArray[np.integer]) -> Floats:
+        """Mean of what a term adds to the stress of its elements [Pa], (k, 3, 3): `sum_a f_a (x) X_a / V`."""
+        term.evaluate_forces(self.u)
+        points = self.node_mesh.points[term.stencils]
+        away = points - points.mean(axis=1, keepdims=True)
+        return np.einsum("eai,eaj,e->eij", term.forces.numpy().astype(np.float64), away, 1.0 / self._volumes[elements])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.ramps import read_ramp
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
-from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing, Says
 from warpbrain.physics.mechanisms import mechanisms
 
@@ -57,21 +55,13 @@ def read_mechanisms(
         if any(value is None for value in values.values()):
             continue
         try:
-            facts = Facts(named.mesh, axis, density, left_by(found.values(), named.mesh))
+            facts = Facts(named.mesh, axis, density, tuple(m for m in found.values() if isinstance(m, Removing)))
             found[place] = mechanism.of_case(values | {"ramp": ramp}, facts)
         except ParameterError as error:
             _note(context, table, error)
         except InputError as error:
             table.problem("kind", str(error))
     return tuple(found[place] for place in sorted(found))
-
-
-def left_by(acting: Iterable[Mechanism], mesh: TetMesh) -> TetMesh:
-    """What is left of a mesh by those mechanisms that remove elements."""
-    for mechanism in acting:
-        if isinstance(mechanism, Removing):
-            mesh, _ = mechanism.remaining(mesh)
-    return mesh
 
 
 def _value(context: Context, table: Reading, named: Named, name: str, says: Says) -> Any:

@@ -7,7 +7,7 @@ An exponent of 2 is the neo-Hookean law; a negative one stiffens in compression.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -15,6 +15,7 @@ from warpbrain.physics.expectation import Normal
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.ogden import Ogden
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 
 
@@ -36,6 +37,10 @@ class Asymmetry(Mechanism):
     )
     kind: ClassVar[str] = "asymmetry"
     of_specimens: ClassVar[bool] = True
+    enters: ClassVar[Enters] = Enters("law", "alpha")
+    together: ClassVar[Mapping[str, str]] = {
+        "compressibility": "Each says a part of the law, in any order.",
+    }
     sentence: ClassVar[str] = "Tissue resists compression more than tension."
     example: ClassVar[str] = "asymmetry:exponent=-20"
     confused_with: ClassVar[tuple[str, ...]] = ("fibres",)

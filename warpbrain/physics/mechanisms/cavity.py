@@ -11,8 +11,8 @@ the body has an open wall, and the faces of the set on that surface carry nothin
 dura, a dressing) bears the fluid there. What the rim of an open wall does is said in `pressure`: if it moves, the load
 has no energy, the skew part of the tangent along it is left out, and Newton's method converges linearly.
 
-A limit: what other mechanisms add to the law of these elements (fibres, residual stress, viscosity) is not taken out.
-Leave these elements out of its element set.
+What other mechanisms add to the law of these elements (fibres, residual stress, viscosity) is taken out with them. What
+acts on them (a pressure or a traction on their faces, fluid in their pores) would act on nothing, and is refused.
 """
 
 from collections.abc import Sequence
@@ -26,6 +26,7 @@ from warpbrain.mesh import TetMesh, interface_faces
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.mechanisms.pressure import PressureTerm
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body
 
@@ -62,6 +63,7 @@ class Cavity(Mechanism):
     )
     kind: ClassVar[str] = "cavity"
     quadratic: ClassVar[bool] = True
+    enters: ClassVar[Enters] = Enters("part", "c", fills="W_cavity")
     sentence: ClassVar[str] = "Tissue is taken out little by little, and the walls of the cavity move in."
     example: ClassVar[str] = "cavity:elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("inclusion", "swelling")
@@ -95,6 +97,21 @@ class Cavity(Mechanism):
     def remaining_part(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
         """See `warpbrain.physics.mechanism.Emptying`."""
         return np.where(mesh.element_sets[self.elements], 1.0 - scale * (1.0 - self.left), 1.0)
+
+    def excludes(self, other: Mechanism, mesh: TetMesh) -> str:
+        emptied = mesh.element_sets.get(self.elements)
+        if emptied is None or not (other.acts_on(mesh) & emptied).any():
+            return ""
+        return (
+            f"{other.kind} acts on tissue of the element set '{self.elements}', of which the cavity leaves nothing: "
+            "leave it out there, or take the tissue out by a resection"
+        )
+
+    @classmethod
+    def excluded(cls, other: type[Mechanism]) -> str:
+        if other.acts_on is Mechanism.acts_on:
+            return ""
+        return f"where {other.kind} acts on tissue that the cavity takes out: nothing would be left to act on"
 
     def bind(self, body: Body) -> PressureTerm:
         """See `warpbrain.physics.term.Following`."""

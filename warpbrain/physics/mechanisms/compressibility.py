@@ -10,6 +10,7 @@ from typing import ClassVar
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.laws import Law
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 
 
@@ -33,6 +34,7 @@ class Compressibility(Mechanism):
     )
     kind: ClassVar[str] = "compressibility"
     of_specimens: ClassVar[bool] = True
+    enters: ClassVar[Enters] = Enters("law", "nu")
     sentence: ClassVar[str] = "Tissue gives way under pressure more, or less, than was assumed."
     example: ClassVar[str] = "compressibility:poisson=0.35"
     confused_with: ClassVar[tuple[str, ...]] = ("drainage", "swelling")

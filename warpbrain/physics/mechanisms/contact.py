@@ -21,7 +21,7 @@ repeated until they are those of the state to 0.1 %, or of the last time step: s
 `f A p (sqrt(s^2 + d^2) - d)`, with `d` = 0.1 mm, over which it builds up.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, ClassVar
@@ -38,6 +38,7 @@ from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.physics.term import Body, Term
 
@@ -88,6 +89,13 @@ class Contact(Mechanism):
         absent="the body's own surface as it was imaged",
     )
     kind: ClassVar[str] = "contact"
+    enters: ClassVar[Enters] = Enters("beside", "W_contact")
+    together: ClassVar[Mapping[str, str]] = {
+        "contact": "A node of both sets meets both walls.",
+        "drainage": "The wall carries the whole stress, of fluid and skeleton; where it drains is said apart.",
+        "resection": "The wall is the surface of the tissue that is left, unless another one is given.",
+        "swelling": "The wall stays where it was imaged, and holds what swells.",
+    }
     sentence: ClassVar[str] = "The brain's surface is not stuck to the skull: it slides along it, or lifts off."
     example: ClassVar[str] = "contact:nodes=side,state=lifting"
     confused_with: ClassVar[tuple[str, ...]] = ("traction", "gravity")

@@ -26,7 +26,7 @@ follow the pressure there, which overshoots (Vermeer and Verruijt 1981).
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -39,6 +39,7 @@ from warpbrain.kernels.pore import pore_kernels
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import LogNormal, Normal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body, Coupling, Term
@@ -112,6 +113,21 @@ class Drainage(Mechanism):
     elements: str = parameter("Element set that has pores; all if empty.", default="", kind="element set")
     kind: ClassVar[str] = "drainage"
     example: ClassVar[str] = "drainage:permeability=1e-9,exchange=1e-6,capillary_pressure=1000"
+    enters: ClassVar[Enters] = Enters("beside", "W_fluid")
+    together: ClassVar[Mapping[str, str]] = {
+        "asymmetry": "The law is that of the drained skeleton.",
+        "compressibility": "The Poisson ratio is that of the drained skeleton.",
+        "falx": "Fluid flows through the membrane.",
+        "fibres": "The fibres are part of the skeleton.",
+        "gravity": "The load is on skeleton and fluid together; the pressure is that beyond the hydrostatic one.",
+        "inclusion": "The skeleton is stiffer; the permeability stays.",
+        "pressure": "The load is on skeleton and fluid together; what the fluid has at drained faces is said apart.",
+        "residual-stress": "The tension is in the skeleton.",
+        "resection": "The wall of what was taken out is surface, and drained where the whole surface is.",
+        "swelling": "The skeleton swells, and takes its water through the pores: the fluid sees the whole `F`.",
+        "traction": "The load is on skeleton and fluid together.",
+        "viscoelasticity": "The skeleton relaxes by itself, and fluid flows.",
+    }
     sentence: ClassVar[str] = "Fluid in the tissue carries load at first, and flows away over minutes."
     confused_with: ClassVar[tuple[str, ...]] = ("viscoelasticity", "compressibility", "swelling")
     needs: ClassVar[tuple[str, ...]] = ("two times or more", "a change of volume, or bodies of two sizes")
@@ -160,6 +176,9 @@ class Drainage(Mechanism):
             name = f"node set '{self.drained}'" if self.drained else "the surface"
             raise ParameterError("drained", f"{name} holds no face of the tissue with pores: its fluid could not leave")
 
+    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+        return np.isin(np.arange(len(mesh.tetrahedra)), elements_of(mesh, self.elements))
+
     def open_nodes(self, mesh: TetMesh) -> NDArray[np.bool_]:
         """Nodes (n,) at which the pressure of the fluid is given: of the drained faces of elements with pores."""
         faces = mesh.boundary
@@ -184,7 +203,7 @@ class DrainageTerm(Term):
     Attributes
     ----------
     softness : wp.array, shape (k,)
-        `1/(2 mu)` of each element [1/Pa], of the stabilisation.
+        `1/(2 mu)` of each element [1/Pa], of the stabilisation; with the factor that its moduli have.
     """
 
     memory = ("_held", "_shape", "_beyond")
@@ -274,7 +293,7 @@ class DrainageTerm(Term):
         )  # fmt: skip
 
     def take_moduli(self) -> None:
-        self.softness.assign(0.5 / self.body.shear_moduli[self._elements.numpy()])
+        self.softness.assign(0.5 / (self.body.stiffness_factors * self.body.shear_moduli)[self._elements.numpy()])
         self._element_compliance(self.mechanism.storage, 1.0, 0.0, self._storage)
         self._entries.assign(self._yielding())
         self._gather(self.coupling.yielding)
@@ -305,7 +324,8 @@ class DrainageTerm(Term):
         So much it does to a pressure that varies over a length that is short beside the body.
         """
         elements = self._elements.numpy()
-        modulus = (self.body.volumetric_moduli + 2.0 * self.body.shear_moduli)[elements]
+        body = self.body
+        modulus = (body.stiffness_factors * (body.volumetric_moduli + 2.0 * body.shear_moduli))[elements]
         pairs = [2.0 if a == b else 1.0 for a in range(4) for b in range(a, 4)]
         return np.outer(self._volume.numpy().astype(np.float64) / (20.0 * modulus), pairs)
 

@@ -7,7 +7,7 @@ modulus `mu`, the incompressible neo-Hookean membrane (Bonet and Wood, Nonlinear
     W = A t mu/2 (tr C + 1/det C - 3),   P = t mu F (I - C^-1 / det C)
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar
@@ -22,6 +22,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.mesh.surface import all_faces
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body
 from warpbrain.physics.triangle_term import TriangleTerm
@@ -57,6 +58,15 @@ class Falx(Mechanism):
     )
     kind: ClassVar[str] = "falx"
     quadratic: ClassVar[bool] = True
+    enters: ClassVar[Enters] = Enters("beside", "W_falx")
+    together: ClassVar[Mapping[str, str]] = {
+        "cavity": "Only tissue is taken out: the membrane stays.",
+        "falx": "A face of both node sets carries two membranes.",
+        "inclusion": "The membrane is not tissue of the region: its stiffness stays.",
+        "resection": "Of the membrane the faces stay that tissue still holds.",
+        "swelling": "The membrane does not grow: it holds what swells.",
+        "viscoelasticity": "The membrane does not relax.",
+    }
     sentence: ClassVar[str] = "A stiff membrane, such as the falx, holds the tissue on both sides of it."
     example: ClassVar[str] = "falx:nodes=falx"
     confused_with: ClassVar[tuple[str, ...]] = ("inclusion", "contact")

@@ -6,7 +6,7 @@ with the direction `a`, dispersion `d` from 0 (all parallel) to 1/3 (none prefer
 2 (1 - 3 d) F a (x) a`, `P = k1 E exp(k2 E^2) H`. What `I1` adds beside `I4` is the scatter of the fibres.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -19,6 +19,7 @@ from warpbrain.physics.directions import element_directions, unit_vector
 from warpbrain.physics.expectation import LogNormal, Uniform
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
@@ -136,6 +137,13 @@ class Fibres(Mechanism):
     kind: ClassVar[str] = "fibres"
     quadratic: ClassVar[bool] = True
     of_specimens: ClassVar[bool] = True
+    enters: ClassVar[Enters] = Enters("energy", "Psi_fibres")
+    together: ClassVar[Mapping[str, str]] = {
+        "asymmetry": "The fibres add to the new law.",
+        "compressibility": "The Poisson ratio is that of the law without fibres.",
+        "residual-stress": "The fibres are without stress in the imaged shape, before the tension acts.",
+        "swelling": "The fibres grow with the tissue: swelling that nothing holds stretches none.",
+    }
     sentence: ClassVar[str] = "Nerve fibres make the tissue stiffer along their direction."
     example: ClassVar[str] = "fibres:direction=1/0/0,stiffness=2000"
     confused_with: ClassVar[tuple[str, ...]] = ("asymmetry", "inclusion")

@@ -34,6 +34,7 @@ from warpbrain.physics.directions import unit_vector
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Along, BodyForce
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 
 #: Standard gravity [m/s2] as used by the verification cases of this project.
@@ -88,6 +89,11 @@ class Gravity(BodyForce, Mechanism):
     kind: ClassVar[str] = "gravity"
     quadratic: ClassVar[bool] = True
     confused_with: ClassVar[tuple[str, ...]] = ("pressure", "swelling")
+    enters: ClassVar[Enters] = Enters("weight", "f_gravity")
+    together: ClassVar[Mapping[str, str]] = {
+        "cavity": "What has been taken out weighs nothing.",
+        "resection": "Levels are counted from the lowest point of the whole anatomy.",
+    }
     sentence: ClassVar[str] = "Cerebrospinal fluid drained, and the brain sinks under the weight it no longer carries."
     example: ClassVar[str] = "gravity:level=130"
 

@@ -1,12 +1,13 @@
 """A region that is stiffer or softer than the tissue around it: a tumour, a scar.
 
-All moduli of an element are multiplied by `exp(s w)`, `w` how much it belongs to the region and `exp(s)` the ratio.
+All moduli of an element are multiplied by `exp(s w)`, `w` how much it belongs to the region and `exp(s)` the ratio:
+those of its law, of fibres and of viscosity. A residual stress is no modulus.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
 
@@ -48,6 +50,13 @@ class Inclusion(Mechanism):
     centre: tuple[float, float, float] | None = parameter("Centre of a ball.", default=None, kind="position")
     radius: float | None = parameter("Its radius.", default=None, unit="mm", si=1e-3, above=0.0)
     kind: ClassVar[str] = "inclusion"
+    enters: ClassVar[Enters] = Enters("moduli", "r")
+    together: ClassVar[Mapping[str, str]] = {
+        "compressibility": "The ratio multiplies both moduli, so the Poisson ratio is the new one inside too.",
+        "cavity": "What is left of the tissue keeps its ratio.",
+        "gravity": "Stiffer tissue is not heavier.",
+        "inclusion": "Where regions overlap their ratios multiply.",
+    }
     sentence: ClassVar[str] = "A part of the tissue is stiffer or softer than the rest."
     example: ClassVar[str] = "inclusion:ratio=10,elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("swelling",)

@@ -26,7 +26,7 @@ taken out if the mesh has no node set of that name. Triangles of the surface bes
 are no part of it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, ClassVar
@@ -42,7 +42,9 @@ from warpbrain.mesh import TetMesh, faces_of, rim_edges
 from warpbrain.mesh.integrals import triangle_rule
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
+from warpbrain.physics.regions import elements_with
 from warpbrain.physics.term import Body
 from warpbrain.physics.triangle_term import TriangleTerm
 
@@ -71,6 +73,12 @@ class Pressure(Mechanism):
     )
     kind: ClassVar[str] = "pressure"
     quadratic: ClassVar[bool] = True
+    enters: ClassVar[Enters] = Enters("beside", "W_pressure")
+    together: ClassVar[Mapping[str, str]] = {
+        "pressure": "A face of both node sets carries the sum.",
+        "resection": "It acts on the faces of the node set that the surface of what is left has.",
+        "swelling": "It acts on the faces as they are, grown or not.",
+    }
     sentence: ClassVar[str] = "Fluid presses on part of the surface, more than on the rest of it."
     example: ClassVar[str] = "pressure:nodes=ventricle,value=300"
     confused_with: ClassVar[tuple[str, ...]] = ("gravity", "swelling")
@@ -90,6 +98,9 @@ class Pressure(Mechanism):
                 "nodes", f"node set '{self.nodes}' holds no face of the surface, which a pressure needs{cure}"
             )
         return own
+
+    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+        return elements_with(mesh, self.faces(mesh))
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 
 
@@ -28,6 +29,7 @@ class Resection(Mechanism):
     elements: str = parameter("Element set that was taken out.", default="resection", kind="element set")
     kind: ClassVar[str] = "resection"
     switches: ClassVar[bool] = True
+    enters: ClassVar[Enters] = Enters("body", "resection")
     sentence: ClassVar[str] = "Tissue was taken out, and what it held moves into the cavity."
     example: ClassVar[str] = "resection:elements=ball"
 
@@ -40,6 +42,14 @@ class Resection(Mechanism):
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
         return f" It is the element set '{self.elements}'; the wall of the cavity is free."
+
+    @classmethod
+    def excluded(cls, other: type[Mechanism]) -> str:
+        """Where nothing is left of what another one acts on; see `warpbrain.physics.composition.require_left`."""
+        places = ("node set", "element set", "position")
+        if not any(says.kind in places for says in other.parameters().values()):
+            return ""
+        return f"where nothing is left of what {other.kind} acts on"
 
     def remaining(self, mesh: TetMesh) -> tuple[TetMesh, NDArray[np.int32]]:
         """The mesh that is left, and for each of its nodes the id in the whole mesh.

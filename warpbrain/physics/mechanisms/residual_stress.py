@@ -7,7 +7,7 @@ body that holds it; a constant one on a body that is free does too. The imaged s
 tension acted.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -19,6 +19,7 @@ from warpbrain.physics.directions import element_directions, unit_vector
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
@@ -47,7 +48,7 @@ def _moduli(F: Any, g: Any, h: Any, data: wp.array2d[Any], e: int):
     return data[e, 0] * wp.dot(a, g) * wp.dot(a, h) * wp.identity(n=3, dtype=F.dtype)
 
 
-_CODE = ExtraEnergy("residual_stress", _energy, _stress, _moduli)
+_CODE = ExtraEnergy("residual_stress", _energy, _stress, _moduli, "tissue")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +87,12 @@ class ResidualStress(Mechanism):
     kind: ClassVar[str] = "residual-stress"
     quadratic: ClassVar[bool] = True
     of_specimens: ClassVar[bool] = True
+    enters: ClassVar[Enters] = Enters("tension", "T")
+    together: ClassVar[Mapping[str, str]] = {
+        "inclusion": "A tension is a stress that is said in Pa, no modulus: it stays.",
+        "swelling": "The tension is that of the swollen tissue, along the grown direction.",
+        "cavity": "The tension goes with the tissue.",
+    }
     sentence: ClassVar[str] = "Tissue is under tension before anything is done to it."
     example: ClassVar[str] = "residual-stress:tension=500,direction=0/0/1,elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("swelling",)

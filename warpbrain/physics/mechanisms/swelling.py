@@ -1,12 +1,12 @@
 """Swelling or shrinkage: tissue would have another volume if nothing held it.
 
-`F = F_e F_g` with `F_g = (1 + g)^(1/3) I`; only `F_e` makes stress (Rodriguez et al. 1994). See
-`warpbrain.physics.laws.grown`.
+`F = F_e F_g` with `F_g = (1 + g)^(1/3) I`; only `F_e` makes stress (Rodriguez et al. 1994), in the law
+(`warpbrain.physics.laws.grown`), in fibres, in viscosity: swelling that nothing holds makes none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
 
@@ -52,6 +53,13 @@ class Swelling(Mechanism):
     radius: float | None = parameter("Its radius.", default=None, unit="mm", si=1e-3, above=0.0)
     kind: ClassVar[str] = "swelling"
     of_specimens: ClassVar[bool] = True
+    enters: ClassVar[Enters] = Enters("growth", "g")
+    together: ClassVar[Mapping[str, str]] = {
+        "inclusion": "The moduli are those of the swollen tissue.",
+        "cavity": "What swells is what is left.",
+        "gravity": "Tissue weighs what it did when it was imaged: water that comes or goes is not weighed.",
+        "swelling": "Where regions overlap one grows what the other has grown.",
+    }
     sentence: ClassVar[str] = "Tissue takes up or loses water, and swells or shrinks."
     example: ClassVar[str] = "swelling:amount=20,elements=ball"
     confused_with: ClassVar[tuple[str, ...]] = ("pressure", "gravity")

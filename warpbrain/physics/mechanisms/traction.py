@@ -9,7 +9,7 @@ what hangs together with the point nearest to the centre and faces the same way 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar
@@ -21,7 +21,9 @@ from warpbrain.mesh import QuadraticMesh, TetMesh, patch_around, surface_forces
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
+from warpbrain.physics.regions import elements_with
 
 #: Where it is looked for: radii [m] of patches, and standard deviation of each component [Pa].
 _RADII, _USUAL = (0.009, 0.014), 1000.0
@@ -61,6 +63,12 @@ class Traction(Load, Mechanism):
     )
     kind: ClassVar[str] = "traction"
     quadratic: ClassVar[bool] = True
+    enters: ClassVar[Enters] = Enters("load", "f_traction")
+    together: ClassVar[Mapping[str, str]] = {
+        "resection": "It acts on what the surface of what is left has within the radius.",
+        "swelling": "The force is that on the imaged surface: it does not grow with it.",
+        "traction": "Where patches overlap their tractions add.",
+    }
     sentence: ClassVar[str] = "Something presses or pulls on a patch of the surface, such as a retractor."
     example: ClassVar[str] = "traction:centre=58/-17/50,value=-500/0/-500,radius=15"
     confused_with: ClassVar[tuple[str, ...]] = ("contact", "pressure")
@@ -70,6 +78,9 @@ class Traction(Load, Mechanism):
         super().check(mesh)
         if not self.nodal_forces(mesh).any() and any(self.value):
             raise ParameterError("centre", "no face of the surface lies within the radius of this point")
+
+    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+        return elements_with(mesh, mesh.boundary[patch_around(mesh.points, mesh.boundary, self.centre, self.radius)])
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:

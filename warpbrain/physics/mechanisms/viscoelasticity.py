@@ -1,7 +1,8 @@
 """Viscoelasticity: stress that relaxes, as a Prony series on the isochoric part (Holzapfel 2000, section 6.10).
 
-The case's law is what is left after a long time. Each branch adds a second Piola-Kirchhoff stress `q_i` that follows
-the isochoric neo-Hookean stress of the tissue's shear modulus at rest, `S = mu0 J^(-2/3) (I - I1/3 C^-1)`:
+`F` is the elastic one where tissue swells, and an inclusion multiplies these stresses too. The case's law is what is
+left after a long time. Each branch adds a second Piola-Kirchhoff stress `q_i` that follows the isochoric neo-Hookean
+stress of the tissue's shear modulus at rest, `S = mu0 J^(-2/3) (I - I1/3 C^-1)`:
 
     dq_i/dt + q_i/tau_i = beta_i dS/dt
     q_i(t + h) = exp(-h/tau_i) q_i(t) + beta_i exp(-h/(2 tau_i)) (S(t + h) - S(t))
@@ -14,7 +15,7 @@ exp(-h/(2 tau_i))` and `S = 2 dPsi/dC`, `Psi = mu0/2 (J^(-2/3) I1 - 3)`,
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations
@@ -30,6 +31,7 @@ from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks, store_forces
 from warpbrain.physics.expectation import LogNormal, LogUniform
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body, Term
 
@@ -75,6 +77,15 @@ class Viscoelasticity(Mechanism):
     )
     kind: ClassVar[str] = "viscoelasticity"
     of_specimens: ClassVar[bool] = True
+    enters: ClassVar[Enters] = Enters("energy", "Psi_viscous")
+    together: ClassVar[Mapping[str, str]] = {
+        "asymmetry": "The branches stay neo-Hookean, of the shear modulus at rest of the new law.",
+        "compressibility": "The branches are isochoric: they do not see it.",
+        "fibres": "The branches are of the tissue's shear modulus; fibres do not relax.",
+        "residual-stress": "The tension does not relax; the branches begin at rest in the imaged shape.",
+        "swelling": "The branches remember the stress of `F_e`: swelling that nothing holds strains none of them.",
+        "cavity": "What is taken out takes its memory with it.",
+    }
     sentence: ClassVar[str] = "Tissue resists fast deformation more than slow, and its stress relaxes."
     example: ClassVar[str] = "viscoelasticity:moduli=1,times=10"
     confused_with: ClassVar[tuple[str, ...]] = ("drainage",)
@@ -155,7 +166,8 @@ class ViscoelasticTerm(Term):
         self.mechanism = mechanism
         scalar, mat33 = body.precision.scalar, body.precision.mat33
         count, branches = len(self.stencils), len(mechanism.times)
-        self._weights = wp.zeros((count, 2), dtype=scalar, device=body.device)
+        self.elements = np.arange(count)
+        self._weights = wp.zeros((count, 3), dtype=scalar, device=body.device)
         self.take_moduli()
         self._decay = wp.zeros(branches, dtype=scalar, device=body.device)
         self._response = wp.zeros(branches, dtype=scalar, device=body.device)
@@ -171,7 +183,9 @@ class ViscoelasticTerm(Term):
         self._response.assign(np.array(self.mechanism.moduli) * np.exp(-0.5 * h / times))
 
     def take_moduli(self) -> None:
-        self._weights.assign(np.stack([self.body.mesh.volumes, self.body.shear_moduli], axis=1))
+        body = self.body
+        volumes = body.stiffness_factors * body.mesh.volumes
+        self._weights.assign(np.stack([volumes, body.shear_moduli, body.growth_stretches], axis=1))
 
     def forget(self) -> None:
         self._q.zero_()
@@ -247,12 +261,13 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
     ):
         e = wp.tid()
         G = inverse_edges[e]
-        F = deformation_gradient(u, nodes[e], G)
+        s = weights[e, 2]
+        F = deformation_gradient(u, nodes[e], G) / s
         change = isochoric(F, weights[e, 1]) - S_before[e]
         total = mat33()
         for k in range(decay.shape[0]):
             total += decay[k] * q[e, k] + response[k] * change
-        store_forces(scale[0] * weights[e, 0] * (F * total), G, element_forces, e)
+        store_forces(scale[0] * weights[e, 0] * s * s * (F * total), G, element_forces, e)
 
     @wp.kernel(module=module)
     def tangents(
@@ -270,7 +285,8 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
     ):
         e = wp.tid()
         G = inverse_edges[e]
-        F = deformation_gradient(u, nodes[e], G)
+        s = weights[e, 2]
+        F = deformation_gradient(u, nodes[e], G) / s
         mu = weights[e, 1]
         S = isochoric(F, mu)
         total = mat33()
@@ -278,8 +294,8 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
         for k in range(decay.shape[0]):
             total += decay[k] * q[e, k] + response[k] * (S - S_before[e])
             all += response[k]
-        V = scale[0] * weights[e, 0]
-        store_forces(V * (F * total), G, element_forces, e)
+        V = scale[0] * weights[e, 0] * s
+        store_forces(V * s * (F * total), G, element_forces, e)
         a, b, c = G[0], G[1], G[2]
         store_blocks(
             V * moduli(F, S, total, mu, all, a, a),
@@ -305,7 +321,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
         u: wp.array[vec3],
     ):
         e = wp.tid()
-        S = isochoric(deformation_gradient(u, nodes[e], inverse_edges[e]), weights[e, 1])
+        S = isochoric(deformation_gradient(u, nodes[e], inverse_edges[e]) / weights[e, 2], weights[e, 1])
         for k in range(decay.shape[0]):
             q[e, k] = decay[k] * q[e, k] + response[k] * (S - S_before[e])
         S_before[e] = S
@@ -324,7 +340,8 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
         energy: wp.array[scalar],
     ):
         e = wp.tid()
-        F = deformation_gradient(u, nodes[e], inverse_edges[e])
+        s = weights[e, 2]
+        F = deformation_gradient(u, nodes[e], inverse_edges[e]) / s
         root = wp.cbrt(wp.determinant(F))
         psi = scalar(0.5) * weights[e, 1] * (wp.ddot(F, F) / (root * root) - scalar(3.0))
         strain = wp.transpose(F) * F - wp.identity(n=3, dtype=scalar)
@@ -332,6 +349,6 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
         for k in range(decay.shape[0]):
             kept = decay[k] * q[e, k] - response[k] * S_before[e]
             total += response[k] * psi + scalar(0.5) * wp.ddot(kept, strain)
-        energy[e] = scale[0] * weights[e, 0] * total
+        energy[e] = scale[0] * weights[e, 0] * s * s * s * total
 
     return forces, tangents, advance, energies

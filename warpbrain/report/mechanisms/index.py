@@ -11,7 +11,7 @@ from warpbrain.report.mechanisms.effect import Effect
 _HEAD = """# Mechanisms
 
 What can act on a brain beside its tissue's own law. A case assumes one by a table of `case.toml`, a run by `--with`,
-and several act together:
+and several act together, as [one energy](pairs.md):
 
 ```toml
 [[mechanism]]

@@ -33,7 +33,10 @@ def page(kind: str, effect: Effect, costs: list[str]) -> str:
     lines += ["## What it is taken for", "", *confusions(mechanism), ""]
     lines += ["## Derivatives", "", *derivatives(mechanism), ""]
     lines += ["## Cost", "", *(costs or ["Not measured yet."]), ""]
-    lines += [f"[{source.rsplit('/', 1)[1]}]({source}), [all mechanisms](index.md)", ""]
+    lines += [
+        f"[{source.rsplit('/', 1)[1]}]({source}), [all mechanisms](index.md), [together with others](pairs.md)",
+        "",
+    ]
     return "\n".join(lines)
 
 

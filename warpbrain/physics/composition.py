@@ -1,0 +1,96 @@
+"""Which mechanisms cannot act together, and what each pair of them means if they can."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from warpbrain.errors import InputError
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanism import Mechanism, Removing
+from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.potential import potential
+
+
+class CompositionError(InputError):
+    """Two mechanisms that have no meaning together."""
+
+
+def require_composable(acting: Sequence[Mechanism], mesh: TetMesh) -> None:
+    """Raise `CompositionError` if two mechanisms exclude each other.
+
+    Parameters
+    ----------
+    acting : sequence of Mechanism
+    mesh : TetMesh
+        The body on which they act: without what has been removed.
+    """
+    for one, other in itertools.combinations(acting, 2):
+        for first, second in ((one, other), (other, one)):
+            if reason := first.excludes(second, mesh):
+                raise CompositionError(f"{first.kind} and {second.kind} cannot act together: {reason}")
+
+
+def require_left(acting: Sequence[Mechanism], mesh: TetMesh) -> TetMesh:
+    """The body that mechanisms leave; `CompositionError` if they take away what others of them act on.
+
+    Parameters
+    ----------
+    acting : sequence of Mechanism
+    mesh : TetMesh
+        The whole anatomy, of which each mechanism makes sense.
+    """
+    left = mesh
+    for removing in acting:
+        if not isinstance(removing, Removing):
+            continue
+        left, _ = removing.remaining(left)
+        for other in acting:
+            if other is removing:
+                continue
+            try:
+                other.check(left)
+            except InputError as error:
+                raise CompositionError(
+                    f"{removing.kind} and {other.kind} cannot act together: in the tissue that is left {error}"
+                ) from None
+    return left
+
+
+@dataclass(frozen=True)
+class Pair:
+    """What two kinds of mechanisms, or one twice, are together.
+
+    Attributes
+    ----------
+    kinds : (str, str)
+    potential : str
+        The total potential with both, as a formula; empty if a case cannot have both.
+    remark : str
+        What the formula leaves open; empty if nothing.
+    refused : str
+        Where, or why, a case cannot have both; empty if it always can.
+    """
+
+    kinds: tuple[str, str]
+    potential: str
+    remark: str
+    refused: str
+
+
+def pairs() -> list[Pair]:
+    """All pairs of the registry, each kind with itself too, in the order of their names."""
+    known = mechanisms().values()
+    return [_pair(one, other) for one, other in itertools.combinations_with_replacement(known, 2)]
+
+
+def _pair(one: type[Mechanism], other: type[Mechanism]) -> Pair:
+    kinds = (one.kind, other.kind)
+    if one is other and not one.several:
+        return Pair(
+            kinds, "", "", f"a case has one {one.kind}, a second one would act twice; that of `--with` takes its place"
+        )
+    remark = one.together.get(other.kind, "") or other.together.get(one.kind, "")
+    refused = one.excluded(other) or other.excluded(one)
+    return Pair(kinds, potential([one.enters, other.enters]), remark, refused)
