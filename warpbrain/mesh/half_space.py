@@ -106,7 +106,7 @@ def summed_at_nodes(mesh: TetMesh | QuadraticMesh, values: Floats) -> Floats:
     """Values (m, s, ...) at the nodes of tetrahedra, added up at each node (n, ...)."""
     nodes, count = elements_of_nodes(mesh).ravel(), len(mesh.points)
     columns = values.reshape(len(nodes), -1).T
-    sums = [np.bincount(nodes, weights=column, minlength=count) for column in columns]
+    sums = [np.bincount(nodes, weights=column, minlength=count).astype(np.float64) for column in columns]
     return np.stack(sums, axis=1).reshape(count, *values.shape[2:])
 
 

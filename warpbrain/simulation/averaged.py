@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from warpbrain.kernels.averaged_gradient import averaged_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
-from warpbrain.physics.mechanism import Emptying
 from warpbrain.physics.term import Body, Term
 from warpbrain.simulation.model import Material
 
@@ -158,16 +157,11 @@ def node_patches(tetrahedra: NDArray[np.integer], kind: NDArray[np.integer]) -> 
         yield int(keys[start, 1]), elements, np.unique(tetrahedra[elements])
 
 
-def averaged_terms(
-    body: Body, labels: Sequence[int], kernels: ElementKernels, emptying: Sequence[Emptying] = ()
-) -> list[AveragedTerm]:
-    """The patches of some tissues that have one law: a term for each number of nodes."""
-    left = [mechanism.remaining_part(body.mesh, 1.0) for mechanism in emptying]
-    rows = np.stack([body.mesh.tissue.astype(np.float64), *left], axis=1)
-    kinds, kind = np.unique(rows, axis=0, return_inverse=True)
+def averaged_terms(body: Body, labels: Sequence[int], kernels: ElementKernels, kinds: Ints) -> list[AveragedTerm]:
+    """The patches of some tissues that have one law, of elements of one kind each: a term for each number of nodes."""
     families: dict[int, list[tuple[Ints, Ints]]] = {}
-    for number, elements, nodes in node_patches(body.tetrahedra, kind.ravel()):
-        if int(kinds[number, 0]) in labels:
+    for _, elements, nodes in node_patches(body.tetrahedra, kinds):
+        if int(body.mesh.tissue[elements[0]]) in labels:
             families.setdefault(len(nodes), []).append((nodes, elements))
     return [
         AveragedTerm(body, np.array([nodes for nodes, _ in patches]), [elements for _, elements in patches], kernels)

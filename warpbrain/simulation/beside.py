@@ -15,6 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -146,8 +148,8 @@ class Beside:
         factors = self._of_models(k, lambda model: model.external_forces(time, self.model.unit_forces))
         nodes = self.model.quadratic or self.model.mesh
         rates = [
-            load.unit_forces_rate(nodes, lambda look, at=at: self._of_models(k, lambda model: look(model.loads[at])))
-            for at, load in enumerate(self.model.loads)
+            load.unit_forces_rate(nodes, partial(self._of_loads, k, number))
+            for number, load in enumerate(self.model.loads)
         ]
         return factors + self.model.external_forces(time, rates)
 
@@ -156,7 +158,12 @@ class Beside:
         # differences from here, so that what does not change is zero and no rounding
         return self._of_models(k, lambda model: model.prescribed - self.model.prescribed)
 
+    def _of_loads(self, k: int, number: int, of: Callable[[Any], Floats]) -> Floats:
+        """Derivative by parameter k of what a function finds for a load, by its number."""
+        return self._of_models(k, lambda model: of(model.loads[number]))
+
     def _of_models(self, k: int, of: Callable[[Model], Floats]) -> Floats:
+        """Derivative by parameter k of what a function finds for a model."""
         total: Floats | float = 0.0
         for distance, weight in _STENCIL.items():
             total = total + weight * of(self._places[k][distance])

@@ -1,7 +1,7 @@
 """Quadratic tetrahedra with a pressure that is linear and continuous in each tissue: P2-P1, of Taylor and Hood (1973).
 
 With the volumetric part `k U(J)` of a law, `Psi = Psi' + k U(J)`, and the volume of a patch, the elements of one tissue
-around a corner a with its linear shape function `L_a` as weight,
+around a corner a (of one that is taken out little by little, those alone) with its shape function `L_a` as weight,
 
     Pi = sum_e int_e Psi'(F) dV + sum_a V_a k_a U(theta_a),    theta_a = int L_a J dV / V_a,    V_a = int L_a dV
 
@@ -42,16 +42,17 @@ class NodalVolumeTerm(Term):
         Of quadratic elements.
     logarithmic : (m,) bool array
         Whether `U = (ln J)^2 / 2` in an element (laws of the coupled formulation), or `(J - 1)^2 / 2`.
+    kinds : (m,) int array
+        See `warpbrain.simulation.model.Model.element_kinds`.
     """
 
-    def __init__(self, body: Body, logarithmic: NDArray[np.bool_]) -> None:
+    def __init__(self, body: Body, logarithmic: NDArray[np.bool_], kinds: Ints) -> None:
         assert body.quadratic is not None
         super().__init__(body, body.quadratic.elements)
         p, mesh = body.precision, body.mesh
         self._kernels = nodal_volume_kernels(p)
         count, corners = len(mesh.tetrahedra), self.stencils[:, :4]
-        labels, which = np.unique(mesh.tissue, return_inverse=True)
-        keys, patches = np.unique(corners * len(labels) + which[:, None], return_inverse=True)
+        keys, patches = np.unique(corners * (kinds.max() + 1) + kinds[:, None], return_inverse=True)
         patches = patches.reshape(count, 4)
         self._patches, self.count = patches, len(keys)
         self._shares = np.repeat(0.25 * mesh.volumes, 4)

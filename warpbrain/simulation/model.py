@@ -222,6 +222,16 @@ class Model:
             part *= mechanism.remaining_part(self.mesh, scale)
         return part
 
+    @cached_property
+    def element_kinds(self) -> NDArray[np.int64]:
+        """Number (m,) by which elements are alike that are of one tissue and are taken out by the same mechanisms.
+
+        A mean over elements of several kinds would hold the wall of a cavity, however little of it is left.
+        """
+        left = [mechanism.remaining_part(self.mesh, 1.0) for mechanism in self.emptying]
+        rows = np.stack([self.mesh.tissue.astype(np.float64), *left], axis=1)
+        return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
+
     def remaining_share(self, scales: Sequence[float]) -> Floats:
         """Share (n,) of the volume around each node that is left, with a scale from 0 to 1 for each of `emptying`."""
         if not self.emptying:

@@ -194,7 +194,9 @@ class System:
             device_law = grown(device_law) if self._growing else device_law
             linear = self.quadratic is None
             kernels = device_law.kernels(self.precision) if linear else quadratic_kernels(device_law, self.precision)
-            averaged = averaged_terms(self, list(materials), kernels, self.model.emptying) if self._averages else []
+            averaged = (
+                averaged_terms(self, list(materials), kernels, self.model.element_kinds) if self._averages else []
+            )
             parameters = self._array(self._parameters(law_type, materials), self.precision.scalar)
             groups.append(ElementGroup(kernels, self._array(members, int), parameters, averaged))
         return groups
@@ -209,7 +211,9 @@ class System:
 
     def _place_volumes(self) -> None:
         formulations = {label: m.formulation == "coupled" for label, m in self.model.materials.items()}
-        self._volumes_at_nodes = NodalVolumeTerm(self, self._by_element(formulations).astype(bool))
+        self._volumes_at_nodes = NodalVolumeTerm(
+            self, self._by_element(formulations).astype(bool), self.model.element_kinds
+        )
         # in this order: the second takes its numbers from the first
         self._beyond_blocks = PatchStiffnessTerm(self._volumes_at_nodes)
         self.terms += [self._volumes_at_nodes, self._beyond_blocks]

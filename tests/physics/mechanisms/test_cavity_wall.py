@@ -57,7 +57,7 @@ def resected(mesh: TetMesh, pressure: float, elements: str, device: str) -> tupl
 
 @pytest.mark.parametrize("elements", ELEMENTS)
 def test_an_open_cavity_becomes_the_resection_as_less_and_less_is_left(elements, device, verify):
-    mesh = bowl(3 if elements == "tet10" else 4)
+    mesh = bowl(3 if elements.startswith("tet10") else 4)
     expected, nodes = resected(mesh, 100.0, elements, device)
     corners = expected[: len(nodes)]
     assert np.abs(corners).max() > 0.01
