@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from febio import laws
+from febio import anisotropic, laws
 from febio.problem import Problem
 from febio.reader import UnsupportedError
 
@@ -17,6 +17,7 @@ from warpbrain.physics.laws import NeoHookean, Ogden
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.residual_stress import ResidualStress
 from warpbrain.physics.mechanisms.swelling import Swelling
+from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.model import Material
 
 #: FEBio's generic laws are texts; these are the ones known here: the law, and its parameters by the names in the text.
@@ -140,22 +141,30 @@ class _Reading:
         mu = self.number(m["E"]) / 3.0 * (1.0 + 0.5 * (1.0 - solid) ** 2)
         return Constitution(Material(laws.PorousNeoHookean(mu, solid)))
 
-    def _orthotropic_elastic(self, m: Mapping[str, Any]) -> Constitution:
+    def orthotropic_row(self, m: Mapping[str, Any]) -> tuple[float, ...]:
         E = np.array([self.number(m[f"E{i}"]) for i in (1, 2, 3)])
         G = np.array([self.number(m[f"G{ij}"]) for ij in (12, 23, 31)])
         nu = np.array([self.number(m[f"v{ij}"]) for ij in (12, 23, 31)])
-        added = laws.orthotropic(_frame(m), E, G, nu, self.number(m.get("c", 0.0)))
-        return Constitution(Material(laws.Nothing(1.0)), (added,))
+        return anisotropic.orthotropic_row(_frame(m), E, G, nu, self.number(m.get("c", 0.0)))
+
+    def _orthotropic_elastic(self, m: Mapping[str, Any]) -> Constitution:
+        return _added(anisotropic.orthotropic(self.orthotropic_row(m)))
 
     def _fung_ortho_compressible(self, m: Mapping[str, Any]) -> Constitution:
-        base = self._orthotropic_elastic(m)
-        return Constitution(base.material, (*base.mechanisms, self.bulk(m)))
+        return _added(anisotropic.orthotropic(self.orthotropic_row(m)), self.bulk(m))
+
+    def _fung_orthotropic(self, m: Mapping[str, Any]) -> Constitution:
+        return _added(anisotropic.isochoric_orthotropic(self.orthotropic_row(m)), self.bulk(m))
 
     def _isotropic_elastic(self, m: Mapping[str, Any]) -> Constitution:
         E, nu = self.number(m["E"]), self.number(m["v"])
         each = np.full(3, 1.0)
-        added = laws.orthotropic(np.eye(3), E * each, 0.5 * E / (1.0 + nu) * each, nu * each)
-        return Constitution(Material(laws.Nothing(1.0)), (added,))
+        row = anisotropic.orthotropic_row(np.eye(3), E * each, 0.5 * E / (1.0 + nu) * each, nu * each)
+        return _added(anisotropic.orthotropic(row))
+
+    def _muscle_material(self, m: Mapping[str, Any]) -> Constitution:
+        keys = ("g1", "g2", "p1", "p2", "Lofl", "lam_max", "smax")
+        return _added(anisotropic.muscle(direction(m), *(self.number(m[key]) for key in keys)), self.bulk(m))
 
     def _trans_iso_mooney_rivlin(self, m: Mapping[str, Any]) -> Constitution:
         if "active_contraction" in m:
@@ -172,14 +181,17 @@ class _Reading:
     # -- what is made of several ---------------------------------------------------------------------------------------
 
     def _solid_mixture(self, m: Mapping[str, Any]) -> Constitution:
-        first, *others = m["solids"]
+        # a Newtonian viscous solid carries nothing once the body is at rest
+        first, *others = sorted(
+            (solid for solid in m["solids"] if not solid["type"].startswith("Newtonian viscous")),
+            key=lambda solid: solid["type"].endswith("contraction"),
+        )
         base = self.of(first)
         added = [mechanism for other in others for mechanism in self._tension(other)]
         return Constitution(base.material, (*base.mechanisms, *added))
 
     def _uncoupled_solid_mixture(self, m: Mapping[str, Any]) -> Constitution:
-        first, *others = m["solids"]
-        return self._solid_mixture({"solids": [{**first, "k": m["k"]}, *others]})
+        return self._solid_mixture({"solids": [{**solid, "k": m["k"]} for solid in m["solids"]]})
 
     def _tension(self, m: Mapping[str, Any]) -> list[Mechanism]:
         # in an uncoupled mixture it is not made deviatoric: it is the same tension
@@ -191,11 +203,35 @@ class _Reading:
         return [ResidualStress(tension=T0, direction=tuple(axis)) for axis in axes]
 
     def _kinematic_growth(self, m: Mapping[str, Any]) -> Constitution:
+        growth = m["growth"]
+        stretch = self.number(growth["multiplier"])
         base = self.of(m["elastic"])
-        if m["growth"]["type"] != "volume growth":
-            raise UnsupportedError(m["growth"]["type"])
-        stretch = self.number(m["growth"]["multiplier"])
-        return Constitution(base.material, (*base.mechanisms, Swelling(amount=stretch**3 - 1.0)))
+        if growth["type"] == "volume growth":
+            return Constitution(base.material, (*base.mechanisms, Swelling(amount=stretch**3 - 1.0)))
+        along = np.outer(a := direction(growth), a)
+        # the multiplier is that of an area, or of the length of the fibres
+        kinds = {"area growth": np.sqrt(stretch) * (np.eye(3) - along) + along}
+        kinds["fiber growth"] = np.eye(3) + (stretch - 1.0) * along
+        if growth["type"] not in kinds or base.mechanisms or not isinstance(base.material.law, NeoHookean):
+            raise UnsupportedError(growth["type"])
+        mu, lam = base.material.law.shear_modulus, base.material.volumetric_modulus
+        return _added(anisotropic.grown(mu, lam, kinds[growth["type"]]))
+
+    def _rodriguez_growth(self, m: Mapping[str, Any]) -> Constitution:
+        return self._kinematic_growth(m)
+
+    def _viscoelastic(self, m: Mapping[str, Any]) -> Constitution:
+        base = self.of(m["elastic"])
+        branches = [(self.number(m[f"g{i}"]), self.number(m[f"t{i}"])) for i in range(1, 7) if m.get(f"g{i}")]
+        moduli, times = zip(*branches, strict=True)
+        return Constitution(base.material, (*base.mechanisms, Viscoelasticity(moduli=moduli, times=times)))
+
+
+def _added(*mechanisms: Mechanism) -> Constitution:
+    """A material of which all is added, with an uncoupled `U(J)` if that is among it."""
+    uncoupled = any(laws.is_volumetric(mechanism) for mechanism in mechanisms)
+    material = Material(laws.Nothing(1.0), formulation="uncoupled" if uncoupled else "coupled")
+    return Constitution(material, mechanisms)
 
 
 def _of_text(text: str, law: str) -> tuple[float, ...]:
