@@ -126,6 +126,10 @@ def solve_on_hexahedra(problem: Problem, device: str, steps: int | None = None) 
         for iteration in range(40):
             residual = -forces + solid.assemble.vector(field).toarray().ravel()
             K = solid.assemble.matrix(field)
+            if problem.springs:
+                pull, stiffness = _pull(problem, field[0].values)
+                residual[: held.size] += pull
+                K = K + sparse.block_diag([stiffness, sparse.csr_matrix(2 * (size - held.size,))])
             for item, p in pressures:
                 item.field[0].values[:] = field[0].values
                 residual[: held.size] += item.assemble.vector(item.field).toarray().ravel()
@@ -139,7 +143,30 @@ def solve_on_hexahedra(problem: Problem, device: str, steps: int | None = None) 
                 break
         else:
             raise AssertionError(f"{problem.name}: no equilibrium at {share:.3g} of the load")
-    return float(np.linalg.norm(field[0].values[~held]))
+    return problem.norm(field[0].values)
+
+
+def _pull(problem: Problem, u: Floats) -> tuple[Floats, sparse.csr_matrix]:
+    """Forces of the springs, (3n,), and their derivatives."""
+    points = np.array(problem.nodes)
+    gradient = np.zeros(u.size)
+    hessian = sparse.lil_matrix((u.size, u.size))
+    for spring in problem.springs:
+        a, b = spring["nodes"]
+        rest = np.linalg.norm(points[b] - points[a])
+        along = points[b] + u[b] - points[a] - u[a]
+        block = spring["stiffness"] * np.eye(3)
+        if rest > 0.0:
+            length = np.linalg.norm(along)
+            across = np.eye(3) - np.outer(along, along) / length**2
+            block -= spring["stiffness"] * rest / length * across
+            along *= 1.0 - rest / length
+        pull = spring["stiffness"] * along
+        for i, sign in ((a, -1.0), (b, 1.0)):
+            gradient[3 * i : 3 * i + 3] += sign * pull
+            for j, other in ((a, -1.0), (b, 1.0)):
+                hessian[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] += sign * other * block
+    return gradient, hessian.tocsr()
 
 
 def _add(field: Any, change: Floats) -> None:

@@ -60,11 +60,14 @@ class Problem:
     fixed : dict of str to list of int
         Nodes that are held, by axis.
     prescribed, forces : list of {axis, nodes, value, curve}
-        Displacements, and forces on each node.
+        Displacements, and forces on each node. Displacements with `tied` are those of nodes that FEBio ties to others
+        that are prescribed: it solves for them, so they count in its number.
     pressures : list of {faces, value, curve, linear}
         Positive pushes on the faces, which are oriented outwards; they follow the deformation unless `linear`.
     body_forces : list of {value, curve}
         Forces [x, y, z] for each mass, as FEBio takes them: a body is accelerated by their negative.
+    springs : list of {nodes, stiffness}
+        Two nodes pulled together by the stiffness times their distance's increase.
     curves : dict of str to Curve
     """
 
@@ -83,6 +86,7 @@ class Problem:
     forces: list[dict[str, Any]] = field(default_factory=list)
     pressures: list[dict[str, Any]] = field(default_factory=list)
     body_forces: list[dict[str, Any]] = field(default_factory=list)
+    springs: list[dict[str, Any]] = field(default_factory=list)
     curves: dict[str, Curve] = field(default_factory=dict)
 
     @property
@@ -106,6 +110,14 @@ class Problem:
             values[place] = each["value"] * self.factor(each["curve"], time)
         return held, values
 
+    def norm(self, u: Floats) -> float:
+        """FEBio's golden number of displacements (n, 3)."""
+        counted = ~self.constraints(self.end)[0]
+        for each in self.prescribed:
+            if each.get("tied"):
+                counted[each["nodes"], AXES.index(each["axis"])] = True
+        return float(np.linalg.norm(u[counted]))
+
     def nodal_forces(self, time: float) -> Floats:
         """Dead forces on the nodes, (n, 3)."""
         forces = np.zeros((len(self.nodes), 3))
@@ -119,8 +131,8 @@ def read_problems(folder: Path) -> list[Problem]:
     found = []
     for path in sorted(folder.glob("*.json")):
         for entry in json.loads(path.read_text(encoding="utf-8")):
-            curves = {name: Curve(**curve) for name, curve in entry.pop("curves").items()}
-            found.append(Problem(**entry, curves=curves))
+            curves = {name: Curve(**curve) for name, curve in entry.pop("curves", {}).items()}
+            found.append(Problem(**{"fixed": {}, **entry}, curves=curves))
     return found
 
 

@@ -1,8 +1,8 @@
 """Reads FEBio's input files (`.feb`, format 3.0 and 4.0) into `Problem`, or says what of one is not supported.
 
 Formats: FEBio User's Manual, versions 3 and 4, chapter 3. Supported are solid elements, one analysis step, fixed,
-prescribed and (of prescribed nodes) constrained displacements, nodal forces, pressures, constant body forces and load
-curves. What the materials are is read as it stands; whether warpbrain has them is for `febio.materials` to say.
+prescribed and (of prescribed nodes) constrained displacements, nodal forces, pressures, constant body forces, linear
+springs and load curves. What the materials are is read as it stands; whether warpbrain has them is for `febio.materials` to say.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from febio.problem import Curve, Problem
 ELEMENTS = {"tet4": 4, "tet10": 10, "hex8": 8, "penta6": 6}
 #: Parts of a file that change nothing of what is solved.
 _IDLE = {"Module", "Control", "Globals", "Material", "Mesh", "MeshDomains", "Boundary", "Loads", "LoadData", "Output"}
+_READ = _IDLE | {"Constraints", "Discrete"}
 
 
 class UnsupportedError(Exception):
@@ -45,7 +46,7 @@ def read_feb(text: str, name: str, source: str, commit: str, golden: float) -> P
     if root.tag != "febio_spec" or version not in ("3.0", "4.0"):
         raise UnsupportedError(f"format {version or 'unknown'} of {root.tag}")
     for part in root:
-        if part.tag not in _IDLE and len(part):
+        if part.tag not in _READ and len(part):
             raise UnsupportedError(f"section {part.tag}")
     module = _get(root, "Module").get("type")
     if module != "solid":
@@ -118,6 +119,8 @@ class _Reader:
         self.prescribed: list[dict[str, Any]] = []
         for bc in self.root.iterfind("Boundary/bc"):
             self._boundary(bc)
+        for constraint in self.root.iterfind("Constraints/constraint"):
+            self._tie(constraint)
         loads = self._loads()
         return Problem(
             name=name,
@@ -132,6 +135,7 @@ class _Reader:
             materials={m.get("name", ""): _value(m) for m in self.root.iterfind("Material/material")},
             fixed={axis: sorted(nodes) for axis, nodes in sorted(self.fixed.items())},
             prescribed=self.prescribed,
+            springs=self._springs(),
             curves=self._curves(),
             **loads,
         )
@@ -189,6 +193,34 @@ class _Reader:
                 self.prescribed.append(scaled)
                 return
         raise UnsupportedError("a linear constraint between unknown displacements")
+
+    def _tie(self, constraint: ET.Element) -> None:
+        """Displacements that are to equal one that is prescribed."""
+        if constraint.get("type") != "linear constraint":
+            raise UnsupportedError(f"constraint {constraint.get('type')}")
+        for equation in constraint.iterfind("linear_constraint"):
+            terms = {(self.index[int(t.get("id", ""))], t.get("bc")): float(t.text or 0.0) for t in equation}
+            for other in [p for p in self.prescribed if "tied" not in p]:
+                given = [term for term in terms if term[0] in other["nodes"] and term[1] == other["axis"]]
+                if len(given) == 1 and len(terms) == 2 and sum(terms.values()) == 0.0:
+                    ((node, axis),) = terms.keys() - given
+                    self.prescribed.append({**other, "axis": axis, "nodes": [node], "tied": True})
+                    break
+            else:
+                raise UnsupportedError("a linear constraint between unknown displacements")
+
+    def _springs(self) -> list[dict[str, Any]]:
+        materials = {m.get("id"): m for m in self.root.iterfind("Discrete/discrete_material")}
+        sets = {s.get("name"): s for s in self.root.iterfind("Mesh/DiscreteSet")}
+        springs = []
+        for discrete in self.root.iterfind("Discrete/discrete"):
+            material = materials[discrete.get("dmat")]
+            if material.get("type") != "linear spring":
+                raise UnsupportedError(f"discrete material {material.get('type')}")
+            stiffness = float(_get(material, "E").text or 0.0)
+            pairs = sets[discrete.get("discrete_set")]
+            springs += [{"nodes": self._nodes(pair), "stiffness": stiffness} for pair in pairs]
+        return springs
 
     def _loads(self) -> dict[str, Any]:
         forces, pressures, body_forces = [], [], []
