@@ -1,7 +1,7 @@
 """Laws of FEBio's that warpbrain does not ship, as files of device functions that it runs like its own.
 
 Sources: FEBio Theory Manual, version 4, chapter 5. FEBio's uncoupled laws are `W(C J^(-2/3)) + U(J)`: the first part
-is warpbrain's own uncoupled law with a bulk modulus of 0 (`Isochoric`), and `U` is added here.
+is warpbrain's own uncoupled law with a bulk modulus of 0 (`Isochoric...`), and `U` is added here.
 """
 
 from collections.abc import Mapping
@@ -345,10 +345,6 @@ def _fibre_derivatives(I4: Any, data: wp.array2d[Any], e: int):
     # stretch dpsi/dstretch, and its derivative by the stretch
     g = zero
     dg = zero
-    if data[e, 3] == zero:
-        # a tension that is always there: psi = T/2 I4
-        g = data[e, 4] * I4
-        dg = type(I4)(2.0) * data[e, 4] * stretch
     if data[e, 3] == one and one < stretch:
         # exponential toe: c3 (exp(c4 (stretch - 1)) - 1), then the line c5 stretch + c6 from lam_max on
         lam_max = data[e, 7]
@@ -386,8 +382,6 @@ def _fibre_energy(F: Any, data: wp.array2d[Any], e: int):
     one = type(I4)(1.0)
     stretch = wp.sqrt(I4)
     psi = zero
-    if data[e, 3] == zero:
-        psi = type(I4)(0.5) * data[e, 4] * (I4 - one)
     if data[e, 3] == type(I4)(2.0) and one < stretch:
         psi = data[e, 4] * wp.pow(stretch - one, data[e, 5])
     if data[e, 3] == one and one < stretch:
@@ -445,7 +439,7 @@ _FIBRE = ExtraEnergy("febio_fibre", _fibre_energy, _fibre_stress, _fibre_moduli)
 
 
 def fibre(direction: np.ndarray, number: int, *parameters: float) -> Added:
-    """Fibres along a direction: 0 a tension `T`, 1 a toe and a line `c3, c4, c5, lam_max`, 2 a power `xi, beta`."""
+    """Fibres along a direction: 1 a toe and a line `c3, c4, c5, lam_max`, 2 a power `xi, beta`."""
     a = np.asarray(direction, dtype=float)
     padded = (*parameters, 0.0, 0.0, 0.0, 0.0)[:4]
     return Added(code=_FIBRE, row=(*(a / np.linalg.norm(a)), float(number), *padded))

@@ -95,7 +95,9 @@ class _Reading:
         return made
 
     def bulk(self, m: Mapping[str, Any]) -> laws.Added:
-        return laws.volumetric(self.number(m["k"]), m.get("pressure_model", "default"))
+        # a pressure that FEBio iterates (`laugon`) is taken to its end, where the volume stays
+        stiffer = 1e4 if m.get("laugon") else 1.0
+        return laws.volumetric(stiffer * self.number(m["k"]), m.get("pressure_model", "default"))
 
     # -- laws --------------------------------------------------------------------------------------------------------
 
@@ -172,6 +174,14 @@ class _Reading:
         base = self._mooney_rivlin(m)
         toe = [self.number(m[key]) for key in ("c3", "c4", "c5", "lam_max")]
         return Constitution(base.material, (*base.mechanisms, laws.fibre(direction(m), 1, *toe)))
+
+    def _2d_trans_iso_mooney_rivlin(self, m: Mapping[str, Any]) -> Constitution:
+        """Twelve fibres in the plane of x and y share `c3` and `c5`."""
+        base = self._mooney_rivlin(m)
+        c3, c4, c5, lam_max = (self.number(m[key]) for key in ("c3", "c4", "c5", "lam_max"))
+        angles = 2.0 * np.pi * np.arange(12) / 12.0
+        around = [laws.fibre(np.array([np.cos(t), np.sin(t), 0.0]), 1, c3 / 12, c4, c5 / 12, lam_max) for t in angles]
+        return Constitution(base.material, (*base.mechanisms, *around))
 
     def _tc_nonlinear_orthotropic(self, m: Mapping[str, Any]) -> Constitution:
         base = self._mooney_rivlin(m)

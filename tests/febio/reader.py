@@ -233,7 +233,9 @@ class _Reader:
                 axis, nodes = load.findtext("dof", ""), self._members(load.get("node_set", ""))
                 forces.append({"axis": axis, "nodes": nodes, **self._scaled(size)})
             elif load.tag == "surface_load" and kind == "pressure":
-                faces = self.surfaces[load.get("surface", "")]
+                faces = self.surfaces.get(load.get("surface", ""))
+                if faces is None:
+                    raise UnsupportedError(f"surface {load.get('surface')!r}")
                 linear = load.findtext("linear", "0") == "1"
                 pressures.append({"faces": faces, **self._scaled(_get(load, "pressure")), "linear": linear})
             elif load.tag == "body_load" and kind == "const":

@@ -26,6 +26,8 @@ HOMOGENEOUS = {
 #: Bounds, and in how many steps the loads are put on; on hexahedra.
 HEXAHEDRA = {
     "di01": (5e-8, 1), "di02": (1e-8, 1), "fi02": (2e-8, 1), "ma01": (5e-6, 1), "ma02": (1e-7, 1), "ma05": (1e-11, 1),
+    # FEBio iterates the pressure of fi03 until its volume nearly stays; here it stays
+    "fi03": (5e-5, 5),
     "ma06": (2e-11, 1), "ma11": (1e-7, 2), "ma15": (2e-5, 1), "ma21": (1e-11, 1), "ma23": (2e-12, 1),
     "ma25": (2e-12, 1), "ma32": (2e-9, 20), "mi02": (2e-7, 1), "mi05": (2e-7, 1), "mi06": (5e-12, 1),
     "mi09": (1e-5, 1), "mi37": (5e-6, 2), "mi43": (1e-8, 1), "mu02": (2e-12, 1),
