@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from febio.laws import Added
 
+from febio.laws import Added
 from warpbrain.kernels.invariants import cofactor
 from warpbrain.physics.extra_energy import ExtraEnergy
 
@@ -136,7 +136,7 @@ def _orthotropic_energy(F: Any, data: wp.array2d[Any], e: int):
 def _orthotropic_stress(F: Any, data: wp.array2d[Any], e: int):
     E = _green(F)
     S = _second_stress(E, data, e)
-    factor, rate = _fung_factor(E, S, data, e)
+    factor, _rate = _fung_factor(E, S, data, e)
     return factor * (F * S)
 
 
@@ -167,7 +167,9 @@ def _orthotropic_moduli(F: Any, g: Any, h: Any, data: wp.array2d[Any], e: int):
 _ORTHOTROPIC = ExtraEnergy("febio_orthotropic", _orthotropic_energy, _orthotropic_stress, _orthotropic_moduli)
 
 
-def orthotropic_row(axes: np.ndarray, E: np.ndarray, G: np.ndarray, nu: np.ndarray, c: float = 0.0) -> tuple[float, ...]:
+def orthotropic_row(
+    axes: np.ndarray, E: np.ndarray, G: np.ndarray, nu: np.ndarray, c: float = 0.0
+) -> tuple[float, ...]:
     """Young's moduli 1, 2, 3, shear moduli and Poisson's ratios 12, 23, 31 along the rows of `axes`; `c` is Fung's."""
     compliance = np.diag(1.0 / E)
     for k, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
@@ -237,7 +239,7 @@ def _cross_fibre(w: Any):
 
 @wp.func
 def _muscle_energy(F: Any, data: wp.array2d[Any], e: int):
-    a, n, Ca = _muscle_state(F, data, e)
+    _a, n, Ca = _muscle_state(F, data, e)
     I1 = wp.ddot(F, F)
     I4 = wp.dot(n, n)
     I5 = wp.dot(Ca, Ca)
@@ -251,9 +253,9 @@ def _muscle_energy(F: Any, data: wp.array2d[Any], e: int):
     step = (stretch - one) / type(I1)(64.0)
     for k in range(32):
         s = one + step * type(I1)(float(2 * k))
-        f0, d0 = _muscle_fibre(s, data, e)
-        f1, d1 = _muscle_fibre(s + step, data, e)
-        f2, d2 = _muscle_fibre(s + type(I1)(2.0) * step, data, e)
+        f0, _d0 = _muscle_fibre(s, data, e)
+        f1, _d1 = _muscle_fibre(s + step, data, e)
+        f2, _d2 = _muscle_fibre(s + type(I1)(2.0) * step, data, e)
         psi += step / type(I1)(3.0) * (f0 + type(I1)(4.0) * f1 + f2)
     return psi
 
@@ -264,8 +266,8 @@ def _muscle_first(I1: Any, I4: Any, I5: Any, data: wp.array2d[Any], e: int):
     half = type(I1)(0.5)
     G1 = data[e, 3]
     G2 = data[e, 4]
-    beta, ksi = _cross_fibre(half * (I1 * I4 - I5) / stretch)
-    force, slope = _muscle_fibre(stretch, data, e)
+    beta, _ksi = _cross_fibre(half * (I1 * I4 - I5) / stretch)
+    force, _slope = _muscle_fibre(stretch, data, e)
     W1 = G2 * beta * stretch
     W4 = -type(I1)(2.0) * G1 * I5 / (I4 * I4 * I4) + half * G2 * beta * (I1 * I4 + I5) / (I4 * stretch)
     W4 += half * force / stretch

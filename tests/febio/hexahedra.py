@@ -9,11 +9,12 @@ from typing import Any
 import felupe
 import numpy as np
 import scipy.sparse as sparse
+from scipy.sparse.linalg import spsolve
+
 from febio.laws import is_volumetric, volumetric_derivatives
 from febio.materials import Constitution, constitution
 from febio.points import Points
 from febio.problem import Floats, Problem
-from scipy.sparse.linalg import spsolve
 
 
 class _AtPoints:
@@ -103,7 +104,12 @@ def _mask(mesh: Any, faces: list[list[int]]) -> Any:
 
 def solve_on_hexahedra(problem: Problem, device: str, steps: int | None = None) -> float:
     """The golden number of a static problem of hexahedra of one material."""
-    assert problem.analysis == "static" and len(problem.elements) == 1 and problem.elements[0]["type"] == "hex8"
+    assert (
+        problem.analysis == "static"
+        and not (problem.forces and problem.tractions)
+        and len(problem.elements) == 1
+        and problem.elements[0]["type"] == "hex8"
+    )
     mesh = felupe.Mesh(np.array(problem.nodes), np.array(problem.elements[0]["nodes"]), "hexahedron")
     part = constitution(problem, problem.elements[0]["material"], problem.end)
     solid = _solid(problem, part, mesh, device)
@@ -123,17 +129,21 @@ def solve_on_hexahedra(problem: Problem, device: str, steps: int | None = None) 
             # FElupe's positive pressure pulls
             item.results.pressure = -share * p["value"] * problem.factor(p["curve"], problem.end)
         target = share * end_values.ravel()[fixed]
-        for iteration in range(40):
+        for _iteration in range(40):
+            if problem.tractions:
+                forces[: held.size] = share * problem.traction_forces(field[0].values, problem.end).ravel()
             residual = -forces + solid.assemble.vector(field).toarray().ravel()
             K = solid.assemble.matrix(field)
             if problem.springs:
                 pull, stiffness = _pull(problem, field[0].values)
                 residual[: held.size] += pull
                 K = K + sparse.block_diag([stiffness, sparse.csr_matrix(2 * (size - held.size,))])
-            for item, p in pressures:
+            for item, _ in pressures:
                 item.field[0].values[:] = field[0].values
                 residual[: held.size] += item.assemble.vector(item.field).toarray().ravel()
-                K = K + sparse.block_diag([item.assemble.matrix(item.field), sparse.csr_matrix(2 * (size - held.size,))])
+                K = K + sparse.block_diag(
+                    [item.assemble.matrix(item.field), sparse.csr_matrix(2 * (size - held.size,))]
+                )
             change = np.zeros(size)
             change[fixed] = target - field[0].values.ravel()[fixed]
             K = sparse.csr_matrix(K)

@@ -44,7 +44,7 @@ class Nothing(_WithoutVolume, NeoHookean):
         return (0.0,)
 
 
-# -- Holmes-Mow: exponential in the invariants ----------------------------------------------------------------------
+# -- Holmes-Mow: exponential in the invariants -----------------------------------------------------------------
 
 
 @wp.func
@@ -126,7 +126,7 @@ class HolmesMow(Law):
         return HolmesMow(shear_modulus, factor * self.lam, self.beta)
 
 
-# -- uncoupled Holmes-Mow: an exponential of the isochoric first invariant ---------------------------------------------
+# -- uncoupled Holmes-Mow: an exponential of the isochoric first invariant ----------------------------------------
 
 
 @wp.func
@@ -191,7 +191,93 @@ class IsochoricHolmesMow(_WithoutVolume, Law):
         return IsochoricHolmesMow(shear_modulus, self.beta)
 
 
-# -- porous neo-Hookean: pores cannot close -----------------------------------------------------------------------------
+# -- Arruda-Boyce: chains of N links, five terms of their series ---------------------------------------------------
+# FEBio's program multiplies the coefficients of the derivative (1/2, 1/10, 11/350, ...) by the powers once more: its
+# energy has them where that of Arruda and Boyce (1993) has 1/2, 1/20, 11/1050, ...
+
+
+@wp.func
+def _chains(x: Any, parameters: wp.array2d[Any], e: int):
+    """Energy by the isochoric first invariant, and its two derivatives."""
+    mu = parameters[e, 1]
+    n = type(x)(1.0) / parameters[e, 2]
+    three = type(x)(3.0)
+    c2 = n / type(x)(10.0)
+    c3 = type(x)(11.0) / type(x)(350.0) * n * n
+    c4 = type(x)(19.0) / type(x)(1750.0) * n * n * n
+    c5 = type(x)(519.0) / type(x)(134750.0) * n * n * n * n
+    two = type(x)(2.0)
+    four = type(x)(4.0)
+    five = type(x)(5.0)
+    half = type(x)(0.5)
+    value = x * (half + x * (c2 + x * (c3 + x * (c4 + x * c5))))
+    rest = three * (half + three * (c2 + three * (c3 + three * (c4 + three * c5))))
+    first = half + x * (two * c2 + x * (three * c3 + x * (four * c4 + x * five * c5)))
+    second = two * c2 + x * (two * three * c3 + x * (three * four * c4 + x * four * five * c5))
+    return mu * (value - rest), mu * first, mu * second
+
+
+@wp.func
+def _chains_energy(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any], e: int):
+    root = wp.cbrt(J)
+    value, _first, _second = _chains(I1 / (root * root), parameters, e)
+    return value
+
+
+@wp.func
+def _chains_derivatives(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any], e: int):
+    zero = type(J)(0.0)
+    root = wp.cbrt(J)
+    x1 = type(J)(1.0) / (root * root)
+    x = I1 * x1
+    rate = type(J)(-2.0) / (type(J)(3.0) * J)
+    xJ = rate * x
+    _value, first, second = _chains(x, parameters, e)
+    d1J = second * x1 * xJ + first * rate * x1
+    dJJ = second * xJ * xJ - type(J)(5.0) / (type(J)(3.0) * J) * first * xJ
+    return first * x1, zero, first * xJ, second * x1 * x1, zero, d1J, zero, zero, dJJ
+
+
+_CHAINS = InvariantLaw("febio_chains", _chains_energy, _chains_derivatives, second_invariant=False)
+
+
+@dataclass(frozen=True)
+class IsochoricArrudaBoyce(_WithoutVolume, Law):
+    """`mu (1/2 (x - 3) + (x^2 - 9)/(10 N) + 11 (x^3 - 27)/(350 N^2) + ...)`, `x = J^(-2/3) I1`."""
+
+    mu: float
+    links: float
+    name: ClassVar[str] = "arruda-boyce"
+    keys: ClassVar[Mapping[str, type]] = {"mu": float, "links": float}
+
+    def _terms(self) -> list[float]:
+        factors = (1 / 2, 1 / 10, 11 / 350, 19 / 1750, 519 / 134750)
+        return [self.mu * factor / self.links**i for i, factor in enumerate(factors)]
+
+    @property
+    def shear_modulus(self) -> float:
+        return 2.0 * sum((i + 1) * c * 3.0**i for i, c in enumerate(self._terms()))
+
+    @classmethod
+    def of_shear_modulus(cls, mu: float) -> "IsochoricArrudaBoyce":
+        return cls(1.0, 26.5).scaled_to(mu)
+
+    def parameters(self) -> tuple[float, ...]:
+        return (self.mu, self.links)
+
+    def energy(self, stretches: np.ndarray) -> np.ndarray:
+        x = np.sum(stretches**2, axis=-1)
+        return sum(c * (x ** (i + 1) - 3.0 ** (i + 1)) for i, c in enumerate(self._terms()))
+
+    @classmethod
+    def device_law(cls, formulation: str) -> InvariantLaw:
+        return _CHAINS
+
+    def scaled_to(self, shear_modulus: float) -> "IsochoricArrudaBoyce":
+        return IsochoricArrudaBoyce(self.mu * shear_modulus / self.shear_modulus, self.links)
+
+
+# -- porous neo-Hookean: pores cannot close ------------------------------------------------------------------------
 
 
 @wp.func
@@ -257,7 +343,7 @@ class PorousNeoHookean(_WithoutVolume, Law):
         return PorousNeoHookean(shear_modulus, self.solid)
 
 
-# -- energies that are added --------------------------------------------------------------------------------------
+# -- energies that are added ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -310,7 +396,7 @@ def _volumetric_energy(F: Any, data: wp.array2d[Any], e: int):
 
 @wp.func
 def _volumetric_stress(F: Any, data: wp.array2d[Any], e: int):
-    first, second = _volumetric_derivatives(wp.determinant(F), data, e)
+    first, _second = _volumetric_derivatives(wp.determinant(F), data, e)
     return first * cofactor(F)
 
 
@@ -376,7 +462,7 @@ def _fibre(F: Any, data: wp.array2d[Any], e: int):
 
 @wp.func
 def _fibre_energy(F: Any, data: wp.array2d[Any], e: int):
-    n, a = _fibre(F, data, e)
+    n, _a = _fibre(F, data, e)
     I4 = wp.dot(n, n)
     zero = type(I4)(0.0)
     one = type(I4)(1.0)
@@ -389,11 +475,11 @@ def _fibre_energy(F: Any, data: wp.array2d[Any], e: int):
         step = (stretch - one) / type(I4)(64.0)
         for k in range(32):
             s = one + step * type(I4)(float(2 * k))
-            f0, d0 = _fibre_derivatives(s * s, data, e)
+            f0, _d0 = _fibre_derivatives(s * s, data, e)
             s1 = s + step
-            f1, d1 = _fibre_derivatives(s1 * s1, data, e)
+            f1, _d1 = _fibre_derivatives(s1 * s1, data, e)
             s2 = s1 + step
-            f2, d2 = _fibre_derivatives(s2 * s2, data, e)
+            f2, _d2 = _fibre_derivatives(s2 * s2, data, e)
             psi += step / type(I4)(3.0) * type(I4)(2.0) * (f0 * s + type(I4)(4.0) * f1 * s1 + f2 * s2)
     return psi
 
@@ -402,7 +488,7 @@ def _fibre_energy(F: Any, data: wp.array2d[Any], e: int):
 def _fibre_stress(F: Any, data: wp.array2d[Any], e: int):
     n, a = _fibre(F, data, e)
     I4 = wp.dot(n, n)
-    first, second = _fibre_derivatives(I4, data, e)
+    first, _second = _fibre_derivatives(I4, data, e)
     two = type(I4)(2.0)
     return two * first * (wp.outer(n, a) - I4 / (type(I4)(3.0) * wp.determinant(F)) * cofactor(F))
 

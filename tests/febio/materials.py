@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
 from febio import anisotropic, laws
 from febio.problem import Problem
 from febio.reader import UnsupportedError
-
 from warpbrain.physics.laws import NeoHookean, Ogden
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.residual_stress import ResidualStress
@@ -136,6 +136,10 @@ class _Reading:
 
     def _uncoupled_holmes_mow(self, m: Mapping[str, Any]) -> Constitution:
         law = laws.IsochoricHolmesMow(self.number(m["mu"]), self.number(m["beta"]))
+        return Constitution(Material(law, formulation="uncoupled"), (self.bulk(m),))
+
+    def _arruda_boyce(self, m: Mapping[str, Any]) -> Constitution:
+        law = laws.IsochoricArrudaBoyce(self.number(m["mu"]), self.number(m["N"]))
         return Constitution(Material(law, formulation="uncoupled"), (self.bulk(m),))
 
     def _porous_neo_hookean(self, m: Mapping[str, Any]) -> Constitution:

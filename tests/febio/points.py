@@ -6,9 +6,9 @@ forces and tangent blocks, of the law and of everything that is added to it, are
 
 import numpy as np
 from bodies import matrix_of
+
 from febio.materials import Constitution
 from febio.problem import Floats
-
 from warpbrain.mesh import TetMesh
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.system import System

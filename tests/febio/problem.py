@@ -64,6 +64,8 @@ class Problem:
         that are prescribed: it solves for them, so they count in its number.
     pressures : list of {faces, value, curve, linear}
         Positive pushes on the faces, which are oriented outwards; they follow the deformation unless `linear`.
+    tractions : list of {faces, value, curve}
+        Forces [x, y, z] for each area of the faces as it is deformed.
     body_forces : list of {value, curve}
         Forces [x, y, z] for each mass, as FEBio takes them: a body is accelerated by their negative.
     springs : list of {nodes, stiffness}
@@ -85,6 +87,7 @@ class Problem:
     prescribed: list[dict[str, Any]] = field(default_factory=list)
     forces: list[dict[str, Any]] = field(default_factory=list)
     pressures: list[dict[str, Any]] = field(default_factory=list)
+    tractions: list[dict[str, Any]] = field(default_factory=list)
     body_forces: list[dict[str, Any]] = field(default_factory=list)
     springs: list[dict[str, Any]] = field(default_factory=list)
     curves: dict[str, Curve] = field(default_factory=dict)
@@ -124,6 +127,32 @@ class Problem:
         for each in self.forces:
             forces[each["nodes"], AXES.index(each["axis"])] += each["value"] * self.factor(each["curve"], time)
         return forces
+
+    def traction_forces(self, u: Floats, time: float) -> Floats:
+        """Forces of the tractions on the nodes, (n, 3), for displacements."""
+        x = np.array(self.nodes) + u
+        forces = np.zeros_like(x)
+        for each in self.tractions:
+            force = np.array(each["value"]) * self.factor(each["curve"], time)
+            for face in each["faces"]:
+                forces[face] += np.outer(areas_of_corners(x[face]), force)
+        return forces
+
+
+def areas_of_corners(corners: Floats) -> Floats:
+    """What of a face's area each of its corners bears: the integrals of their shape functions."""
+    if len(corners) == 3:
+        area = 0.5 * np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
+        return np.full(3, area / 3.0)
+    if len(corners) != 4:
+        raise NotImplementedError("a quadratic face")
+    signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    total = np.zeros(4)
+    for r, s in signs / np.sqrt(3.0):
+        along = 0.25 * (signs[:, 0] * (1.0 + signs[:, 1] * s)) @ corners
+        across = 0.25 * (signs[:, 1] * (1.0 + signs[:, 0] * r)) @ corners
+        total += 0.25 * (1.0 + signs[:, 0] * r) * (1.0 + signs[:, 1] * s) * np.linalg.norm(np.cross(along, across))
+    return total
 
 
 def read_problems(folder: Path) -> list[Problem]:

@@ -1,8 +1,9 @@
 """Reads FEBio's input files (`.feb`, format 3.0 and 4.0) into `Problem`, or says what of one is not supported.
 
 Formats: FEBio User's Manual, versions 3 and 4, chapter 3. Supported are solid elements, one analysis step, fixed,
-prescribed and (of prescribed nodes) constrained displacements, nodal forces, pressures, constant body forces, linear
-springs and load curves. What the materials are is read as it stands; whether warpbrain has them is for `febio.materials` to say.
+prescribed and (of prescribed nodes) constrained displacements, nodal forces, pressures, tractions, constant body
+forces, linear springs and load curves. What the materials are is read as it stands; whether warpbrain has them is for
+`febio.materials` to say.
 """
 
 from __future__ import annotations
@@ -223,7 +224,7 @@ class _Reader:
         return springs
 
     def _loads(self) -> dict[str, Any]:
-        forces, pressures, body_forces = [], [], []
+        forces, pressures, tractions, body_forces = [], [], [], []
         for load in self.root.iterfind("Loads/*"):
             kind = load.get("type")
             if load.tag == "nodal_load" and kind in ("nodal_load", "nodal_force"):
@@ -238,6 +239,12 @@ class _Reader:
                     raise UnsupportedError(f"surface {load.get('surface')!r}")
                 linear = load.findtext("linear", "0") == "1"
                 pressures.append({"faces": faces, **self._scaled(_get(load, "pressure")), "linear": linear})
+            elif load.tag == "surface_load" and kind == "traction":
+                if load.findtext("linear", "0") != "0":
+                    raise UnsupportedError("a traction for each area at rest")
+                part = {**self._scaled(_get(load, "scale")), "faces": self.surfaces[load.get("surface", "")]}
+                along = [float(word) for word in _words(load.findtext("traction"))]
+                tractions.append({**part, "value": [part["value"] * each for each in along]})
             elif load.tag == "body_load" and kind == "const":
                 for i, axis in enumerate("xyz"):
                     part = self._scaled(_get(load, axis))
@@ -245,7 +252,7 @@ class _Reader:
                         body_forces.append({**part, "value": [part["value"] * (i == j) for j in range(3)]})
             else:
                 raise UnsupportedError(f"load {kind}")
-        return {"forces": forces, "pressures": pressures, "body_forces": body_forces}
+        return {"forces": forces, "pressures": pressures, "tractions": tractions, "body_forces": body_forces}
 
     def _curves(self) -> dict[str, Curve]:
         found = {}

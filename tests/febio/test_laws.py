@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from material_point import random_gradients
+
 from febio.materials import constitution
 from febio.points import Points
 from febio.problem import read_problems
-from material_point import random_gradients
 
 PROBLEMS = read_problems(Path(__file__).parents[1] / "verification" / "data" / "febio")
 LAWS = {material["type"]: (problem, name) for problem in PROBLEMS for name, material in problem.materials.items()}
@@ -22,7 +23,7 @@ def test_stiffness_is_the_derivative_of_the_stress(kind):
     change = np.random.default_rng(0).normal(size=F.shape)
     step = 1e-6
     (plus, _), (minus, _) = points.evaluate(F + step * change), points.evaluate(F - step * change)
-    P, A = points.evaluate(F)
+    _P, A = points.evaluate(F)
     expected = (plus - minus) / (2.0 * step)
     found = np.einsum("nijkl,nkl->nij", A, change)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())

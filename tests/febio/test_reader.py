@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+
 from febio.materials import constitution
 from febio.problem import read_problems, write_problems
 from febio.reader import UnsupportedError, read_feb

@@ -7,10 +7,10 @@ elements, so the golden number is that of the tetrahedra too; where it is not, t
 from itertools import permutations
 
 import numpy as np
-from febio.materials import constitution
-from febio.problem import Floats, Problem
 from shapes import oriented
 
+from febio.materials import constitution
+from febio.problem import Floats, Problem
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanisms.pressure import Pressure
@@ -19,7 +19,16 @@ from warpbrain.simulation.model import Model
 from warpbrain.simulation.system import System
 
 #: Corners of a hexahedron by its three local coordinates, 0 or 1.
-_CORNER = {(0, 0, 0): 0, (1, 0, 0): 1, (1, 1, 0): 2, (0, 1, 0): 3, (0, 0, 1): 4, (1, 0, 1): 5, (1, 1, 1): 6, (0, 1, 1): 7}
+_CORNER = {
+    (0, 0, 0): 0,
+    (1, 0, 0): 1,
+    (1, 1, 0): 2,
+    (0, 1, 0): 3,
+    (0, 0, 1): 4,
+    (1, 0, 1): 5,
+    (1, 1, 1): 6,
+    (0, 1, 1): 7,
+}
 
 
 def _kuhn() -> list[list[int]]:
@@ -67,7 +76,7 @@ def tetrahedral_mesh(problem: Problem) -> TetMesh:
 
 def solve_on_tetrahedra(problem: Problem, elements: str, device: str) -> float:
     """The golden number of a static problem whose solution is homogeneous."""
-    assert problem.analysis == "static" and not problem.springs
+    assert problem.analysis == "static" and not (problem.springs or problem.tractions or problem.body_forces)
     end = problem.end
     mesh = tetrahedral_mesh(problem)
     parts = {i + 1: constitution(problem, name, end) for i, name in enumerate(problem.materials)}
