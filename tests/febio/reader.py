@@ -234,15 +234,13 @@ class _Reader:
                 axis, nodes = load.findtext("dof", ""), self._members(load.get("node_set", ""))
                 forces.append({"axis": axis, "nodes": nodes, **self._scaled(size)})
             elif load.tag == "surface_load" and kind == "pressure":
-                faces = self.surfaces.get(load.get("surface", ""))
-                if faces is None:
-                    raise UnsupportedError(f"surface {load.get('surface')!r}")
+                faces = self._faces(load)
                 linear = load.findtext("linear", "0") == "1"
                 pressures.append({"faces": faces, **self._scaled(_get(load, "pressure")), "linear": linear})
             elif load.tag == "surface_load" and kind == "traction":
                 if load.findtext("linear", "0") != "0":
                     raise UnsupportedError("a traction for each area at rest")
-                part = {**self._scaled(_get(load, "scale")), "faces": self.surfaces[load.get("surface", "")]}
+                part = {**self._scaled(_get(load, "scale")), "faces": self._faces(load)}
                 along = [float(word) for word in _words(load.findtext("traction"))]
                 tractions.append({**part, "value": [part["value"] * each for each in along]})
             elif load.tag == "body_load" and kind == "const":
@@ -253,6 +251,12 @@ class _Reader:
             else:
                 raise UnsupportedError(f"load {kind}")
         return {"forces": forces, "pressures": pressures, "tractions": tractions, "body_forces": body_forces}
+
+    def _faces(self, load: ET.Element) -> list[list[int]]:
+        faces = self.surfaces.get(load.get("surface", ""))
+        if faces is None:
+            raise UnsupportedError(f"surface {load.get('surface')!r}")
+        return faces
 
     def _curves(self) -> dict[str, Curve]:
         found = {}

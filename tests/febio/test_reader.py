@@ -64,6 +64,17 @@ def test_norm_counts_what_is_solved_for():
     assert read(OLD).norm(u) == 5.0
 
 
+def test_traction_follows_the_area():
+    old = '<surface_load type="pressure" surface="side"><pressure lc="1">3</pressure>'
+    new = '<surface_load type="traction" surface="side"><scale lc="1">3</scale><traction>0,0,1</traction>'
+    assert old in OLD
+    problem = read(OLD.replace(old, new))
+    # a triangle of area 1/2, twice as large
+    u = np.array([[0.0] * 3, [1.0, 0.0, 0.0], [0.0] * 3, [0.0] * 3])
+    forces = problem.traction_forces(u, problem.end)
+    np.testing.assert_allclose(forces[:, 2], [2.0, 2.0, 2.0, 0.0], atol=1e-14)
+
+
 def test_files_of_our_own_say_the_same(tmp_path):
     problem = read(OLD)
     write_problems(tmp_path / "ex.json", [problem, dataclasses.replace(problem, name="ex02", fixed={}, curves={})])
@@ -84,7 +95,7 @@ def test_files_of_our_own_say_the_same(tmp_path):
         ('type="fix"', 'type="rigid"', "boundary condition rigid"),
         ("x,z</dofs>", "x,u</dofs>", "degree of freedom u"),
         ("<relative>0", "<relative>1", "relative to the step before"),
-        ('surface_load type="pressure"', 'surface_load type="traction"', "load traction"),
+        ('surface_load type="pressure"', 'surface_load type="fluidflux"', "load fluidflux"),
         ('load_controller id="1" type="loadcurve"', 'load_controller id="1" type="math"', "load controller math"),
         ("<points>", "<extend>REPEAT</extend><points>", "repeated"),
         ('surface="side"><pressure', 'surface="none"><pressure', "surface 'none'"),

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from febio.hexahedra import solve_on_hexahedra
 from febio.materials import constitution
 from febio.problem import Problem, read_problems
 from febio.tetrahedra import solve_on_tetrahedra
@@ -64,9 +65,6 @@ def test_on_tetrahedra(name, elements, device, verify):
 
 @pytest.mark.parametrize("name", HEXAHEDRA)
 def test_on_hexahedra(name, verify):
-    pytest.importorskip("felupe")
-    from febio.hexahedra import solve_on_hexahedra
-
     problem, (bound, steps) = PROBLEMS[name], HEXAHEDRA[name]
     error = abs(solve_on_hexahedra(problem, "cpu", steps) / problem.golden - 1.0)
     verify(f"FEBio's problems on FElupe's hexahedra, {parts(problem)} at their points", REFERENCE, error, bound)
