@@ -217,6 +217,23 @@ def uncoupled_neo_hookean(mu: float, poisson: float) -> Stress:
     return stress
 
 
+def uncoupled_mooney_rivlin(C1: float, C2: float, poisson: float) -> Stress:
+    """`C1 (J^-2/3 I1 - 3) + C2 (J^-4/3 I2 - 3) + K/2 (J - 1)^2`."""
+    K = 4.0 * (C1 + C2) * (1.0 + poisson) / (3.0 * (1.0 - 2.0 * poisson))
+
+    def stress(F: NDArray, X: NDArray) -> NDArray:
+        J, T = np.linalg.det(F), inverse_transpose(F)
+        C = np.swapaxes(F, -1, -2) @ F
+        I1 = np.trace(C, axis1=-2, axis2=-1)
+        I2 = 0.5 * (I1**2 - np.einsum("...ij,...ji->...", C, C))
+        first = F - scalars(I1 / 3.0) * T
+        second = scalars(I1) * F - F @ C - scalars(2.0 / 3.0 * I2) * T
+        isochoric = C1 * scalars(J ** (-2.0 / 3.0)) * first + C2 * scalars(J ** (-4.0 / 3.0)) * second
+        return 2.0 * isochoric + K * scalars((J - 1.0) * J) * T
+
+    return stress
+
+
 def coupled_ogden(mu: float, poisson: float, alpha: int) -> Stress:
     """One term of a shear modulus `mu` and an even negative exponent: `F C^(alpha/2 - 1)` is a power of an inverse."""
     lam, c = 2.0 * mu * poisson / (1.0 - 2.0 * poisson), 2.0 * mu / alpha
