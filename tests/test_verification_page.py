@@ -49,3 +49,4 @@ def test_sections_are_found_by_the_longest_path():
 
 def test_amounts():
     assert amount(0.0123, "") == "1.2 %" and amount(2e-9, "") == "2e-09" and amount(0.5, "m") == "0.5 m"
+    assert amount(1.0, "") == "100 %" and amount(0.0, "orders") == "0 orders"

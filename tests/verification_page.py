@@ -108,5 +108,6 @@ def _line(row: Measurement) -> str:
 def amount(value: float, unit: str) -> str:
     """An error with its unit; a relative one above 1e-3 in per cent."""
     if not unit and value >= 1e-3:
-        return f"{100.0 * value:.2g} %"
-    return f"{value:.2g} {unit}".rstrip()
+        value, unit = 100.0 * value, "%"
+    number = f"{value:.2g}" if value < 100.0 else f"{value:.0f}"
+    return f"{number} {unit}".rstrip()

@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from _pytest.mark import ParameterSet
 from manufactured_problem import (
     ORDERS,
     Floats,
@@ -133,7 +132,7 @@ def error(name: str, level: int, elements: str, device: str) -> Floats:
     return errors(PROBLEMS[name][0], level, elements, device)
 
 
-def cases() -> Iterator[ParameterSet]:
+def cases() -> Iterator[object]:
     """The first halving of every element and every mechanism; the second of all of them is slow."""
     for name in PROBLEMS:
         for elements in ORDERS:

@@ -163,12 +163,8 @@ def test_viscoelasticity(verify: Row) -> None:
         agree(verify, "a stretched body with `viscoelasticity`, in eight steps", u, expected)
         top = forces[high].sum(axis=0)
         error = np.abs(found.internal[high].sum(axis=0) - top).max() / np.linalg.norm(top)
-        verify(
-            "force on a stretched body with `viscoelasticity`",
-            "FElupe, the same mesh, formulas written again",
-            error,
-            1e-8,
-        )
+        claim = "force on a stretched body with `viscoelasticity`"
+        verify(claim, "FElupe, the same mesh, formulas written again", error, 1e-8)
 
 
 def test_live_pressure(verify: Row) -> None:
