@@ -142,7 +142,8 @@ assert any(name.endswith("case.toml") for name in opened)
 assert not [name for name in opened if "truth" in name or "concealed" in name]
 assert not [name for name in sys.modules if name.startswith("concealed")]
 """
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+    seen = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120)
+    assert seen.returncode == 0, seen.stderr
 
 
 def test_the_page_says_what_is_published():

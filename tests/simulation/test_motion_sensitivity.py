@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from shapes import cube
+from verification_rows import Row
 
 from warpbrain.errors import InputError
 from warpbrain.physics.continuous import numbers_of, scales_of, with_numbers
@@ -108,7 +109,7 @@ def relative(found: Floats, expected: Floats) -> float:
     ],
 )
 def test_against_motions_beside(
-    newton: int, h: float, elements: str, acting: tuple[Mechanism, ...], device: str
+    newton: int, h: float, elements: str, acting: tuple[Mechanism, ...], device: str, verify: Row
 ) -> None:
     """The linearised step, the implicit one, and steps so long that inertia is nothing."""
     models, theta, scales = by_numbers(block(elements), acting)
@@ -125,10 +126,11 @@ def test_against_motions_beside(
             total = total + weight * ends(models(beside), newton, h, steps, device)
         total = total / (12.0 * 2e-3 * scales[k])
         for at in range(2):
-            assert relative(found[at, k], total[at]) < 1e-6
+            claim = f"derivatives of {'linearised' if newton == 1 else 'implicit'} motions, viscosity and flow included"
+            verify(claim, "differences of motions", relative(found[at, k], total[at]), 1e-6)
 
 
-def test_over_minutes_they_are_those_of_equilibria_in_a_row(device: str) -> None:
+def test_over_minutes_they_are_those_of_equilibria_in_a_row(device: str, verify: Row) -> None:
     """Without inertia, by another solver: Newton's method with a line search, a step of fluid and stress at a time."""
     still = block()
     still = replace(still, prescribed=np.zeros_like(still.prescribed), density=1e-6, damping=Damping(0.0, 0.0))
@@ -144,7 +146,9 @@ def test_over_minutes_they_are_those_of_equilibria_in_a_row(device: str) -> None
         system.set_model(models(theta + 1e-3 * distance * direction))
         *_, last = follow_slowly(system, times, options)
         total = total + weight * last.state.u / 12e-3
-    assert relative(np.tensordot(direction, found, 1), total) < 1e-6
+    error = relative(np.tensordot(direction, found, 1), total)
+    claim = "derivatives of motions without inertia, flow and viscosity"
+    verify(claim, "differences of equilibria in a row, by another solver", error, 1e-6)
 
 
 def test_what_has_relaxed_is_the_equilibrium(device: str) -> None:

@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from bodies import model_of
 from scipy.integrate import solve_ivp
 from shapes import box, cube, room, sphere
+from verification_rows import Row
 
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import NeoHookean
@@ -20,8 +20,13 @@ from warpbrain.simulation.system import System
 # -- Hertz --------------------------------------------------------------------------------------------------------
 
 
-def test_hertz(device: str) -> None:
-    """A block with a round bottom (radius 1 m) is pressed on a floor (Johnson, Contact Mechanics, section 4.2)."""
+def test_hertz(device: str, verify: Row) -> None:
+    """A block with a round bottom (radius 1 m) is pressed on a floor (Johnson, Contact Mechanics, section 4.2).
+
+    The force rests on Boussinesq's correction for the height, which is of first order in `a / height` = 4 %. Where the
+    pressure ends it falls as a root, which elements cut off: 7.6, 6.5 and 5.4 % of it in L2 with 4, 6 and 8 of them
+    from the middle to the rim, of the order 1/2 that a root allows.
+    """
     radius, about, cells, mu, nu = 1.0, 0.05, 15, 1000.0, 0.3
     steps = about / 4.0 * np.array([*np.ones(6), *1.45 ** np.arange(1, cells - 5)])
     axis = np.concatenate([[0.0], np.cumsum(steps)])
@@ -46,14 +51,15 @@ def test_hertz(device: str) -> None:
     # Hertz counts from far away; the top is at a finite height, where a half-space would give way by (Boussinesq)
     height = force * (3.0 - 2.0 * nu) / (4.0 * np.pi * mu * size)
     expected = 4.0 / 3.0 * modulus * np.sqrt(radius) * (depth + height) ** 1.5
-    assert force == pytest.approx(expected, rel=0.03)
+    verify("force of a round block on a floor", "Hertz, height by Boussinesq", abs(force / expected - 1.0), 0.025)
 
     # the pressure of that force: a half ellipse over the contact, resolved by five nodes from its middle to its rim
     a = np.cbrt(3.0 * force * radius / (4.0 * modulus))
     ellipse = 1.5 * force / (np.pi * a**2) * np.sqrt(np.maximum(1.0 - (r[below] / a) ** 2, 0.0))
     (term,) = system.terms
     assert isinstance(term, ContactTerm)
-    assert np.linalg.norm(term.pressures() - ellipse) < 0.1 * np.linalg.norm(ellipse)
+    error = np.linalg.norm(term.pressures() - ellipse) / np.linalg.norm(ellipse)
+    verify("pressure of a round block on a floor, in L2", "Hertz", error, 0.08)
 
 
 # -- a pendulum ---------------------------------------------------------------------------------------------------
@@ -105,13 +111,14 @@ def slide(time_step: float, end: float, device: str) -> tuple[np.ndarray, float,
     return np.array(angles), start, V + simulator.kinetic_energy(), lost
 
 
-def test_a_block_in_a_bowl_swings_as_a_pendulum_and_its_energy_is_accounted_for(device: str) -> None:
+def test_a_block_in_a_bowl_swings_as_a_pendulum_and_its_energy_is_accounted_for(device: str, verify: Row) -> None:
     end, time_step = 0.25, 1e-3
     angles, before, after, lost = slide(time_step, end, device)
     finer, *_, less = slide(0.5 * time_step, end, device)
     fall = DENSITY * SIDE**3 * STANDARD_GRAVITY * BOWL
     # kinetic, stored, of the contact and of weight, and what the method takes: all there is
-    assert abs(before - after - lost) < 1e-9 * fall
+    claim = "energy of a block in a bowl with what backward Euler takes, of its fall"
+    verify(claim, "what it had", abs(before - after - lost) / fall, 1e-9)
     # a method of first order takes half as much in half the steps
     assert 0.0 < lost < 0.03 * fall
     assert 0.45 < less / lost < 0.65
@@ -125,7 +132,8 @@ def test_a_block_in_a_bowl_swings_as_a_pendulum_and_its_energy_is_accounted_for(
     assert swing.y[0, -1] < -0.8
     # without the error of first order
     extrapolated = 2.0 * finer[1::2] - angles
-    assert np.abs(extrapolated - swing.y[0]).max() < 0.005
+    claim = "swing of a block in a bowl, of 1.7 rad"
+    verify(claim, "rigid pendulum; extrapolated in time", np.abs(extrapolated - swing.y[0]).max(), 0.005, "rad")
 
 
 # -- a slope ------------------------------------------------------------------------------------------------------
@@ -148,17 +156,19 @@ def slipped(degrees: float, damping: Damping, end: float, device: str) -> float:
     return float(simulator.system.u.numpy()[block.points[:, 2] < 1e-9, 0].mean())
 
 
-def test_friction_holds_a_block_on_a_slope_below_its_limit(device: str) -> None:
+def test_friction_holds_a_block_on_a_slope_below_its_limit(device: str, verify: Row) -> None:
     part = np.tan(np.radians(20.0)) / FRICTION
     went = slipped(20.0, Damping(0.005, 40.0), 0.3, device)
-    assert went == pytest.approx(SLIP * part / np.sqrt(1.0 - part**2), rel=0.02)
+    error = abs(went / (SLIP * part / np.sqrt(1.0 - part**2)) - 1.0)
+    verify("creep of a block on a slope below the limit of friction", "closed form", error, 5e-3)
 
 
-def test_a_block_slides_down_a_slope_above_the_limit_of_friction(device: str) -> None:
+def test_a_block_slides_down_a_slope_above_the_limit_of_friction(device: str, verify: Row) -> None:
     down, across = STANDARD_GRAVITY * np.sin(np.radians(35.0)), STANDARD_GRAVITY * np.cos(np.radians(35.0))
 
     def rates(_: float, y: np.ndarray) -> list[float]:
         return [y[1], down - FRICTION * across * y[0] / np.hypot(y[0], SLIP)]
 
     expected = solve_ivp(rates, (0.0, 0.15), [0.0, 0.0], rtol=1e-9).y[0, -1]
-    assert slipped(35.0, Damping(0.005, 0.0), 0.15, device) == pytest.approx(expected, rel=0.02)
+    error = abs(slipped(35.0, Damping(0.005, 0.0), 0.15, device) / expected - 1.0)
+    verify("slide of a block down a slope above the limit of friction", "ordinary differential equation", error, 0.01)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bodies import model_of
 from shapes import box
+from verification_rows import Row
 
 from warpbrain.mesh import TetMesh, surface_forces
 from warpbrain.physics.laws import NeoHookean
@@ -56,16 +57,20 @@ def roughness(system: System) -> float:
     return float((pressure - around[mesh.tetrahedra].mean(axis=1))[inner].std() / pressure[inner].std())
 
 
-def test_plain_tetrahedra_lock():
+def test_plain_tetrahedra_lock(verify: Row) -> None:
     tip, system = bent(16, 0.49, "tet4")
-    assert tip == pytest.approx(7.606, abs=2e-3)
+    claim = "tip of Cook's membrane, nu 0.49, tet4, which lock as they do there"
+    verify(claim, "DOLFINx, the same elements", abs(tip / 7.606 - 1.0), 3e-4)
     assert roughness(system) > 0.9
 
 
-@pytest.mark.parametrize(("poisson", "within"), [(0.49, 0.02), (0.499, 0.04)])
-def test_averaged_ones_do_not_and_their_pressure_is_smooth(poisson, within):
+@pytest.mark.parametrize(("poisson", "within"), [(0.49, 0.01), (0.499, 0.02)])
+def test_averaged_ones_do_not_and_their_pressure_is_smooth(poisson: float, within: float, verify: Row) -> None:
+    """Of second order: at 32 a side 0.8 and 1.5 % are left of the error of linear elements in bending."""
     tip, system = bent(32, poisson, "tet4-averaged")
-    assert tip == pytest.approx(MIXED[poisson], rel=within)
+    claim = f"tip of Cook's membrane, nu {poisson}, tet4-averaged, 32 a side"
+    verify(claim, "P2-P1 elements of DOLFINx", abs(tip / MIXED[poisson] - 1.0), within)
+    # of the spread of pressure, where plain elements have more than 0.9
     assert roughness(system) < 0.1
 
 
@@ -82,9 +87,10 @@ def test_mixed_ones(poisson, verify):
 
 
 @pytest.mark.parametrize(("poisson", "n"), QUADRATIC)
-def test_quadratic_ones(poisson, n):
-    """Within 0.25 % of the same elements of DOLFINx: reached 0.01 to 0.2 %."""
+def test_quadratic_ones(poisson: float, n: int, verify: Row) -> None:
+    """The quadrature of DOLFINx has more points."""
     tip, _ = bent(n, poisson, "tet10")
-    assert tip == pytest.approx(QUADRATIC[poisson, n], rel=2.5e-3)
+    claim = "tip of Cook's membrane, nu 0.3 to 0.499, tet10"
+    verify(claim, "DOLFINx, the same elements", abs(tip / QUADRATIC[poisson, n] - 1.0), 2.5e-3)
     if n == 16:
         assert tip == pytest.approx({0.3: 14.735, 0.49: MIXED[0.49]}[poisson], rel=0.01)

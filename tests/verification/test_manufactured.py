@@ -13,6 +13,7 @@ from manufactured import MATERIAL, exact, exact_gradient, gradients, norm, quadr
 from material_point import stress_at
 from numpy.typing import NDArray
 from shapes import cube
+from verification_rows import Row
 
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.load import Load
@@ -70,15 +71,17 @@ def test_quadrature() -> None:
 
 
 @pytest.mark.parametrize("n", [4, 8, 16])
-def test_errors_are_those_of_dolfinx(n: int, device: str) -> None:
+def test_errors_are_those_of_dolfinx(n: int, device: str, verify: Row) -> None:
     """Its quadrature rules of the same degrees have other points: five digits agree, and more on finer meshes."""
     l2, h1 = errors(n, device)
-    assert l2 == pytest.approx(NUMBERS[f"P1 n={n}"]["l2"], rel=1e-5)
-    assert h1 == pytest.approx(NUMBERS[f"P1 n={n}"]["h1"], rel=1e-6)
+    claim, by = "of a manufactured solution, tet4, regular meshes", "DOLFINx, the same elements"
+    verify(f"error in L2 {claim}", by, abs(l2 / NUMBERS[f"P1 n={n}"]["l2"] - 1.0), 1e-5)
+    verify(f"error in H1 {claim}", by, abs(h1 / NUMBERS[f"P1 n={n}"]["h1"] - 1.0), 1e-6)
 
 
 @pytest.mark.parametrize("n", [4, 8])
-def test_rates(n: int, device: str) -> None:
-    coarse, fine = errors(n, device), errors(2 * n, device)
-    assert np.log2(coarse[0] / fine[0]) >= 1.85
-    assert np.log2(coarse[1] / fine[1]) >= 0.97
+def test_rates(n: int, device: str, verify: Row) -> None:
+    short = np.array([2.0, 1.0]) - np.log2(np.divide(errors(n, device), errors(2 * n, device)))
+    claim = "manufactured solution, tet4, regular meshes, nu 0.45: orders 2 and 1 of value and gradient; short by"
+    # these lock: 1.85, 1.93 and up with every halving
+    verify(claim, "exact", max(short.max(), 0.0), 0.15, "orders")

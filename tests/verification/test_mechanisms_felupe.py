@@ -8,10 +8,11 @@ that agreement is to solver tolerance too; how far the steps are from the heredi
 from collections.abc import Callable
 from dataclasses import replace
 
+import felupe
 import numpy as np
-import pytest
 from bodies import model_of
 from shapes import cube, distorted, swept, triangle
+from verification_rows import Row
 
 from warpbrain.mesh import TetMesh, boundary_faces
 from warpbrain.physics.laws import NeoHookean
@@ -23,8 +24,6 @@ from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System
-
-felupe = pytest.importorskip("felupe")
 
 MU, POISSON = 1000.0, 0.4
 LAM = 2.0 * MU * POISSON / (1.0 - 2.0 * POISSON)
@@ -91,23 +90,25 @@ def clamped(*acting: Mechanism, stretch: float = 0.0) -> Model:
     return model_of(mesh, MATERIAL, constrained=constrained, prescribed=prescribed, mechanisms=acting)
 
 
-def agree(found: np.ndarray, expected: np.ndarray, within: float) -> None:
+def agree(verify: Row, what: str, found: np.ndarray, expected: np.ndarray) -> None:
     largest = np.linalg.norm(expected, axis=1).max()
     assert largest > 0.01
-    assert np.abs(found - expected).max() <= within * largest
+    by = "FElupe, the same mesh, formulas written again"
+    verify(f"displacement of {what}", by, np.abs(found - expected).max() / largest, 1e-9)
 
 
-def test_growth() -> None:
+def test_growth(verify: Row) -> None:
     """A ball in the body swells by up to 40 %: `P = s^2 P_e(F/s)`, another `s` in every element."""
     ball = Swelling(amount=0.4, centre=(0.5, 0.5, 0.6), radius=0.35)
     model = clamped(ball)
     s = np.cbrt(1.0 + ball.growth(model.mesh, 1.0))[:, None, None]
     field = field_of(model.mesh)
     expected = solve(field, [felupe.SolidBody(Numerical(lambda F: s**2 * neo_hookean(F / s)), field)], model)
-    agree(solve_equilibrium(System(model, "cpu"), EXACT).u, expected, 1e-9)
+    found = solve_equilibrium(System(model, "cpu"), EXACT).u
+    agree(verify, "a body in which a ball swells (`swelling`)", found, expected)
 
 
-def test_fibres() -> None:
+def test_fibres(verify: Row) -> None:
     """Scattered fibres, some of them slack: `P += k1 E exp(k2 E^2) dE/dF`."""
     fibres = Fibres(direction=(0.3, 0.2, 1.0), stiffness=800.0, exponent=2.0, dispersion=0.1)
     model = clamped(fibres, stretch=0.2)
@@ -123,10 +124,11 @@ def test_fibres() -> None:
     solid = felupe.SolidBody(Numerical(stress), field)
     for share in (0.5, 1.0):
         expected = solve(field, [solid], model, share)
-    agree(solve_equilibrium(System(model, "cpu"), EXACT).u, expected, 1e-9)
+    found = solve_equilibrium(System(model, "cpu"), EXACT).u
+    agree(verify, "a stretched body with scattered `fibres`", found, expected)
 
 
-def test_viscoelasticity() -> None:
+def test_viscoelasticity(verify: Row) -> None:
     """Stretched within 0.4 s in four steps and held for 2 s in four more; forces on the top too."""
     moduli, times = np.array([2.0, 0.7]), np.array([0.3, 3.0])
     model = clamped(Viscoelasticity(moduli=tuple(moduli), times=tuple(times)), stretch=0.15)
@@ -158,12 +160,14 @@ def test_viscoelasticity() -> None:
         solver.system.model = replace(model, prescribed=share * model.prescribed)
         found = solver.step(u, h)
         u = found.u
-        agree(u, expected, 1e-9)
+        agree(verify, "a stretched body with `viscoelasticity`, in eight steps", u, expected)
         top = forces[high].sum(axis=0)
-        np.testing.assert_allclose(found.internal[high].sum(axis=0), top, atol=1e-8 * np.linalg.norm(top))
+        error = np.abs(found.internal[high].sum(axis=0) - top).max() / np.linalg.norm(top)
+        claim = "force on a stretched body with `viscoelasticity`"
+        verify(claim, "FElupe, the same mesh, formulas written again", error, 1e-8)
 
 
-def test_live_pressure() -> None:
+def test_live_pressure(verify: Row) -> None:
     """An octant of a thick sphere, inflated from radius 1 to 1.06: FElupe's `SolidBodyPressure` on the inner faces."""
 
     def place(xy: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -192,4 +196,4 @@ def test_live_pressure() -> None:
     loaded = felupe.FieldContainer([felupe.Field(region, dim=3)])
     solid = felupe.SolidBody(felupe.NeoHookeCompressible(mu=MU, lmbda=LAM), field)
     expected = solve(field, [solid, felupe.SolidBodyPressure(loaded, pressure=200.0)], model)
-    agree(solve_equilibrium(System(model, "cpu"), EXACT).u, expected, 1e-9)
+    agree(verify, "a thick sphere under live `pressure`", solve_equilibrium(System(model, "cpu"), EXACT).u, expected)

@@ -1,10 +1,12 @@
 """Quadratic tetrahedra: what they must reproduce exactly, and another code on the same mesh."""
 
+import felupe
 import numpy as np
 import pytest
 from bodies import energy_at, forces_at, model_of
 from material_point import MATERIALS, random_gradients, random_rotations, stress_at
 from shapes import cube, distorted
+from verification_rows import Row
 
 from warpbrain.kernels.precision import SINGLE, Precision
 from warpbrain.mesh import surface_forces
@@ -31,7 +33,7 @@ def quadratic(material: Material, elements: str, device: str, precision: str = "
 
 
 @every_material
-def test_patch(material: Material, elements: str, precision: Precision, device: str) -> None:
+def test_patch(material: Material, elements: str, precision: Precision, device: str, verify: Row) -> None:
     """A linear displacement: no force inside, and the law's stress everywhere."""
     if precision is SINGLE and material not in (MATERIALS["neo-hookean, coupled"], MATERIALS["ogden -20, uncoupled"]):
         pytest.skip("two laws tell what single precision does to the element")
@@ -43,7 +45,8 @@ def test_patch(material: Material, elements: str, precision: Precision, device: 
     P = stress_at(material, F[None], device)[0]
     # rounding against the stiffness, which is what cancels, and against the stress
     tolerance = 100.0 * precision.epsilon * (material.volumetric_modulus + np.abs(P).max())
-    assert np.abs(forces[~nodes.on_surface]).max() <= tolerance
+    error = 100.0 * np.abs(forces[~nodes.on_surface]).max() / tolerance
+    verify("patch test, tet10, every law: forces inside", "none", error, 100.0, "roundings of the stiffness")
     # sum of f (x) X is the volume times the stress
     assert np.abs(forces.T @ nodes.points / MESH.volume - P).max() <= 20.0 * tolerance
     assert np.abs(system.stresses() - P).max() <= tolerance
@@ -74,9 +77,9 @@ def test_forces_and_tangents_are_derivatives(material: Material, elements: str, 
 # -- another code -------------------------------------------------------------------------------------------------
 
 
-def test_felupe(device: str) -> None:
-    """Coupled neo-Hookean under a dead force; the same mesh, rule and law."""
-    felupe = pytest.importorskip("felupe")
+def test_felupe(device: str, verify: Row) -> None:
+    """Coupled neo-Hookean under a dead force; the same mesh, rule and law. Its points have eight digits."""
+
     mesh = distorted(cube(3), 0.05)
     z = cube(3).points[:, 2]
     constrained = np.repeat((z < 1e-9)[:, None], 3, axis=1)
@@ -100,4 +103,5 @@ def test_felupe(device: str) -> None:
     result = felupe.newtonraphson(items=[solid, load], dof0=dof0, dof1=dof1, tol=1e-12, verbose=0)
     expected = result.x[0].values
     assert np.abs(expected).max() > 0.05
-    assert np.abs(found - expected).max() <= 1e-8 * np.abs(expected).max()
+    error = np.abs(found - expected).max() / np.abs(expected).max()
+    verify("displacement of a distorted cube, coupled neo-Hookean, tet10", "FElupe, the same elements", error, 1e-8)
