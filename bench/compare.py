@@ -1,68 +1,79 @@
-"""Run every code that is installed, three times each, in turn; keep the smallest times; print and record a table."""
+"""Run every code that is installed, three times each, in turn; keep the smallest times, print and record them.
+
+`python bench/compare.py` measures; `python docs/make_benchmarks.py` puts what was recorded into `docs/benchmarks.md`.
+"""
 
 from __future__ import annotations
 
-import datetime
+import argparse
+import importlib.util
 import json
 import os
-import platform
 import shutil
-import subprocess
 import sys
 from pathlib import Path
+from typing import Any
+
+from process import whole_process
+
+from warpbrain.bench.host import host
 
 HERE = Path(__file__).parent
-CODES = {"run_warpbrain.py": None, "run_calculix.py": "ccx", "run_felupe.py": None, "run_scikit_fem.py": None}
 REPEATS = 3
-COLUMNS = {
-    "assembly": "forces + tangent + assembly [ms]",
-    "solve": "full static solve [ms]",
-    "newton": "Newton",
-    "peak_rss_mb": "peak RSS [MB]",
+#: Scripts with their arguments, and what has to be there: a program or a module.
+CODES = {
+    ("run_warpbrain.py",): None,
+    ("run_calculix.py",): "ccx",
+    ("run_felupe.py",): "felupe",
+    ("run_felupe.py", "pardiso"): "pypardiso",
+    ("run_scikit_fem.py",): "skfem",
+    ("run_scikit_fem.py", "pardiso"): "pypardiso",
 }
-
-
-def processor() -> str:
-    """Name of the processor."""
-    for line in Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []:
-        if line.startswith("model name"):
-            return line.split(":", 1)[1].strip()
-    return platform.processor()
+#: Times [s] of a process that solves once, and of one that also does things again; the smallest of each is kept.
+ONCE, AGAIN = ("setup", "solve", "together", "process"), ("assembly", "setup_again", "solve_again")
 
 
 def main() -> None:
-    """Run, print, record."""
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    best: dict[str, dict] = {}
-    for _ in range(REPEATS):
-        for script, program in CODES.items():
-            if program is not None and shutil.which(program) is None:
+    """Run, record, print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--repeats", type=int, default=REPEATS, help=f"processes of each kind (default: {REPEATS})")
+    parser.add_argument("--out", type=Path, default=HERE / "results", help="folder for cube_DATE.json")
+    options = parser.parse_args()
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    environment, where = {**os.environ, **threads}, host()
+    rows: dict[tuple[str, ...], dict[str, Any]] = {}
+    for _ in range(options.repeats):
+        for command, needed in CODES.items():
+            if not (needed is None or shutil.which(needed) or importlib.util.find_spec(needed)):
+                print(f"{' '.join(command)}: {needed} is not installed", file=sys.stderr)
                 continue
-            run = subprocess.run(
-                [sys.executable, str(HERE / script)], capture_output=True, text=True, env=environment, check=False
-            )
-            if run.returncode != 0:
-                print(f"{script}: {(run.stderr or run.stdout).strip().splitlines()[-1]}", file=sys.stderr)
-                continue
-            row = json.loads(run.stdout.strip().splitlines()[-1])
-            kept = best.setdefault(row["code"], row)
-            for key in ("assembly", "solve"):
-                if key in row:
-                    kept[key] = min(kept[key], row[key])
-    print(f"{processor()}, {os.cpu_count()} cores, one thread, {datetime.date.today()}\n")
-    print("| code | " + " | ".join(COLUMNS.values()) + " | linear solver |")
-    print("|---" * (len(COLUMNS) + 2) + "|")
-    for row in best.values():
-        cells = []
-        for key in COLUMNS:
-            value = row.get("process_rss_mb" if key == "peak_rss_mb" and "process_rss_mb" in row else key)
-            scale = 1000.0 if key in ("assembly", "solve") else 1.0
-            cells.append("inside" if value is None else f"{scale * value:.4g}")
-        print(f"| {row['code']} {row['version']} | " + " | ".join(cells) + f" | {row['linear_solver']} |")
-    record = {"processor": processor(), "date": str(datetime.date.today()), "rows": list(best.values())}
-    (HERE / "results").mkdir(exist_ok=True)
-    path = HERE / "results" / f"cube_{record['date']}.json"
-    path.write_text(json.dumps(record, indent=1) + "\n")
+            row = run([*command], environment)
+            keep(rows.setdefault(command, row), row, ONCE)
+            if needed != "ccx":
+                keep(rows[command], run([*command, "assembly"], environment), AGAIN)
+    path = options.out / f"cube_{where['date']}.json"
+    path.write_text(json.dumps({"host": where, "rows": list(rows.values())}, indent=1) + "\n", encoding="utf-8")
+    for row in rows.values():
+        told = ", ".join(f"{name} {1000.0 * row[name]:.4g} ms" for name in (*ONCE, *AGAIN) if name in row)
+        print(f"{row['code']} {row['version']}, {row['linear_solver']}: {told}; {row['newton']} iterations")
+    print(f"written to {path}")
+
+
+def run(command: list[str], environment: dict[str, str]) -> dict[str, Any]:
+    """The row that a script reports, with what its whole process took if it has none to report itself."""
+    printed, failed, used = whole_process([sys.executable, str(HERE / command[0]), *command[1:]], env=environment)
+    if used["status"] != 0:
+        sys.exit(f"{' '.join(command)}: {(failed or printed).strip().splitlines()[-1]}")
+    row = json.loads(printed.splitlines()[-1])
+    whole = {"process": used["seconds"], "peak_rss_mb": used["peak_rss_mb"]}
+    return {**whole, **row, "together": row["setup"] + row["solve"]}
+
+
+def keep(kept: dict[str, Any], row: dict[str, Any], names: tuple[str, ...]) -> None:
+    """Keep the smaller one of each time of these names."""
+    for name in names:
+        if name in row:
+            kept[name] = min(kept.get(name, row[name]), row[name])
 
 
 if __name__ == "__main__":

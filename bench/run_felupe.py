@@ -1,13 +1,20 @@
-"""FElupe: neo-Hookean solid body, Newton with SciPy's SuperLU."""
+"""FElupe: neo-Hookean solid body, Newton with SciPy's SuperLU or, with `pardiso`, with Intel's Pardiso."""
 
+import sys
 import time
 
 import felupe
-from problem import BULK, MU, STRETCH, cube, report, seconds
+import numpy as np
+from problem import ASSEMBLIES, BULK, MU, STRETCH, TOLERANCE, cube, imbalance, report, seconds
 from scipy.sparse.linalg import spsolve
 
-start = time.process_time()
+solver, name = spsolve, "SuperLU (SciPy)"
+if "pardiso" in sys.argv:
+    from pardiso import NAME as name
+    from pardiso import spsolve as solver
+
 nodes, tetrahedra = cube()
+start = time.process_time()
 field = felupe.FieldContainer([felupe.Field(felupe.RegionTetra(felupe.Mesh(nodes, tetrahedra, "tetra")), dim=3)])
 solid = felupe.SolidBody(felupe.NeoHooke(mu=MU, bulk=BULK), field)
 boundaries = {
@@ -25,18 +32,23 @@ def assemble() -> None:
     solid.assemble.matrix(field)
 
 
-first = seconds(assemble, 1)
-assembly = seconds(assemble)
+def check(dx, x, f, xtol, ftol, dof1, dof0, items):
+    reached = imbalance(f, dof1)
+    return np.linalg.norm(dx), reached, reached <= ftol
+
+
+figures = {"assembly": seconds(assemble)} if ASSEMBLIES else {}
 start = time.process_time()
-state = felupe.newtonraphson(items=[solid], dof0=dof0, dof1=dof1, ext0=moved, solver=spsolve, tol=1e-10, verbose=0)
+state = felupe.newtonraphson(
+    items=[solid], dof0=dof0, dof1=dof1, ext0=moved, solver=solver, check=check, tol=TOLERANCE, verbose=0
+)
 report(
     "FElupe",
     felupe.__version__,
-    "SuperLU (SciPy)",
+    name,
     state.x[0].values,
     setup=setup,
-    first_assembly=first,
-    assembly=assembly,
     solve=time.process_time() - start,
     newton=int(state.iterations),
+    **figures,
 )

@@ -1,16 +1,17 @@
 """Loads: their totals, their directions, and what they refuse."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from shapes import box, cube, distorted
 
 from warpbrain.errors import InputError
-from warpbrain.mesh import TetMesh
+from warpbrain.mesh import QuadraticMesh, TetMesh
 from warpbrain.physics.force import NodalForce
-from warpbrain.physics.load import Load
-from warpbrain.physics.mechanisms.gravity import CSF_DENSITY, STANDARD_GRAVITY, SURFACE_WIDTH, Gravity
+from warpbrain.physics.load import Along, Load
+from warpbrain.physics.mechanisms.gravity import CSF_DENSITY, STANDARD_GRAVITY, Gravity
 
 MESH = box((4, 3, 20), (0.08, 0.06, 0.1))
 DENSITY = 1211.5
@@ -40,20 +41,34 @@ def test_weight_acts_at_the_centre_of_mass() -> None:
     np.testing.assert_allclose(moment, np.cross(centre, f.sum(axis=0)), atol=1e-12)
 
 
-def test_weight_above_the_level() -> None:
-    """What hangs above the fluid weighs what the fluid no longer carries; the step is smooth over 3 mm."""
-    level = 0.04
-    found = total(Gravity(direction=DOWN, density=DENSITY, csf_level=level))
-    expected = CSF_DENSITY * STANDARD_GRAVITY * MESH.volume * 0.6
-    # the smoothed step is odd about the level; nodal quadrature on layers of 5 mm sees it to a few percent
-    assert -found[2] == pytest.approx(expected, rel=0.03)
-    assert np.abs(found[:2]).max() == 0.0
+@pytest.mark.parametrize("level", [0.0, 0.0123, 0.04, 0.0425, 0.05, 0.0999])
+def test_weight_above_the_level(level: float, verify) -> None:
+    """What hangs above the fluid weighs what the fluid no longer carries: in a column, on a plane of nodes or not."""
+    force = total(Gravity(direction=DOWN, density=DENSITY, csf_level=level))
+    expected = CSF_DENSITY * STANDARD_GRAVITY * MESH.volume * (1.0 - level / 0.1)
+    error = np.abs(force - [0.0, 0.0, -expected]).max() / (CSF_DENSITY * STANDARD_GRAVITY * MESH.volume)
+    verify("weight of a column above the level of the fluid", "closed form", error, 1e-12)
 
 
-def test_height_is_measured_against_gravity_from_the_lowest_point() -> None:
+@pytest.mark.parametrize("kind", [lambda mesh: mesh, QuadraticMesh], ids=["tet4", "tet10"])
+def test_weight_above_a_level_acts_at_its_centre(kind, verify) -> None:
+    """Moments of what is above a tilted level of an irregular mesh, whatever the elements."""
+    mesh = distorted(MESH, 0.002)
+    load = Gravity(direction=(0.3, -0.2, -1.0), density=DENSITY, csf_level=0.047)
+    coarse = load.nodal_forces(kind(mesh))
+    fine = mesh.finer[0]
+    expected = load.nodal_forces(fine)
+    points = kind(mesh).points
+    scale = np.abs(np.cross(fine.points, expected)).sum()
+    error = np.abs(np.cross(points, coarse).sum(axis=0) - np.cross(fine.points, expected).sum(axis=0)).max() / scale
+    verify("moment of the weight above a tilted level", "the same body in eight times as many elements", error, 1e-14)
+
+
+def test_datum_is_the_lowest_point_against_gravity() -> None:
     moved = TetMesh(MESH.points + np.array([1.0, 2.0, 3.0]), MESH.tetrahedra)
-    height = Gravity(direction=(0.0, 0.0, 2.0), density=DENSITY).height(moved, moved.points)
-    np.testing.assert_allclose(height, 0.1 - MESH.points[:, 2], atol=1e-12)
+    load = Gravity(direction=(0.0, 0.0, 2.0), density=DENSITY, csf_level=0.03)
+    assert load.datum(moved) == pytest.approx(-3.1)
+    np.testing.assert_allclose(load.nodal_forces(moved), load.nodal_forces(MESH), atol=1e-12)
 
 
 def test_drowned_and_dry() -> None:
@@ -63,18 +78,63 @@ def test_drowned_and_dry() -> None:
     assert -total(dry)[2] == pytest.approx(CSF_DENSITY * STANDARD_GRAVITY * MESH.volume, rel=1e-12)
 
 
-def test_force_is_smooth_in_the_level() -> None:
-    """Nothing jumps when the level passes a layer of nodes: an estimator can differentiate through it."""
-    h = 1e-5
-    levels = np.arange(0.03, 0.04, h)
-    F = np.array([-total(Gravity(direction=DOWN, density=DENSITY, csf_level=v))[2] for v in levels])
-    slope = np.diff(F) / h
-    assert np.all(slope <= 0.0)
-    # the steepest change of slope is that of tanh over the width of the surface, for the heaviest layer
-    layer = CSF_DENSITY * STANDARD_GRAVITY * MESH.volume / 20.0
-    assert np.abs(np.diff(slope) / h).max() <= 1.05 * layer * 4.0 / SURFACE_WIDTH**2
-    # and the slope on average is that of the fluid's weight
-    assert slope.mean() == pytest.approx(-CSF_DENSITY * STANDARD_GRAVITY * MESH.volume / 0.1, rel=0.01)
+def along(load: Gravity, **rates: np.ndarray | float) -> Along:
+    """Differentiates along the path on which the fields of a load change at these rates."""
+
+    def differentiated(look):
+        h = 1e-3
+        ends = [
+            look(
+                replace(load, **{key: getattr(load, key) + step * h * np.asarray(rate) for key, rate in rates.items()})
+            )
+            for step in (-2, -1, 1, 2)
+        ]
+        return np.asarray((ends[0] - 8.0 * ends[1] + 8.0 * ends[2] - ends[3]) / (12.0 * h))
+
+    return differentiated
+
+
+RATES = {
+    "level": {"csf_level": 1.0},
+    "direction": {"direction": np.array([0.2, 0.3, 0.1])},
+    "imaged_direction": {"imaged_direction": np.array([0.2, -0.3, 0.1])},
+    "all": {"csf_level": -0.3, "direction": np.array([0.1, 0.0, 0.4]), "imaged_direction": np.array([0.2, -0.3, 0.1])},
+}
+
+
+@pytest.mark.parametrize("name", RATES)
+@pytest.mark.parametrize("lowest", [None, -0.01])
+@pytest.mark.parametrize("kind", [lambda mesh: mesh, QuadraticMesh], ids=["tet4", "tet10"])
+def test_derivatives_of_the_weight(name: str, lowest: float | None, kind, verify) -> None:
+    """The load is a spline in the level, so differences of small steps are as good as their rounding."""
+    mesh = kind(distorted(box((3, 3, 3), (0.08, 0.06, 0.1)), 0.002))
+    load = Gravity(
+        direction=(0.3, -0.2, -1.0), imaged_direction=(0.1, 0.1, -1.0), density=DENSITY, csf_level=0.0471, lowest=lowest
+    )
+    rate = load.unit_forces_rate(mesh, along(load, **RATES[name]))
+    h = 1e-6
+    ends = [
+        replace(
+            load, **{key: getattr(load, key) + step * h * np.asarray(value) for key, value in RATES[name].items()}
+        ).unit_forces(mesh)
+        for step in (-1.0, 1.0)
+    ]
+    difference = (ends[1] - ends[0]) / (2.0 * h)
+    error = np.linalg.norm(rate - difference) / np.linalg.norm(difference)
+    verify(f"derivative of the weight by {name}", "central difference of the load, step 1e-6", error, 1e-7)
+
+
+def test_derivative_by_a_level_on_a_plane_of_nodes(verify) -> None:
+    """On a lattice the section has no jump, though each element's has."""
+    load = Gravity(direction=DOWN, density=DENSITY, csf_level=0.05)
+    rate = load.unit_forces_rate(MESH, along(load, csf_level=1.0)).sum(axis=(0, 1))
+    expected = CSF_DENSITY * STANDARD_GRAVITY * 0.08 * 0.06
+    verify(
+        "derivative by a level on a plane of nodes",
+        "closed form",
+        np.abs(rate - [0, 0, expected]).max() / expected,
+        1e-12,
+    )
 
 
 def test_turned_head_adds_the_submerged_weight() -> None:

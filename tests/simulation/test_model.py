@@ -5,13 +5,15 @@ import math
 import numpy as np
 import pytest
 from bodies import model_of
-from shapes import box, cube
+from shapes import box, cube, distorted
 
 from warpbrain.errors import InputError
 from warpbrain.kernels.precision import DOUBLE, SINGLE
-from warpbrain.mesh import TetMesh
+from warpbrain.mesh import QuadraticMesh, TetMesh
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.mechanisms.cavity import Cavity
+from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.model import Damping, Material, Model
@@ -68,6 +70,26 @@ def test_loads_are_summed_with_their_ramps() -> None:
     model = model_of(mesh, SOFT, loads=loads)
     np.testing.assert_allclose(model.external_forces(0.25), np.tile([0.25, 1.0, 0.0], (8, 1)))
     np.testing.assert_allclose(model.external_forces(), np.tile([1.0, 1.0, 0.0], (8, 1)))
+
+
+@pytest.mark.parametrize("elements", ["tet4", "tet10"])
+def test_what_is_taken_out_above_a_level_weighs_nothing(elements: str) -> None:
+    """The surface of the fluid and that of the cavity may cut each other anywhere."""
+    mesh = distorted(box((3, 3, 3)), 0.04)
+    out = mesh.centres[:, 0] > 0.5
+    mesh = TetMesh(mesh.points, mesh.tetrahedra, element_sets={"out": out})
+    gravity = Gravity(direction=(0.3, -0.2, -1.0), density=1040.0, csf_level=0.61, lowest=0.0)
+    emptied = model_of(
+        mesh, SOFT, loads=[gravity], mechanisms=[Cavity(elements="out", left=1e-9)], elements=elements
+    ).external_forces()
+    left, nodes, _ = mesh.without(out)
+    expected = gravity.nodal_forces(left)
+    found = emptied if elements == "tet4" else QuadraticMesh(mesh).at_corners(emptied)
+    np.testing.assert_allclose(found[nodes].sum(axis=0), expected.sum(axis=0), rtol=1e-8)
+    moments = np.cross(left.points, found[nodes]).sum(axis=0)
+    np.testing.assert_allclose(moments, np.cross(left.points, expected).sum(axis=0), rtol=1e-7)
+    if elements == "tet4":
+        np.testing.assert_allclose(found[nodes], expected, atol=1e-8 * np.abs(expected).sum())
 
 
 def test_devices() -> None:

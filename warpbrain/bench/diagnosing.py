@@ -19,7 +19,7 @@ def main(arguments: Sequence[str]) -> int:
     parser = OneLineParser(
         prog="python -m warpbrain.bench diagnose",
         description="Times each stage of a diagnosis with every mechanism: of 0529 with 289 points, if no other "
-        "case is named. The first run also loads kernels.",
+        "case is named. The first run also loads kernels and makes what is kept of the mesh.",
     )
     add = parser.add_argument
     add("--device", default=None, metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one)")

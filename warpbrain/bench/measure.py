@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from dataclasses import dataclass
 
 import warp as wp
 
+from warpbrain.bench.fresh import MeshArrays, case_of, fresh_arrays
 from warpbrain.bench.table3 import MAIN_LOOP, Row
+from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.errors import SolveError
 from warpbrain.simulation.dynamics import PHASES, Simulator
@@ -18,11 +21,24 @@ from warpbrain.simulation.system import System
 #: The motion starts again from rest after this many steps: the phantom's load crushes its softest mesh after 50 to
 #: 60 ms (see docs/phantom.md), and timing inverted elements would be worthless.
 RESTART = 20
+#: Bodies of which the pre-processing is measured, each on a mesh of its own.
+BODIES = 10
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Samples of one row on one device [ms], and what they were measured on."""
+    """Samples of one row on one device [ms], and what they were measured on.
+
+    Attributes
+    ----------
+    preprocessing, capture : list of float
+        Of the same fresh bodies: from a mesh in memory to a simulator, and capturing the step that it replays. Their
+        sum is what stands between a mesh and the first step.
+    phases : dict of str to list of float
+        By `PHASES` and `MAIN_LOOP`, with the clock stopped between them.
+    step : list of float
+        A step as users get it.
+    """
 
     row: Row
     device: str
@@ -56,18 +72,15 @@ def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, 
     tolerance : float
         Relative tolerance of the linear solves.
     """
-    model, _ = model_of(find_case(row.case, row.tissue))
-    # loads every kernel, so that pre-processing is measured as it is on any run but the first
-    simulator = Simulator(System(model, device, precision), tolerance=tolerance)
+    case = find_case(row.case, row.tissue)
+    # loads every kernel, which is done once in a process and not for a mesh
+    first = preprocess(case, fresh_arrays(case.mesh, 0), device, precision, tolerance)
+    first.capture()
     for _ in range(max(1, warmup)):
-        simulator.step()
+        first.step()
     wp.synchronize_device(device)
-    preprocessing = []
-    for _ in range(5):
-        start = time.perf_counter()
-        simulator = Simulator(System(model, device, precision), tolerance=tolerance)
-        wp.synchronize_device(device)
-        preprocessing.append(1000.0 * (time.perf_counter() - start))
+    del first
+    preprocessing, capture, simulator = measure_preprocessing(case, device, precision, tolerance, BODIES)
 
     phases: dict[str, list[float]] = {name: [] for name in (*PHASES, MAIN_LOOP)}
     iterations = []
@@ -82,12 +95,6 @@ def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, 
             phases[MAIN_LOOP].append(1000.0 * sum(clock.seconds.values()))
             iterations.append(_checked(simulator))
 
-    capture = []
-    for _ in range(3):
-        start = time.perf_counter()
-        simulator.capture()
-        wp.synchronize_device(device)
-        capture.append(1000.0 * (time.perf_counter() - start))
     step = []
     for sample in range(-warmup, steps):
         if sample % RESTART == 0:
@@ -119,6 +126,36 @@ def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, 
         bytes_per_step=moved,
         launches_per_step=launches,
     )
+
+
+def preprocess(case: Case, arrays: MeshArrays, device: str, precision: str, tolerance: float) -> Simulator:
+    """Everything between a mesh in memory and a simulator that can take its first step."""
+    model, _ = model_of(case_of(case, arrays))
+    simulator = Simulator(System(model, device, precision), tolerance=tolerance)
+    wp.synchronize_device(device)
+    return simulator
+
+
+def measure_preprocessing(
+    case: Case, device: str, precision: str, tolerance: float, bodies: int
+) -> tuple[list[float], list[float], Simulator]:
+    """Times [ms] of `preprocess` and of the capture of a step, each on a body that no cache has seen, and the last."""
+    preprocessing, capture = [], []
+    simulator: Simulator | None = None
+    for number in range(1, bodies + 1):
+        arrays = fresh_arrays(case.mesh, number)
+        # what the last one held is given back here, not while the clock runs
+        simulator = None
+        gc.collect()
+        start = time.perf_counter()
+        simulator = preprocess(case, arrays, device, precision, tolerance)
+        preprocessing.append(1000.0 * (time.perf_counter() - start))
+        start = time.perf_counter()
+        simulator.capture()
+        wp.synchronize_device(device)
+        capture.append(1000.0 * (time.perf_counter() - start))
+    assert simulator is not None
+    return preprocessing, capture, simulator
 
 
 def _checked(simulator: Simulator) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import platform
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import date
@@ -47,6 +46,7 @@ def _bench(options: argparse.Namespace) -> None:
             raise InputError(f"--kinds {kind}: expected some of {', '.join(known)}")
 
     from warpbrain.atomic import output_folder, safe_name, whole_file
+    from warpbrain.bench.host import processor
     from warpbrain.bench.mechanism_cost import measure_cost
     from warpbrain.cases.shipped import find_case
     from warpbrain.report.mechanisms.cost import PLAIN, ratio
@@ -80,7 +80,7 @@ def _bench(options: argparse.Namespace) -> None:
         path = out / f"mechanisms_{short}_{today}.json"
         written = {
             "versions": versions,
-            "device": _processor() if device.is_cpu else device.name,
+            "device": processor() if device.is_cpu else device.name,
             "date": today,
             "precision": options.precision,
             "case": BASE,
@@ -89,14 +89,6 @@ def _bench(options: argparse.Namespace) -> None:
         with whole_file(path) as scratch:
             scratch.write_text(json.dumps(written, indent=1) + "\n", encoding="utf-8")
         print(f"written to {path}")
-
-
-def _processor() -> str:
-    """Name of the processor, as far as the system tells it."""
-    told = Path("/proc/cpuinfo")
-    lines = told.read_text(encoding="utf-8").splitlines() if told.exists() else []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return next(iter(names), platform.processor() or "CPU")
 
 
 def _line(row: dict[str, Any], ratio: Any) -> str:

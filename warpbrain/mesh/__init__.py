@@ -4,6 +4,7 @@ Importing this package costs NumPy and nothing else; SciPy and meshio are import
 """
 
 from warpbrain.mesh.files import MeshInFile, read_mesh, read_mesh_file, write_mesh
+from warpbrain.mesh.half_space import integrals_above, integrals_of_shapes, integrals_on_plane, summed_at_nodes
 from warpbrain.mesh.integrals import surface_forces, volume_forces
 from warpbrain.mesh.ordering import ordered
 from warpbrain.mesh.quadratic import QuadraticMesh
@@ -33,6 +34,9 @@ __all__ = [
     "components",
     "dihedral_angles",
     "face_vectors",
+    "integrals_above",
+    "integrals_of_shapes",
+    "integrals_on_plane",
     "interface_faces",
     "measure",
     "node_areas",
@@ -42,6 +46,7 @@ __all__ = [
     "read_mesh",
     "read_mesh_file",
     "split_boundary",
+    "summed_at_nodes",
     "surface_forces",
     "tangents",
     "vertex_normals",

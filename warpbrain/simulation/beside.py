@@ -142,7 +142,14 @@ class Beside:
         here = (list(self.model.loads), self.model.emptying)
         if all((list(model.loads), model.emptying) == here for model in self._places[k].values()):
             return np.zeros((self.system.size, 3))
-        return self._of_models(k, lambda model: model.external_forces(time))
+        # the product rule: factors and what is left of the tissue, then the loads themselves, which may know better
+        factors = self._of_models(k, lambda model: model.external_forces(time, self.model.unit_forces))
+        nodes = self.model.quadratic or self.model.mesh
+        rates = [
+            load.unit_forces_rate(nodes, lambda look, at=at: self._of_models(k, lambda model: look(model.loads[at])))
+            for at, load in enumerate(self.model.loads)
+        ]
+        return factors + self.model.external_forces(time, rates)
 
     def by_prescribed(self, k: int) -> Floats:
         """Derivative of the prescribed displacements [m] by parameter k; nothing is asked of a system."""
@@ -150,7 +157,7 @@ class Beside:
         return self._of_models(k, lambda model: model.prescribed - self.model.prescribed)
 
     def _of_models(self, k: int, of: Callable[[Model], Floats]) -> Floats:
-        total = np.zeros((self.system.size, 3))
+        total: Floats | float = 0.0
         for distance, weight in _STENCIL.items():
-            total += weight * of(self._places[k][distance])
-        return total / self.steps[k]
+            total = total + weight * of(self._places[k][distance])
+        return np.asarray(total) / self.steps[k]

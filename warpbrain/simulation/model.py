@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.mesh import QuadraticMesh, TetMesh
+from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
 from warpbrain.physics.laws import Law
-from warpbrain.physics.load import Load
+from warpbrain.physics.load import BodyForce, Load
 from warpbrain.physics.mechanism import Emptying, Following, Mechanism
 
 Floats = NDArray[np.float64]
@@ -211,15 +211,19 @@ class Model:
         """The mechanisms that take tissue out little by little."""
         return [mechanism for mechanism in self.mechanisms if isinstance(mechanism, Emptying)]
 
+    def remaining_part(self, scales: Sequence[float]) -> Floats:
+        """Part (m,) of each tetrahedron that is left, with a scale from 0 to 1 for each of `emptying`."""
+        part = np.ones(len(self.mesh.tetrahedra))
+        for mechanism, scale in zip(self.emptying, scales, strict=True):
+            part *= mechanism.remaining_part(self.mesh, scale)
+        return part
+
     def remaining_share(self, scales: Sequence[float]) -> Floats:
         """Share (n,) of the volume around each node that is left, with a scale from 0 to 1 for each of `emptying`."""
         if not self.emptying:
             return np.ones(len(self.constrained))
-        part = np.ones(len(self.mesh.tetrahedra))
-        for mechanism, scale in zip(self.emptying, scales, strict=True):
-            part *= mechanism.remaining_part(self.mesh, scale)
         nodes = self.quadratic or self.mesh
-        return np.asarray(nodes.lumped(part * self.mesh.volumes) / nodes.node_volumes)
+        return np.asarray(nodes.lumped(self.remaining_part(scales) * self.mesh.volumes) / nodes.node_volumes)
 
     @property
     def mass(self) -> float:
@@ -227,19 +231,26 @@ class Model:
         return self.density * self.mesh.volume
 
     @cached_property
-    def _unit_forces(self) -> list[Floats]:
-        """Nodal forces of each load at factor 1 [N]; loads are dead, so they are computed once."""
-        return [load.nodal_forces(self.quadratic or self.mesh) for load in self.loads]
+    def unit_forces(self) -> list[Floats]:
+        """What each load does at factor 1 [N], `Load.unit_forces`; loads are dead, so it is computed once."""
+        return [load.unit_forces(self.quadratic or self.mesh) for load in self.loads]
 
-    def external_forces(self, time: float = math.inf) -> Floats:
-        """Sum of the loads on the nodes [N] at a time [s], shape (n, 3); by default long after every ramp.
+    def external_forces(self, time: float = math.inf, unit_forces: Sequence[Floats] | None = None) -> Floats:
+        """Sum of the loads on the nodes [N], shape (n, 3); tissue that has been taken out by then weighs nothing.
 
-        Tissue that has been taken out by then weighs nothing.
+        Parameters
+        ----------
+        time : float
+            [s]; by default long after every ramp.
+        unit_forces : sequence of arrays, optional
+            Others in the place of `unit_forces`, such as their derivatives.
         """
+        nodes = self.quadratic or self.mesh
         total = np.zeros(self.constrained.shape)
-        left = self.remaining_share([mechanism.factor(time) for mechanism in self.emptying])[:, None]
-        for load, forces in zip(self.loads, self._unit_forces, strict=True):
-            total += load.factor(time) * (left * forces if load.by_volume else forces)
+        part = self.remaining_part([mechanism.factor(time) for mechanism in self.emptying])[:, None, None]
+        for load, forces in zip(self.loads, self.unit_forces if unit_forces is None else unit_forces, strict=True):
+            at_nodes = summed_at_nodes(nodes, part * forces) if isinstance(load, BodyForce) else forces
+            total += load.factor(time) * at_nodes
         return total
 
 

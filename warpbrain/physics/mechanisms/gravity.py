@@ -5,10 +5,11 @@ then (diagnosis design, mechanism M1):
 
     f_a = int N_a [ rho_csf g H(z(X) - level) d + (rho - rho_csf) g (d - d_imaged) ] dV
 
-with `d` the direction of gravity, `z` the height against it above the lowest point of the undeformed mesh, and `H` a
-step smoothed over 3 mm. The second term is there only if the head was turned since imaging: `direction` is where 'down'
-is in the pose of the surgery, in the axes of the image, `imaged_direction` where it was while imaging, and either is
-the case's `gravity_axis` if it is not said.
+with `d` the direction of gravity, `z` the height against it above the lowest point of the undeformed mesh, and `H` the
+unit step. Elements that the fluid's surface cuts are integrated exactly, and so are the derivatives by its level and by
+the direction, integrals over the surface of the fluid (`warpbrain.mesh.half_space`). The second term is there only if
+the head was turned since imaging: `direction` is where 'down' is in the pose of the surgery, in the axes of the image,
+`imaged_direction` where it was while imaging, and either is the case's `gravity_axis` if it is not said.
 """
 
 from __future__ import annotations
@@ -21,10 +22,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.mesh import QuadraticMesh, TetMesh, tangents, volume_forces
+from warpbrain.mesh import (
+    QuadraticMesh,
+    TetMesh,
+    integrals_above,
+    integrals_of_shapes,
+    integrals_on_plane,
+    tangents,
+)
 from warpbrain.physics.directions import unit_vector
 from warpbrain.physics.expectation import Uniform
-from warpbrain.physics.load import Load
+from warpbrain.physics.load import Along, BodyForce
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, parameter
 from warpbrain.physics.proposal import Proposal, Situation
 
@@ -32,14 +40,12 @@ from warpbrain.physics.proposal import Proposal, Situation
 STANDARD_GRAVITY = 9.81
 #: Density of cerebrospinal fluid [kg/m3]; about 1.007 g/cm3 at body temperature (Davson and Segal 1996).
 CSF_DENSITY = 1007.0
-#: Width [m] over which the fluid's surface is smoothed, so that the load depends smoothly on its level.
-SURFACE_WIDTH = 0.003
 #: Where it is looked for: levels, standard deviation of how much of the weight acts, and of the head's pose [rad].
 _LEVELS, _SHARE, _POSE = 9, 0.1, 0.12
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gravity(Load, Mechanism):
+class Gravity(BodyForce, Mechanism):
     """Weight that acts on tissue above the level of the cerebrospinal fluid.
 
     Parameters
@@ -79,7 +85,6 @@ class Gravity(Load, Mechanism):
         source="Miga et al. 1999; Davson and Segal 1996 (density of the fluid)",
     )
     lowest: float | None = None
-    by_volume: ClassVar[bool] = True
     kind: ClassVar[str] = "gravity"
     quadratic: ClassVar[bool] = True
     confused_with: ClassVar[tuple[str, ...]] = ("pressure", "swelling")
@@ -156,24 +161,42 @@ class Gravity(Load, Mechanism):
         imaged = unit_vector("imaged_direction", self.imaged_direction)
         return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(down, imaged)), down @ imaged)))
 
-    def height(self, mesh: TetMesh | QuadraticMesh, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Heights of points (k, 3) [m] above the one that levels of a mesh are counted from, against gravity, (k,)."""
-        up = -unit_vector("direction", self.direction)
-        return np.asarray(points @ up - (float((mesh.points @ up).min()) if self.lowest is None else self.lowest))
+    def datum(self, mesh: TetMesh | QuadraticMesh) -> float:
+        """Height [m], `-x . direction`, of the point that levels are counted from."""
+        return float((mesh.points @ self._up).min()) if self.lowest is None else self.lowest
 
-    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
-        down = unit_vector("direction", self.direction)
-        level = self.csf_level
-        if level is None:
-            weight = self.density * STANDARD_GRAVITY * down
-            return volume_forces(mesh, lambda points: np.tile(weight, (len(points), 1)))
+    def unit_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
+        whole = integrals_of_shapes(mesh)[:, :, None]
+        if self.csf_level is None:
+            return -self.density * STANDARD_GRAVITY * whole * self._up
+        dry = integrals_above(mesh, self._up, self.datum(mesh) + self.csf_level)[:, :, None]
+        force = -CSF_DENSITY * STANDARD_GRAVITY * dry * self._up
+        if self.imaged_direction is not None:
+            force = force + (self.density - CSF_DENSITY) * STANDARD_GRAVITY * whole * self._turned
+        return force
 
-        def density(points: NDArray[np.float64]) -> NDArray[np.float64]:
-            drained = 0.5 * (1.0 + np.tanh(2.0 * (self.height(mesh, points) - level) / SURFACE_WIDTH))
-            force = CSF_DENSITY * STANDARD_GRAVITY * drained[:, None] * down
-            if self.imaged_direction is not None:
-                turned = down - unit_vector("imaged_direction", self.imaged_direction)
-                force = force + (self.density - CSF_DENSITY) * STANDARD_GRAVITY * turned
-            return np.asarray(force)
+    def unit_forces_rate(self, mesh: TetMesh | QuadraticMesh, along: Along) -> NDArray[np.float64]:
+        whole = integrals_of_shapes(mesh)[:, :, None]
+        up_rate = along(lambda gravity: gravity._up)
+        if self.csf_level is None:
+            return -self.density * STANDARD_GRAVITY * whole * up_rate
+        surface = self.datum(mesh) + self.csf_level
+        surface_rate = along(lambda gravity: np.asarray(gravity.datum(mesh) + gravity.csf_level))
+        # the surface of the fluid sinks through the tissue by so much [m]
+        sunk = integrals_on_plane(mesh, self._up, surface, lambda points: points @ up_rate - surface_rate)
+        dry = integrals_above(mesh, self._up, surface)
+        rate = -CSF_DENSITY * STANDARD_GRAVITY * (sunk[:, :, None] * self._up + dry[:, :, None] * up_rate)
+        if self.imaged_direction is not None:
+            turned_rate = along(lambda gravity: gravity._turned)
+            rate = rate + (self.density - CSF_DENSITY) * STANDARD_GRAVITY * whole * turned_rate
+        return rate
 
-        return volume_forces(mesh, density)
+    @property
+    def _up(self) -> NDArray[np.float64]:
+        return -unit_vector("direction", self.direction)
+
+    @property
+    def _turned(self) -> NDArray[np.float64]:
+        """Direction of gravity less that while imaged."""
+        assert self.imaged_direction is not None
+        return -self._up - unit_vector("imaged_direction", self.imaged_direction)

@@ -1,0 +1,163 @@
+"""Integrals of shape functions over the part of each tetrahedron above a plane, and over the plane inside it.
+
+A tetrahedron is cut by a plane into tetrahedra: one at a corner that is alone on its side, three in the wedge where two
+corners are on each side. On these the shape functions are polynomials, which the rules below integrate exactly, so the
+result is the integral but for rounding, wherever the plane lies. By the transport theorem a plane that moves with the
+speed `r` along its normal changes the integral over what is above it by
+
+    d/dt int_(above) N_a dV = int_(plane) N_a (-r) dA.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.mesh.integrals import shape_values, triangle_rule
+from warpbrain.mesh.quadratic import QuadraticMesh
+from warpbrain.mesh.tet_mesh import Floats, TetMesh
+
+Ints = NDArray[np.int64]
+
+#: Barycentric points of a rule of degree 2 on a tetrahedron, of equal weights (Keast 1986); exact for quadratic shapes.
+_ALPHA = (5.0 - np.sqrt(5.0)) / 20.0
+_RULE = np.full((4, 4), _ALPHA) + (1.0 - 4.0 * _ALPHA) * np.eye(4)
+#: Corners of three tetrahedra that fill a wedge with the triangles 0 1 2 and 3 4 5, and of two triangles that fill the
+#: quadrilateral 0 1 2 3.
+_WEDGE = ((0, 1, 2, 3), (1, 2, 3, 4), (2, 3, 4, 5))
+_QUADRILATERAL = ((0, 1, 2), (0, 2, 3))
+
+
+def integrals_of_shapes(mesh: TetMesh | QuadraticMesh) -> Floats:
+    """`int N_a dV` over each tetrahedron [m3], shape (m, 4) or (m, 10)."""
+    if isinstance(mesh, TetMesh):
+        return np.repeat(mesh.volumes[:, None] / 4.0, 4, axis=1)
+    return mesh.corners.volumes[:, None] * np.repeat([-1.0 / 20.0, 1.0 / 5.0], [4, 6])
+
+
+def integrals_above(mesh: TetMesh | QuadraticMesh, up: ArrayLike, level: float) -> Floats:
+    """`int N_a dV` over the part of each tetrahedron where `x . up > level`.
+
+    Parameters
+    ----------
+    mesh : TetMesh or QuadraticMesh
+    up : (3,) array
+        Unit normal of the plane.
+    level : float
+        Its distance from the origin along `up` [m].
+
+    Returns
+    -------
+    (m, 4) or (m, 10) array
+        [m3], for the nodes of each tetrahedron in the order of `elements_of_nodes`.
+    """
+    cut = _Cut(mesh, np.asarray(up, dtype=np.float64), level)
+    whole = integrals_of_shapes(mesh)
+    integrals = np.where((cut.count == 4)[:, None], whole, 0.0)
+    for elements, corners, sign in cut.solids():
+        # sign -1: what is below is cut off from the whole
+        bary = np.einsum("qc,kca->kqa", _RULE, corners)
+        volumes = np.abs(np.linalg.det(corners)) * cut.volumes[elements]
+        part = volumes[:, None] * cut.shapes(bary).mean(axis=1)
+        np.add.at(integrals, elements, sign * part)
+    below = cut.count == 3
+    integrals[below] += whole[below]
+    return integrals
+
+
+def integrals_on_plane(
+    mesh: TetMesh | QuadraticMesh, up: ArrayLike, level: float, weight: Callable[[Floats], Floats]
+) -> Floats:
+    """`int N_a w dA` over the part of the plane `x . up = level` inside each tetrahedron.
+
+    Parameters
+    ----------
+    mesh, up, level
+        See `integrals_above`.
+    weight : callable
+        From points (k, 3) [m] on the plane to values (k,); exact for polynomials of degree 2.
+
+    Returns
+    -------
+    (m, 4) or (m, 10) array
+        [m2] times the unit of the weight.
+    """
+    cut = _Cut(mesh, np.asarray(up, dtype=np.float64), level)
+    rule, shares = triangle_rule()
+    integrals = np.zeros(integrals_of_shapes(mesh).shape)
+    for elements, corners in cut.sections():
+        bary = np.einsum("qc,kca->kqa", rule, corners)
+        points = np.einsum("kqa,kai->kqi", bary, cut.corners[elements])
+        x = np.einsum("kca,kai->kci", corners, cut.corners[elements])
+        areas = 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
+        values = weight(points.reshape(-1, 3)).reshape(points.shape[:2]) * shares * areas[:, None]
+        np.add.at(integrals, elements, np.einsum("kq,kqs->ks", values, cut.shapes(bary)))
+    return integrals
+
+
+def elements_of_nodes(mesh: TetMesh | QuadraticMesh) -> NDArray[np.int32]:
+    """Nodes of each tetrahedron, (m, 4) or (m, 10), in the order of the integrals."""
+    return mesh.tetrahedra if isinstance(mesh, TetMesh) else mesh.elements
+
+
+def summed_at_nodes(mesh: TetMesh | QuadraticMesh, values: Floats) -> Floats:
+    """Values (m, s, ...) at the nodes of tetrahedra, added up at each node (n, ...)."""
+    nodes, count = elements_of_nodes(mesh).ravel(), len(mesh.points)
+    columns = values.reshape(len(nodes), -1).T
+    sums = [np.bincount(nodes, weights=column, minlength=count) for column in columns]
+    return np.stack(sums, axis=1).reshape(count, *values.shape[2:])
+
+
+class _Cut:
+    """Tetrahedra and a plane: how many corners lie above it, and the polyhedra and polygons that it cuts out.
+
+    A corner on the plane is taken for one below it, so that a face on the plane belongs to the tetrahedron above.
+    """
+
+    def __init__(self, mesh: TetMesh | QuadraticMesh, up: Floats, level: float) -> None:
+        linear = isinstance(mesh, TetMesh)
+        self.shapes: Callable[[Floats], Floats] = (lambda bary: bary) if linear else _quadratic
+        self.volumes = mesh.volumes if isinstance(mesh, TetMesh) else mesh.corners.volumes
+        self.corners = mesh.points[elements_of_nodes(mesh)[:, :4]]
+        self._heights = self.corners @ up - level
+        self.count = (self._heights > 0.0).sum(axis=1)
+        # the highest first: those above the plane come before those below it
+        self._order = np.argsort(-self._heights, axis=1, kind="stable")
+
+    def solids(self) -> list[tuple[Ints, Floats, float]]:
+        """Ids (k,) of tetrahedra, corners (k, 4, 4) of a part of each in barycentric coordinates, and its sign."""
+        alone_above, alone_below, half = (np.flatnonzero(self.count == count) for count in (1, 3, 2))
+        at_corner = [
+            (ids, np.stack([self._corner(ids, tip), *(self._between(ids, tip, other) for other in others)], 1), sign)
+            for ids, tip, others, sign in ((alone_above, 0, (1, 2, 3), 1.0), (alone_below, 3, (0, 1, 2), -1.0))
+        ]
+        sides = [[self._corner(half, tip), *(self._between(half, tip, other) for other in (2, 3))] for tip in (0, 1)]
+        wedge = np.stack(sides[0] + sides[1], axis=1)
+        return at_corner + [(half, wedge[:, part], 1.0) for part in _WEDGE]
+
+    def sections(self) -> list[tuple[Ints, Floats]]:
+        """Ids (k,) of tetrahedra, and corners (k, 3, 4) of triangles of the plane in them."""
+        alone_above, alone_below, half = (np.flatnonzero(self.count == count) for count in (1, 3, 2))
+        triangles = [
+            (ids, np.stack([self._between(ids, tip, other) for other in others], axis=1))
+            for ids, tip, others in ((alone_above, 0, (1, 2, 3)), (alone_below, 3, (0, 1, 2)))
+        ]
+        around = np.stack([self._between(half, a, b) for a, b in ((0, 2), (0, 3), (1, 3), (1, 2))], axis=1)
+        return triangles + [(half, around[:, part]) for part in _QUADRILATERAL]
+
+    def _corner(self, elements: Ints, rank: int) -> Floats:
+        """Barycentric coordinates (k, 4) of the corner of a rank in height."""
+        return np.eye(4)[self._order[elements, rank]]
+
+    def _between(self, elements: Ints, one: int, other: int) -> Floats:
+        """Where the plane cuts the edge between the corners of two ranks, (k, 4)."""
+        rows = np.arange(len(elements))
+        first, second = (self._heights[elements][rows, self._order[elements, rank]] for rank in (one, other))
+        share = (first / (first - second))[:, None]
+        return (1.0 - share) * self._corner(elements, one) + share * self._corner(elements, other)
+
+
+def _quadratic(bary: Floats) -> Floats:
+    return shape_values(bary.reshape(-1, 4)).reshape(*bary.shape[:-1], 10)
