@@ -4,14 +4,15 @@ With `z = ln mu(l)` of a study of method `m`, anatomy `a`, paper `q`, and `x(l) 
 strain `e` (`secant`), which is `l - 1` near rest and of equal size for tension and compression of one I1,
 
     z = ln 1500 Pa + overall + method + anatomy + group + paper + study                       one modulus each
-        + [curve shared by all + by anatomy + by paper + of the study](x), even in x          hyperelastic studies only
+        + [curve shared by all + by anatomy + by paper + of the study](x), even, 0 at rest    hyperelastic studies only
         + 2 a x + [asymmetry of the paper + of the study](x), odd in x                        asymmetric studies only
         + (b + [asymmetry at rest of the paper + of the study]) sgn(x)                        asymmetric studies only
         + rest
 
 each a Gaussian effect with a variance of its own: a sum of coregionalised kernels whose matrices are "is the same". The
-kernel over `x` is stationary; curves take its even part and asymmetries its odd one. `a` and `b` are what asymmetry is
-in the mean over papers: unknown, one pair for all tissue, as likely positive as negative before the data are seen.
+kernel over `x` is stationary; curves take its even part, given that they are zero at rest, and asymmetries its odd one.
+`a` and `b` are what asymmetry is in the mean over papers: unknown, one pair for all tissue, as likely positive as
+negative before the data are seen.
 Elastography and linear studies publish a modulus, not a curve, so they inform the modulus only. A form of I1 alone that
 was fitted to both sides at once (neo-Hookean, Fung, Gent, Demiray, Yeoh) is symmetric whatever was measured, so such a
 study has no asymmetry and informs none. Grey and white matter of one paper, or of one new subject, are correlated
@@ -125,15 +126,21 @@ class Hierarchy:
         return np.asarray(sum(self.spread[name] ** 2 * matrix for name, matrix in matrices.items()))
 
     def _curves(self, structure: Structure) -> tuple[Floats, Floats, Floats, Floats]:
-        """Even and odd part of the kernel, and their derivatives by the logarithm of the length scale."""
-        kernel = KERNELS[self.kernel]
-        near, d_near = kernel(structure.near, self.length_scale)
-        mirrored, d_mirrored = kernel(structure.mirrored, self.length_scale)
+        """Even and odd part of the kernel, and their derivatives by the logarithm of the length scale.
+
+        The even part is that of curves which are zero at rest, `k(x, y) - k(x, 0) k(0, y) / k(0, 0)`: what a modulus is
+        at rest the effects of moduli say, and curves what it becomes with strain.
+        """
+        near, mirrored, rest_x, rest_y = (
+            KERNELS[self.kernel](distance, self.length_scale)
+            for distance in (structure.near, structure.mirrored, structure.from_rest_x, structure.from_rest_y)
+        )
+        d_rest = np.outer(rest_x[1], rest_y[0]) + np.outer(rest_x[0], rest_y[1])
         return (
-            0.5 * (near + mirrored),
-            0.5 * (near - mirrored),
-            0.5 * (d_near + d_mirrored),
-            0.5 * (d_near - d_mirrored),
+            0.5 * (near[0] + mirrored[0]) - np.outer(rest_x[0], rest_y[0]),
+            0.5 * (near[0] - mirrored[0]),
+            0.5 * (near[1] + mirrored[1]) - d_rest,
+            0.5 * (near[1] - mirrored[1]),
         )
 
 
@@ -147,7 +154,9 @@ class Structure:
         Matrix of each effect for unit variance; those of curves and asymmetries are still to be multiplied by the even
         and the odd part of the kernel.
     near, mirrored : (n, m) array
-        Between the equivalent strains, and between those of one and the mirrored ones of the other.
+        Between the strains, and between those of one and the mirrored ones of the other.
+    from_rest_x, from_rest_y : (n,) and (m,) array
+        Sizes of the strains.
     a, b : (n, 2) and (m, 2) array
         See `mean_asymmetry_of`.
     """
@@ -157,6 +166,8 @@ class Structure:
     odd: dict[str, Floats]
     near: Floats
     mirrored: Floats
+    from_rest_x: Floats
+    from_rest_y: Floats
     a: Floats
     b: Floats
 
@@ -189,7 +200,9 @@ class Structure:
             "curve, study": study * curved,
         }
         odd = {"asymmetry, paper": paper * both, "asymmetry, study": study * both}
-        return cls(constant, even, odd, np.abs(x - y), np.abs(x + y), mean_asymmetry_of(a), mean_asymmetry_of(b))
+        sizes = np.abs(x[:, 0]), np.abs(y[0])
+        means = mean_asymmetry_of(a), mean_asymmetry_of(b)
+        return cls(constant, even, odd, np.abs(x - y), np.abs(x + y), *sizes, *means)
 
 
 def mean_asymmetry_of(at: Places) -> Floats:
