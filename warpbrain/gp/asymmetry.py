@@ -79,8 +79,10 @@ def asymmetry(model: Hierarchical, group: str) -> Asymmetry:
         group,
         strain,
         float(np.mean([mean for mean, _ in everyone])),
-        *(_quantile(everyone, part) for part in (0.025, 0.975)),
-        *(_quantile(new, part) for part in (0.025, 0.975)),
+        _quantile(everyone, 0.025),
+        _quantile(everyone, 0.975),
+        _quantile(new, 0.025),
+        _quantile(new, 0.975),
         float(np.mean([ndtr(mean / spread) for mean, spread in new])),
     )
 
