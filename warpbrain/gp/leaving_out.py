@@ -40,6 +40,9 @@ class Score:
         Part of the points within the central intervals of 50 % and 95 %.
     values : tuple of float
         The log density of each study or paper, for paired comparisons.
+    levels : tuple of float
+        Probability integral transform of the level of each study or paper (`Candidate.level_pit`): evenly spread
+        between 0 and 1 if the model is calibrated. Empty where it was not computed.
     """
 
     name: str
@@ -49,6 +52,7 @@ class Score:
     coverage_50: float
     coverage_95: float
     values: tuple[float, ...]
+    levels: tuple[float, ...] = ()
 
     @property
     def median(self) -> float:
@@ -92,14 +96,15 @@ def leave_out(
     whole = candidate.fitted(studies)
     held = folds(studies, fold)
     predictions: list[list[Prediction]] = []
+    levels: list[float] = []
     for index, left in enumerate(held.values()):
         progress(index / len(held))
         without = whole.fitted([study for study in studies if study not in left])
         predictions.append([without.predict(study, _seen(study)) for study in left])
+        levels.append(without.level_pit(left, [_seen(study) for study in left]))
     values = np.array([np.mean([p.log_density.mean() for p in group]) for group in predictions])
     each = [np.mean([(p.error**2).mean() for p in group]) for group in predictions]
-    # half and 95 % of a normal distribution
-    within = [np.mean([np.mean(np.abs(p.deviation) < k) for g in predictions for p in g]) for k in (0.6745, 1.96)]
+    within = [np.mean([np.mean(np.abs(p.pit - 0.5) < half) for g in predictions for p in g]) for half in (0.25, 0.475)]
     error = float(values.std(ddof=1) / np.sqrt(len(values)))
     return Score(
         candidate.name,
@@ -109,6 +114,7 @@ def leave_out(
         float(within[0]),
         float(within[1]),
         tuple(values.tolist()),
+        tuple(levels),
     )
 
 

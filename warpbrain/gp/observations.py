@@ -29,12 +29,20 @@ class Places:
     study, source, task : (n,) int array
         Numbers that tell studies and the papers they come from apart (negative: new ones), and the group.
     stretch : (n,) array
+    symmetric : (n,) bool array
+        The study's form takes tension and compression alike (`Study.symmetric`): of asymmetry it says nothing.
     """
 
     study: Integers
     source: Integers
     task: Integers
     stretch: Floats
+    symmetric: NDArray[np.bool_]
+
+    @property
+    def asymmetric(self) -> NDArray[np.bool_]:
+        """Curved, and free to be stiffer on one side of rest."""
+        return self.curved & ~self.symmetric
 
     @property
     def curved(self) -> NDArray[np.bool_]:
@@ -67,11 +75,11 @@ def observations(studies: Sequence[Study]) -> Observations:
         if not study.group.startswith("hyperelastic/"):
             grid, values = np.ones(1), values.mean(keepdims=True)
         source = names.index(study.paper)
-        places += [(index, source, study.task, l) for l in grid]
+        places += [(index, source, study.task, l, study.symmetric) for l in grid]
         moduli.append(values)
-    table = np.array(places, dtype=np.float64).reshape(-1, 4)
+    table = np.array(places, dtype=np.float64).reshape(-1, 5)
     whole = table[:, :3].astype(np.int64)
-    at = Places(whole[:, 0], whole[:, 1], whole[:, 2], table[:, 3])
+    at = Places(whole[:, 0], whole[:, 1], whole[:, 2], table[:, 3], table[:, 4] == 1.0)
     return Observations(at, np.concatenate([*moduli, np.empty(0)]))
 
 

@@ -2,12 +2,14 @@
 
 A model is a folder with `model.json`, which holds the parameters, the variant of the literature they are of and how
 they were found, and with `studies.toml`, the studies that a user added, if any. Factors are computed when they are
-first needed.
+first needed. Hierarchical models have `"format": 2`. The first format knew no mean asymmetry, and its effects mean
+other things than those of today: such a model is fitted again to its own studies when it is read, which takes seconds.
 """
 
 from __future__ import annotations
 
 import json
+import warnings
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -20,8 +22,11 @@ from warpbrain.errors import InputError
 from warpbrain.gp.coregionalised import Coregionalised
 from warpbrain.gp.hierarchical import Hierarchical
 from warpbrain.gp.hierarchy import EFFECTS, Hierarchy
+from warpbrain.gp.hierarchy_fit import SAMPLE, Fitted, fit_hierarchy, sample_hierarchies
 from warpbrain.gp.kernels import KERNELS
 from warpbrain.gp.literature.studies import VARIANTS, Variant, read_studies
+from warpbrain.gp.literature.study import Study
+from warpbrain.gp.observations import observations
 from warpbrain.gp.parameters import TASKS, Parameters
 from warpbrain.gp.process import Process
 from warpbrain.values import finite
@@ -31,6 +36,8 @@ Kind = Literal["hierarchical", "coregionalised"]
 KINDS: tuple[Kind, ...] = ("hierarchical", "coregionalised")
 
 MODEL, STUDIES = "model.json", "studies.toml"
+#: Of the file of a hierarchical model.
+FORMAT = 2
 
 
 @cache
@@ -91,15 +98,29 @@ def read_model(folder: Path) -> Process:
     if not isinstance(given, dict):
         raise InputError(f"{path}: parameters: expected a table")
     if kind == "hierarchical":
-        spread = {name: _positive(path, given, name) for name in EFFECTS}
-        hierarchy = Hierarchy(spread, _positive(path, given, "length scale"), kernel)
-        return Hierarchical(studies, hierarchy, variant)
+        if _choice(path, table | {"format": table.get("format", 1)}, "format", (1, FORMAT)) == 1:
+            warnings.warn(f"{path}: of an older format, without a mean asymmetry: fitted again", stacklevel=2)
+            return fitted_hierarchical(studies, variant, kernel)[0]
+        sample = table.get("sample")
+        if not isinstance(sample, list) or not all(isinstance(one, dict) for one in sample):
+            raise InputError(f"{path}: sample: expected tables of parameters")
+        best, *others = (_hierarchy(path, one, kernel) for one in (given, *sample))
+        return Hierarchical(studies, best, variant, tuple(others))
     arrays = {name: _numbers(path, given, name) for name in ("w", "kappa", "noise")}
     try:
         parameters = Parameters(_positive(path, given, "length scale"), **arrays)
     except InputError as error:
         raise InputError(f"{path}: parameters: {error}") from None
     return Coregionalised(studies, parameters, variant, kernel, _positive(path, given, "jitter"))
+
+
+def fitted_hierarchical(
+    studies: tuple[Study, ...], variant: str, kernel: str = "matern52"
+) -> tuple[Hierarchical, Fitted]:
+    """The hierarchical model of studies, with a sample of hierarchies, and how its fit ended."""
+    seen = observations(studies)
+    hierarchy, fitted = fit_hierarchy(seen, kernel)
+    return Hierarchical(studies, hierarchy, variant, sample_hierarchies(hierarchy, seen, SAMPLE)), fitted
 
 
 def write_model(folder: Path, model: Process, record: dict[str, Any], added: Path | None = None) -> None:
@@ -115,9 +136,8 @@ def write_model(folder: Path, model: Process, record: dict[str, Any], added: Pat
     added : Path, optional
     """
     if isinstance(model, Hierarchical):
-        hierarchy = model.hierarchy
-        parameters: dict[str, Any] = {**hierarchy.spread, "length scale": hierarchy.length_scale}
-        kernel = hierarchy.kernel
+        parameters = _described(model.hierarchy)
+        kernel = model.hierarchy.kernel
     elif isinstance(model, Coregionalised):
         own = model.parameters
         parameters = {"length scale": own.length_scale, "jitter": model.jitter}
@@ -125,13 +145,15 @@ def write_model(folder: Path, model: Process, record: dict[str, Any], added: Pat
         kernel = model.kernel
     else:
         raise TypeError(f"{type(model).__name__} is not a model that can be written")
-    table = {
+    table: dict[str, Any] = {
         "kind": model.name,
         "variant": model.variant,
         "kernel": kernel,
         "parameters": parameters,
         "training": record,
     }
+    if isinstance(model, Hierarchical):
+        table |= {"format": FORMAT, "sample": [_described(one) for one in model.sample]}
     # the studies first: a model without them would be another one
     if added is not None:
         text = added.read_text(encoding="utf-8")
@@ -141,9 +163,18 @@ def write_model(folder: Path, model: Process, record: dict[str, Any], added: Pat
         path.write_text(json.dumps(table, indent=2) + "\n", encoding="utf-8")
 
 
+def _hierarchy(path: Path, given: dict[str, Any], kernel: str) -> Hierarchy:
+    spread = {name: _positive(path, given, name) for name in EFFECTS}
+    return Hierarchy(spread, _positive(path, given, "length scale"), kernel)
+
+
+def _described(hierarchy: Hierarchy) -> dict[str, Any]:
+    return {**hierarchy.spread, "length scale": hierarchy.length_scale}
+
+
 def _choice(path: Path, table: dict[str, Any], key: str, known: tuple[Any, ...]) -> Any:
     if table.get(key) not in known:
-        raise InputError(f"{path}: {key} = {table.get(key)!r}: expected one of {', '.join(known)}")
+        raise InputError(f"{path}: {key} = {table.get(key)!r}: expected one of {', '.join(map(str, known))}")
     return table[key]
 
 

@@ -15,8 +15,9 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
         "compare",
         help="score models on studies that they have not seen",
         description="Leaves out each study of the literature, or each paper with all its studies, fits every model "
-        "again without it and scores what it says of it. Takes minutes to half an hour; models that are in the file "
-        "already are not scored again, so that it goes on where it was interrupted.",
+        "again without it and scores what it says of it: log predictive density, with a sign test against the "
+        "default model, and how many levels are within intervals, by method of measurement. Takes minutes to half an "
+        "hour; models that are in the file already are not scored again, so that it goes on where it was interrupted.",
     )
     parser.add_argument("--variant", choices=VARIANTS, default=VARIANTS[0], help=f"default: {VARIANTS[0]}")
     parser.add_argument(
@@ -32,16 +33,24 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
 def _compare(options: argparse.Namespace) -> None:
     from warpbrain.atomic import check_writable
     from warpbrain.errors import InputError
-    from warpbrain.gp.candidates import candidates
+    from warpbrain.gp.calibration import calibration, compared, methods_of
+    from warpbrain.gp.candidates import DEFAULT, candidates
     from warpbrain.gp.leaving_out import folds, leave_out
     from warpbrain.gp.literature.studies import read_studies
-    from warpbrain.gp.score_table import read_scores, score_lines, write_scores
+    from warpbrain.gp.score_table import (
+        calibration_lines,
+        comparison_lines,
+        read_scores,
+        score_lines,
+        write_scores,
+    )
     from warpbrain.terminal.progress import Progress
 
     path = options.csv or Path(f"warpbrain-gp-{options.variant}-{options.leave}.csv")
     check_writable(path)
     studies = read_studies(options.variant)
-    held = list(folds(studies, options.leave))
+    left = folds(studies, options.leave)
+    held = list(left)
     scores = read_scores(path, held)
     done = {score.name for score in scores}
     chosen = [candidate for candidate in candidates() if options.only in candidate.name]
@@ -56,5 +65,15 @@ def _compare(options: argparse.Namespace) -> None:
             write_scores(path, scores, held)
     papers = len({study.paper for study in studies})
     print(f"{len(studies)} studies of {papers} papers, one {options.leave} after the other left out:")
-    print(*score_lines([score for score in scores if options.only in score.name]), sep="\n")
+    shown = [score for score in scores if options.only in score.name]
+    print(*score_lines(shown), sep="\n")
+    for score in shown:
+        if score.levels:
+            lines = calibration_lines(calibration(score, methods_of(left)), options.leave)
+            title = f"{score.name}: {options.leave}s whose level is within an interval (95 % interval of that part)"
+            print("", title, *lines, sep="\n")
+    default = next((score for score in scores if score.name == DEFAULT), None)
+    others = [score for score in shown if score.name != DEFAULT]
+    if default is not None and others:
+        print("", *comparison_lines(default.name, [compared(default, other) for other in others]), sep="\n")
     print("", f"written to {path}", sep="\n")

@@ -17,7 +17,8 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
         help="draw a model and print the shear moduli that it makes likely",
         description="Writes studies.png (the published energies), draws.png (the distribution with draws from it), "
         "extrapolation.png (beyond the data, beside the other kind of model) and moduli.csv, and prints the table: "
-        "laws fitted to the mean curve and to those two standard deviations from it, and what 95 %% of draws have.",
+        "laws fitted to the mean curve and to those two standard deviations from it, and what 95 %% of draws have; of "
+        "hyperelastic groups also whether tissue is stiffer in compression or in tension, with its posterior interval.",
     )
     parser.add_argument("--group", metavar="GROUP", help='only this one, such as "hyperelastic/brain"')
     add_model(parser)
@@ -39,8 +40,11 @@ def _show(options: argparse.Namespace) -> None:
     require_stable_range(options.poisson)
 
     from warpbrain.atomic import output_folder
+    from warpbrain.gp.asymmetry import asymmetries_of_papers, asymmetry
+    from warpbrain.gp.hierarchical import Hierarchical
     from warpbrain.gp.moduli import moduli
     from warpbrain.gp.trained import trained
+    from warpbrain.report.generative.asymmetry_text import asymmetry_lines
     from warpbrain.report.generative.draws_picture import draw_draws
     from warpbrain.report.generative.extrapolation_picture import draw_extrapolation
     from warpbrain.report.generative.moduli_text import moduli_lines, write_moduli
@@ -73,6 +77,10 @@ def _show(options: argparse.Namespace) -> None:
         print("(a modulus in brackets is of a law that is unstable)")
     error = 100.0 * max(one.median_error for one in found)
     print(f"{options.draws} draws each: their medians are known to {error:.0f} % or better")
+    curved = [group for group in groups if group.startswith("hyperelastic/")]
+    if curved and isinstance(model, Hierarchical):
+        papers = asymmetries_of_papers(model.studies)
+        print("", *asymmetry_lines([asymmetry(model, group) for group in curved], papers), sep="\n")
     other = trained("coregionalised" if model.name == KINDS[0] else "hierarchical", options.variant or VARIANTS[0])
     write_moduli(out / "moduli.csv", found)
     save(draw_studies(model, options.group), out / "studies.png")

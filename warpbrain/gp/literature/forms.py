@@ -25,6 +25,8 @@ class Form:
         `mu0` [Pa] of the parameters, the curvature of the energy at rest: `d2Psi/dl2 = 3 mu0` at `l = 1`.
     conventions : mapping of str to Convention
         By name; where a study names none, the one whose keys it gives, and the first if several have them.
+    of_first_invariant : bool
+        A function of I1 alone: whatever its parameters, tension and compression of one I1 have one energy.
     """
 
     name: str
@@ -32,6 +34,7 @@ class Form:
     energy: Callable[..., Floats]
     shear_modulus: Callable[..., float]
     conventions: Mapping[str, Convention]
+    of_first_invariant: bool = False
 
     def convention_of(self, keys: Iterable[str]) -> str:
         """The convention that has most of the keys; of equals the first."""
@@ -87,6 +90,7 @@ _ALL = (
         energies.neo_hookean,
         lambda *, mu: mu,
         _one("supplement", "mu/2 (I1 - 3)", _pa("mu")),
+        of_first_invariant=True,
     ),
     Form(
         "mooney-rivlin",
@@ -136,6 +140,7 @@ _ALL = (
             "C/(2 alpha) (alpha (I1 - 3) + exp(alpha (I1 - 3)) - 1)",
             (*_pa("C"), Parameter("alpha", zero=False)),
         ),
+        of_first_invariant=True,
     ),
     Form(
         "gent",
@@ -150,6 +155,7 @@ _ALL = (
                 conventions.gent_of_inverse,
             ),
         },
+        of_first_invariant=True,
     ),
     Form(
         "demiray",
@@ -157,6 +163,7 @@ _ALL = (
         energies.demiray,
         lambda *, mu, beta: mu,
         _one("budday", "mu/(2 beta) (exp(beta (I1 - 3)) - 1)", (*_pa("mu"), Parameter("beta", zero=False))),
+        of_first_invariant=True,
     ),
     Form(
         "yeoh",
@@ -164,6 +171,7 @@ _ALL = (
         energies.yeoh,
         lambda *, C10, C30: 2.0 * C10,
         _one("yeoh", "C10 (I1 - 3) + C30 (I1 - 3)^3", _pa("C10", "C30")),
+        of_first_invariant=True,
     ),
     Form(
         "rivlin",

@@ -77,6 +77,11 @@ class Study:
         return self.compression != self.tension
 
     @property
+    def symmetric(self) -> bool:
+        """Whether it is a function of I1 alone for both sides, which takes tension and compression alike."""
+        return FORMS[self.form].of_first_invariant and not self.split
+
+    @property
     def parameters(self) -> Parameters | dict[str, Parameters]:
         """Parameters of the form; of a study that is split, both sets by the names of their sides."""
         return {"compression": self.compression, "tension": self.tension} if self.split else self.tension

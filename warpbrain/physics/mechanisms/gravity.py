@@ -3,13 +3,15 @@
 The imaged shape is the reference: it is in equilibrium while submerged. What deforms it is the *change* of load since
 then (diagnosis design, mechanism M1):
 
-    f_a = int N_a [ rho_csf g H(z(X) - level) d + (rho - rho_csf) g (d - d_imaged) ] dV
+    f_a = int N_a [ rho_csf g H(z(X) - level) d + (rho_tissue - rho_csf) g (d - d_imaged) ] dV
 
 with `d` the direction of gravity, `z` the height against it above the lowest point of the undeformed mesh, and `H` the
 unit step. Elements that the fluid's surface cuts are integrated exactly, and so are the derivatives by its level and by
 the direction, integrals over the surface of the fluid (`warpbrain.mesh.half_space`). The second term is there only if
 the head was turned since imaging: `direction` is where 'down' is in the pose of the surgery, in the axes of the image,
-`imaged_direction` where it was while imaging, and either is the case's `gravity_axis` if it is not said.
+`imaged_direction` where it was while imaging, and either is the case's `gravity_axis` if it is not said. It is a small
+difference of two densities, so it takes `tissue_density`, that of brain. The `density` of the case may be the paper's
+1211.5 kg/m3, which is right for comparing inertia with it and would make the difference six times too large.
 """
 
 from __future__ import annotations
@@ -41,6 +43,8 @@ from warpbrain.physics.proposal import Proposal, Situation
 STANDARD_GRAVITY = 9.81
 #: Density of cerebrospinal fluid [kg/m3]; about 1.007 g/cm3 at body temperature (Davson and Segal 1996).
 CSF_DENSITY = 1007.0
+#: Density of brain [kg/m3], grey and white matter (ICRU Report 44, 1989).
+BRAIN_DENSITY = 1040.0
 #: Where it is looked for: levels, standard deviation of how much of the weight acts, and of the head's pose [rad].
 _LEVELS, _SHARE, _POSE = 9, 0.1, 0.12
 
@@ -54,7 +58,9 @@ class Gravity(BodyForce, Mechanism):
     direction : tuple of three floats
         Where 'down' is (any length but zero), axes RAS.
     density : float
-        Density of the tissue [kg/m3].
+        Density [kg/m3] of what has its full weight, where there never was any fluid.
+    tissue_density : float
+        Density [kg/m3] of what is submerged, of which buoyancy takes most.
     csf_level : float or None
         Height of the fluid's surface [m] against `direction`, above `lowest`. None: there never was any fluid, and the
         reference is free of gravity, as a gel phantom on the bench: the full weight acts.
@@ -75,6 +81,14 @@ class Gravity(BodyForce, Mechanism):
         "Where 'down' was while the anatomy was imaged.", kind="vector", default=None, absent="[case] gravity_axis"
     )
     density: float
+    tissue_density: float = parameter(
+        "Density of the tissue that the fluid carries, for the load of a turned head.",
+        default=BRAIN_DENSITY,
+        unit="kg/m3",
+        above=0.0,
+        typical="1030 to 1050 kg/m3",
+        source="ICRU Report 44 (1989): brain, grey and white matter 1040 kg/m3",
+    )
     csf_level: float | None = parameter(
         "Height of the fluid's surface against gravity, above the lowest point of the anatomy.",
         default=None,
@@ -156,7 +170,10 @@ class Gravity(BodyForce, Mechanism):
         axis = ", ".join(f"{v:g}" for v in self.direction)
         text = f" Its level: {1000.0 * self.csf_level:g} mm above the lowest point; gravity along ({axis}) in RAS"
         turned = self.degrees_turned
-        return f"{text}, {turned:.1f} degrees from where it was while imaged." if turned >= 0.05 else f"{text}."
+        if turned < 0.05:
+            return f"{text}."
+        tissue = f"of tissue of {self.tissue_density:g} kg/m3"
+        return f"{text}, {turned:.1f} degrees from where it was while imaged, {tissue}."
 
     @property
     def degrees_turned(self) -> float:
@@ -178,7 +195,7 @@ class Gravity(BodyForce, Mechanism):
         dry = integrals_above(mesh, self._up, self.datum(mesh) + self.csf_level)[:, :, None]
         force = -CSF_DENSITY * STANDARD_GRAVITY * dry * self._up
         if self.imaged_direction is not None:
-            force = force + (self.density - CSF_DENSITY) * STANDARD_GRAVITY * whole * self._turned
+            force = force + (self.tissue_density - CSF_DENSITY) * STANDARD_GRAVITY * whole * self._turned
         return force
 
     def unit_forces_rate(self, mesh: TetMesh | QuadraticMesh, along: Along) -> NDArray[np.float64]:
@@ -193,8 +210,8 @@ class Gravity(BodyForce, Mechanism):
         dry = integrals_above(mesh, self._up, surface)
         rate = -CSF_DENSITY * STANDARD_GRAVITY * (sunk[:, :, None] * self._up + dry[:, :, None] * up_rate)
         if self.imaged_direction is not None:
-            turned_rate = along(lambda gravity: gravity._turned)
-            rate = rate + (self.density - CSF_DENSITY) * STANDARD_GRAVITY * whole * turned_rate
+            turned_rate = along(lambda gravity: (gravity.tissue_density - CSF_DENSITY) * gravity._turned)
+            rate = rate + STANDARD_GRAVITY * whole * turned_rate
         return rate
 
     @property
