@@ -46,7 +46,7 @@ def test_patch(material: Material, elements: str, precision: Precision, device: 
     # rounding against the stiffness, which is what cancels, and against the stress
     tolerance = 100.0 * precision.epsilon * (material.volumetric_modulus + np.abs(P).max())
     error = 100.0 * np.abs(forces[~nodes.on_surface]).max() / tolerance
-    verify("patch test, tet10, every law: forces inside", "none", error, 100.0, "roundings of the stiffness")
+    verify(f"patch test, {elements}, every law: forces inside", "none", error, 100.0, "roundings of the stiffness")
     # sum of f (x) X is the volume times the stress
     assert np.abs(forces.T @ nodes.points / MESH.volume - P).max() <= 20.0 * tolerance
     assert np.abs(system.stresses() - P).max() <= tolerance
