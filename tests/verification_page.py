@@ -49,9 +49,10 @@ the CPU's by 3e-18 m, the equilibrium of case 0529 by 5e-10 mm (2026-11-21).
 at 8, by DOLFINx and not by us, against 12.74 mm: 6 % and 36 % too little. Our elements are the same. The other kinds:
 [solvers.md](solvers.md).
 
-**Other problems of FEBio's suite.** `mg01` is growth of several generations in the loaded shape, which `swelling` is
-not; `ma16` relaxes the deviator of Ogden's law, where `viscoelasticity` relaxes the neo-Hookean one, on three-field
-hexahedra; `te02` to `te05` need the stabilisation of FEBio's nodal tetrahedra.
+**Other problems of FEBio's suite.** [febio.md](febio.md) has those that were looked at, each with its reason. Of others
+`mg01` is growth of several generations in the loaded shape, which `swelling` is not; `ma16` relaxes the deviator of
+Ogden's law, where `viscoelasticity` relaxes the neo-Hookean one; `te02` to `te05` need the stabilisation of FEBio's nodal
+tetrahedra.
 """
 
 
