@@ -51,8 +51,8 @@ at 8, by DOLFINx and not by us, against 12.74 mm: 6 % and 36 % too little. Our e
 
 **Other problems of FEBio's suite.** [febio.md](febio.md) has those that were looked at, each with its reason. Of others
 `mg01` is growth of several generations in the loaded shape, which `swelling` is not; `ma16` relaxes the deviator of
-Ogden's law, where `viscoelasticity` relaxes the neo-Hookean one; `te02` to `te05` need the stabilisation of FEBio's nodal
-tetrahedra.
+Ogden's law, where `viscoelasticity` relaxes the neo-Hookean one; `te02` to `te05` need the stabilisation of FEBio's
+nodal tetrahedra.
 """
 
 
