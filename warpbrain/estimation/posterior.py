@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.estimation.chain import Chain
-from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.discretisation import DiscretisationError
 from warpbrain.estimation.identifiability import Identifiability, identifiability
 from warpbrain.estimation.importance import Importance
 from warpbrain.estimation.modes import Mode, probabilities
@@ -68,7 +68,7 @@ class Posterior:
         The most probable first.
     remarks : tuple of str
         What a user should know of how it was found.
-    differences : tuple of Difference
+    mesh_errors : tuple of DiscretisationError
         The error of the mesh each time it was computed; the last one counts. Empty if it was left out.
     importance : Importance
         The check of Laplace's approximation.
@@ -86,7 +86,7 @@ class Posterior:
     prior: Prior
     modes: tuple[Mode, ...]
     remarks: tuple[str, ...]
-    differences: tuple[Difference, ...]
+    mesh_errors: tuple[DiscretisationError, ...]
     importance: Importance
     doubts: tuple[str, ...]
     chain: Chain | None

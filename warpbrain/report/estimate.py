@@ -169,7 +169,7 @@ def _describe_prediction(prediction: Prediction) -> dict[str, Any]:
 
 
 def _describe_discretisation(posterior: Posterior, options: EstimationOptions) -> dict[str, Any] | None:
-    if not posterior.differences or options.discretisation is None:
+    if not posterior.mesh_errors or options.discretisation is None:
         return None
     _, amount, deviation = posterior.nuisances[0]
     return {
@@ -177,8 +177,9 @@ def _describe_discretisation(posterior: Posterior, options: EstimationOptions) -
         "standard_deviation": deviation,
         "prior_mean": options.discretisation.mean,
         "prior_standard_deviation": options.discretisation.deviation,
-        "difference_root_mean_square_mm": MILLIMETRES * posterior.differences[-1].size,
-        "computed": len(posterior.differences),
+        "difference_root_mean_square_mm": MILLIMETRES * posterior.mesh_errors[-1].size.root_mean_square,
+        "locking_root_mean_square_mm": MILLIMETRES * posterior.mesh_errors[-1].locking.root_mean_square,
+        "computed": len(posterior.mesh_errors),
     }
 
 
@@ -262,7 +263,8 @@ def _check_lines(said: Mapping[str, Any]) -> list[str]:
     if mesh is not None:
         lines.append(
             f"  error of the mesh: {mesh['amount']:.2f} +- {mesh['standard_deviation']:.2f} times what elements of "
-            f"half the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square"
+            f"half the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square, and the "
+            f"{mesh['locking_root_mean_square_mm']:.3f} mm that elements lock"
         )
     if said["registration"] is not None:
         shift = ", ".join(f"{value:.2f}" for value in said["registration"]["shift_mm"])

@@ -1,0 +1,82 @@
+"""The error of the mesh against other elements solved without an estimation, and its derivatives against differences."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import GREY, WHITE, block, truth, with_laws
+
+from warpbrain.errors import InputError
+from warpbrain.estimation.discretisation import NAMES, Discretisation, DiscretisationError, OtherElements
+from warpbrain.estimation.forward import Forward
+from warpbrain.mesh.refinement import refined
+from warpbrain.physics.laws import NeoHookean
+
+THETA = np.log([1370.0, 1000.0])
+CASE = block({"grey": GREY, "white": WHITE}, "gravity")
+
+
+def error_at(case, theta: np.ndarray) -> DiscretisationError:
+    forward = Forward(case, theta, "cpu")
+    state = forward.solve(theta)
+    derivatives = forward.differentiate(state)
+    return OtherElements(case, theta, "cpu").error(state, (derivatives.u, derivatives.reactions))
+
+
+@pytest.fixture(scope="module")
+def error() -> DiscretisationError:
+    return error_at(CASE, THETA)
+
+
+def test_it_is_the_difference_of_elements(error) -> None:
+    plain, free = truth(CASE), truth(CASE, "tet4-averaged")
+    smaller = truth(replace(CASE, mesh=refined(CASE.mesh)[0]), "tet4-averaged")
+    count = len(CASE.mesh.points)
+    # solved to what is far below any noise
+    np.testing.assert_allclose(error.locking.u, free.u - plain.u, atol=1e-4 * np.abs(error.locking.u).max())
+    np.testing.assert_allclose(error.size.u, smaller.u[:count] - free.u, atol=1e-3 * np.abs(error.size.u).max())
+    total = smaller.reactions.sum(axis=0) - plain.reactions.sum(axis=0)
+    parts = error.locking.reactions + error.size.reactions
+    np.testing.assert_allclose(parts.sum(axis=0), total, atol=1e-4 * np.abs(plain.reactions.sum(axis=0)).max())
+
+
+def test_derivatives_by_tissue_are_differences_of_errors(error) -> None:
+    step = 0.02
+    values = np.array([1.2, *0.1 * np.random.default_rng(0).normal(size=len(NAMES) - 1)])
+    for k, found in enumerate(error.by_theta(values)[0]):
+        beside = [error_at(CASE, THETA + sign * step * np.eye(2)[k]).at(THETA, values)[0] for sign in (1.0, -1.0)]
+        # each is to first order about its own parameters: their values there
+        ends = [
+            error_at(CASE, at).at(at, values)[0] for at in (THETA + step * np.eye(2)[k], THETA - step * np.eye(2)[k])
+        ]
+        expected = (ends[0] - ends[1]) / (2.0 * step)
+        assert np.linalg.norm(found - expected) < 1e-2 * np.linalg.norm(expected)
+        assert np.linalg.norm(beside[0] - error.at(THETA, values)[0]) < 1e-2 * np.linalg.norm(beside[0])
+
+
+def test_amount_and_shape_act_as_their_matrices(error) -> None:
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=len(NAMES))
+    fields, forces = error.by_values(THETA)
+    u, reactions = error.at(THETA, values)
+    np.testing.assert_allclose(u, error.locking.u + np.tensordot(values, fields, axes=1), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(
+        reactions, error.locking.reactions + np.tensordot(values, forces, axes=1), rtol=1e-12, atol=1e-12
+    )
+    # B_xy of the even part turns what is missing along y into x
+    number = NAMES.index("shape of the mesh's error xy even")
+    np.testing.assert_array_equal(fields[number], error.size.u[:, [1]] * [1.0, 0.0, 0.0])
+
+
+def test_a_shared_force_keeps_its_resultant_on_the_finer_mesh() -> None:
+    case = with_laws(block({"brain": WHITE}, "pushed"), NeoHookean(1000.0))
+    theta = np.log([1000.0])
+    error, state = error_at(case, theta), Forward(case, theta, "cpu").solve(theta)
+    total = (state.reactions + error.locking.reactions + error.size.reactions).sum(axis=0)
+    np.testing.assert_allclose(total, [-0.1, -0.05, 0.2], rtol=1e-4)
+
+
+@pytest.mark.parametrize("values", [{"mean": np.inf}, {"deviation": 0.0}, {"shape": -1.0}])
+def test_what_is_believed_is_checked(values) -> None:
+    with pytest.raises(InputError, match="discretisation: "):
+        Discretisation(**values)
