@@ -52,7 +52,7 @@ def test_the_gradient_is_that_of_the_objective(problem: Problem) -> None:
         return problem.at(problem.forward.solve(point[:2]), point[2:]).objective
 
     # beside the tissue that the error of the mesh was computed at
-    here = np.concatenate([THETA + [0.1, -0.05], VALUES])
+    here = np.concatenate([THETA + np.array([0.1, -0.05]), VALUES])
     gradient = problem.linearise(problem.at(problem.forward.solve(here[:2]), VALUES)).gradient
     steps = np.array([*[1e-3] * (2 + len(NAMES)), *[1e-6] * 3, *[1e-5] * 3])
     for k, step in enumerate(steps):

@@ -41,7 +41,12 @@ Floats = NDArray[np.float64]
 #: Names of the numbers: the amount `a`, and `B_ij` by what it is multiplied with, all without a unit.
 NAMES = (
     "amount of the mesh's error",
-    *(f"shape of the mesh's error {i}{j} {by}" for by in ("even", "by x", "by y", "by z") for i in "xyz" for j in "xyz"),
+    *(
+        f"shape of the mesh's error {i}{j} {by}"
+        for by in ("even", "by x", "by y", "by z")
+        for i in "xyz"
+        for j in "xyz"
+    ),
 )
 
 
