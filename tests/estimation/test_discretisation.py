@@ -1,4 +1,4 @@
-"""The error of the mesh against other elements that no estimation solved, and its derivatives against differences."""
+"""The error of the mesh against a finer mesh that no estimation solved, and its derivatives against differences."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 from synthetic import GREY, WHITE, block, truth, with_laws
 
 from warpbrain.errors import InputError
-from warpbrain.estimation.discretisation import NAMES, Discretisation, DiscretisationError, OtherElements
+from warpbrain.estimation.discretisation import NAMES, Discretisation, DiscretisationError, FinerMesh
 from warpbrain.estimation.forward import Forward
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.laws import NeoHookean
@@ -20,7 +20,7 @@ def error_at(case, theta: np.ndarray) -> DiscretisationError:
     forward = Forward(case, theta, "cpu")
     state = forward.solve(theta)
     derivatives = forward.differentiate(state)
-    return OtherElements(case, theta, "cpu").error(state, (derivatives.u, derivatives.reactions))
+    return FinerMesh(case, theta, "cpu").error(state, (derivatives.u, derivatives.reactions))
 
 
 @pytest.fixture(scope="module")
@@ -28,16 +28,14 @@ def error() -> DiscretisationError:
     return error_at(CASE, THETA)
 
 
-def test_it_is_the_difference_of_elements(error) -> None:
-    plain, free = truth(CASE), truth(CASE, "tet4-averaged")
-    smaller = truth(replace(CASE, mesh=refined(CASE.mesh)[0]), "tet4-averaged")
-    count = len(CASE.mesh.points)
+def test_it_is_the_difference_of_two_meshes(error) -> None:
+    plain, smaller = truth(CASE), truth(replace(CASE, mesh=refined(CASE.mesh)[0]))
+    expected = smaller.u[: len(CASE.mesh.points)] - plain.u
     # solved to what is far below any noise
-    np.testing.assert_allclose(error.locking.u, free.u - plain.u, atol=1e-4 * np.abs(error.locking.u).max())
-    np.testing.assert_allclose(error.size.u, smaller.u[:count] - free.u, atol=1e-3 * np.abs(error.size.u).max())
+    np.testing.assert_allclose(error.change.u, expected, atol=1e-4 * np.abs(expected).max())
     total = smaller.reactions.sum(axis=0) - plain.reactions.sum(axis=0)
-    parts = error.locking.reactions + error.size.reactions
-    np.testing.assert_allclose(parts.sum(axis=0), total, atol=1e-4 * np.abs(plain.reactions.sum(axis=0)).max())
+    atol = 1e-4 * np.abs(plain.reactions.sum(axis=0)).max()
+    np.testing.assert_allclose(error.change.reactions.sum(axis=0), total, atol=atol)
 
 
 def test_derivatives_by_tissue_are_differences_of_errors(error) -> None:
@@ -56,20 +54,18 @@ def test_amount_and_shape_act_as_their_matrices(error) -> None:
     values = rng.normal(size=len(NAMES))
     fields, forces = error.by_values(THETA)
     u, reactions = error.at(THETA, values)
-    np.testing.assert_allclose(u, error.locking.u + np.tensordot(values, fields, axes=1), rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(
-        reactions, error.locking.reactions + np.tensordot(values, forces, axes=1), rtol=1e-12, atol=1e-12
-    )
+    np.testing.assert_allclose(u, np.tensordot(values, fields, axes=1), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(reactions, np.tensordot(values, forces, axes=1), rtol=1e-12, atol=1e-12)
     # B_xy of the even part turns what is missing along y into x
     number = NAMES.index("shape of the mesh's error xy even")
-    np.testing.assert_array_equal(fields[number], error.size.u[:, [1]] * [1.0, 0.0, 0.0])
+    np.testing.assert_array_equal(fields[number], error.change.u[:, [1]] * [1.0, 0.0, 0.0])
 
 
 def test_a_shared_force_keeps_its_resultant_on_the_finer_mesh() -> None:
     case = with_laws(block({"brain": WHITE}, "pushed"), NeoHookean(1000.0))
     theta = np.log([1000.0])
     error, state = error_at(case, theta), Forward(case, theta, "cpu").solve(theta)
-    total = (state.reactions + error.locking.reactions + error.size.reactions).sum(axis=0)
+    total = (state.reactions + error.change.reactions).sum(axis=0)
     np.testing.assert_allclose(total, [-0.1, -0.05, 0.2], rtol=1e-4)
 
 

@@ -173,8 +173,10 @@ def test_the_error_of_the_mesh_is_no_stiffness() -> None:
     seen = replace(case, recordings=(recording,))
     corrected, taken_for_exact = found(seen, WITH_ERROR_OF_MESH), found(seen)
     assert moduli(taken_for_exact)[0] < 750.0
-    low, high = corrected.marginals[0].interval
-    assert low < theta[0] < high < low + 0.15
+    marginal = corrected.marginals[0]
+    # of one truth, what normal noise passes once in ten thousand (coverage: test_calibration.py)
+    assert abs(marginal.mean - theta[0]) < 4.0 * marginal.deviation < 0.15
+    assert abs(moduli(corrected)[0] - 1000.0) < 50.0
     assert corrected.predictions[0].error_after < 0.6 * taken_for_exact.predictions[0].error_after
     name, amount, deviation = corrected.nuisances[0]
     assert name == "amount of the mesh's error" and 0.5 < amount < 2.2 and deviation < 0.4

@@ -21,6 +21,7 @@ from warpbrain.diagnosis.factors import Factors
 from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.diagnosis.states import TOLERANCE, Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.discretisation import Difference, Discretisation
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.kernels.linear import ConjugateGradient
 from warpbrain.kernels.two_level import TwoLevelGradient
@@ -38,43 +39,6 @@ _ROUGH = 10.0 * TOLERANCE
 _MOST = 10_000
 #: Change of the tissue [standard deviations] whose error is compared: far more than rounding, little beside the error.
 _STEP = 0.2
-#: Amount of the whole error in what plain tetrahedra of half the size show of it: its mean and standard deviation. If
-#: errors fall with the power p of the size it is 2^p / (2^p - 1): 4/3 for p = 2, 2 for p = 1, as where elements lock.
-AMOUNT, AMOUNT_DEVIATION = 5.0 / 3.0, 0.4
-
-
-@dataclass(frozen=True, eq=False)
-class Difference:
-    """The error of a mesh.
-
-    Attributes
-    ----------
-    u, reactions : (n, 3) array
-        Of the state on elements of half the size less the state, at the nodes of the mesh [m] and [N].
-    theta : (p,) array
-        Where it was computed.
-    """
-
-    u: Floats
-    reactions: Floats
-    theta: Floats
-
-    @property
-    def size(self) -> float:
-        """Root mean square over the nodes [m]."""
-        return float(np.sqrt(np.mean(np.sum(self.u**2, axis=1))))
-
-    def less(self, other: Difference) -> Difference:
-        """By how much it is more than another."""
-        return Difference(self.u - other.u, self.reactions - other.reactions, self.theta)
-
-    def plus(self, other: Difference) -> Difference:
-        """Both together."""
-        return Difference(self.u + other.u, self.reactions + other.reactions, self.theta)
-
-    def times(self, factor: float) -> Difference:
-        """So many times as large."""
-        return Difference(factor * self.u, factor * self.reactions, self.theta)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +83,7 @@ def volume_of(materials: Mapping[int, Material]) -> float:
 
 def expected(known: Difference) -> Difference:
     """The whole error of a mesh, of which elements of half the size show a part."""
-    return known.times(AMOUNT)
+    return known.times(Discretisation().mean)
 
 
 def expected_answer(sensors: Sensors, known: Difference) -> Floats:

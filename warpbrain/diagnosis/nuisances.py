@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from warpbrain.diagnosis.effects import Effects
 from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import AMOUNT_DEVIATION, MeshErrors, expected_answer
+from warpbrain.diagnosis.mesh_error import MeshErrors, expected_answer
 from warpbrain.diagnosis.sensors import Sensors, alike_near, spread_points
 from warpbrain.diagnosis.states import Hypothesis, States
+from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
@@ -153,7 +154,7 @@ def nuisances_at(
     ]
     if mesh_errors is not None:
         own = mesh_errors.own
-        families.append(Family("mesh", AMOUNT_DEVIATION * sensors.answer(own.u, own.reactions)[:, None]))
+        families.append(Family("mesh", Discretisation().deviation * sensors.answer(own.u, own.reactions)[:, None]))
     families.append(Family("mesh, unknown", _fractional(at, anchors, fraction)))
     return Nuisances(tuple(families), anchors, fraction)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.chain import Chain, run_chain
-from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, OtherElements
+from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, FinerMesh
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gauss_newton import GaussNewton, GaussNewtonOptions, GaussNewtonStep, require_explained
 from warpbrain.estimation.importance import Importance, importance_sampling
@@ -258,14 +258,14 @@ class Estimation:
         solves: dict[str, int],
     ) -> tuple[Mode, ...]:
         before = self.forward.solves
-        other: OtherElements | None = None
+        finer: FinerMesh | None = None
         for _ in range(_MOST_ERRORS):
-            self.listener.stage("error of the mesh: one equilibrium on elements that do not lock, one on half the size")
+            self.listener.stage("error of the mesh: one equilibrium on elements of half the size")
             best = modes[0]
-            if other is None:
-                other = OtherElements(self.case, best.estimate.theta, self._device)
+            if finer is None:
+                finer = FinerMesh(self.case, best.estimate.theta, self._device)
             derivatives = best.estimate.linearised.du, best.estimate.linearised.dR
-            errors.append(other.error(best.estimate.point.state, derivatives))
+            errors.append(finer.error(best.estimate.point.state, derivatives))
             nuisances = Nuisances(believed, errors[-1], self.options.registration)
             modes = self.fit(nuisances, modes)
             moved = modes[0].estimate.theta - errors[-1].theta
@@ -274,13 +274,13 @@ class Estimation:
         else:
             self._remarks.append("the error of the mesh was still changing when it was last computed")
         whole = float(np.sqrt(np.mean(np.sum(modes[0].estimate.point.state.u ** 2, axis=1))))
-        part = errors[-1].size.root_mean_square / whole
+        part = errors[-1].change.size / whole
         if part > _TOO_COARSE:
             self._remarks.append(
                 f"the mesh is coarse: on elements of half the size displacements change by {100.0 * part:.0f} %; what "
                 "is left of its error may be larger than the intervals"
             )
-        solves["on elements of half the size"] = 0 if other is None else other.solves
+        solves["on elements of half the size"] = 0 if finer is None else finer.solves
         solves["estimate with the error of the mesh"] = self.forward.solves - before
         return modes
 

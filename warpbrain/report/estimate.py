@@ -177,8 +177,7 @@ def _describe_discretisation(posterior: Posterior, options: EstimationOptions) -
         "standard_deviation": deviation,
         "prior_mean": options.discretisation.mean,
         "prior_standard_deviation": options.discretisation.deviation,
-        "difference_root_mean_square_mm": MILLIMETRES * posterior.mesh_errors[-1].size.root_mean_square,
-        "locking_root_mean_square_mm": MILLIMETRES * posterior.mesh_errors[-1].locking.root_mean_square,
+        "difference_root_mean_square_mm": MILLIMETRES * posterior.mesh_errors[-1].change.size,
         "computed": len(posterior.mesh_errors),
     }
 
@@ -263,8 +262,7 @@ def _check_lines(said: Mapping[str, Any]) -> list[str]:
     if mesh is not None:
         lines.append(
             f"  error of the mesh: {mesh['amount']:.2f} +- {mesh['standard_deviation']:.2f} times what elements of "
-            f"half the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square, and the "
-            f"{mesh['locking_root_mean_square_mm']:.3f} mm that elements lock"
+            f"half the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square"
         )
     if said["registration"] is not None:
         shift = ", ".join(f"{value:.2f}" for value in said["registration"]["shift_mm"])
