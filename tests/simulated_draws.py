@@ -49,7 +49,8 @@ class Setting:
     noise : float
         Root mean square length of the noise's scale, relative to that of the motion in the middle of the prior.
     other_elements : bool
-        Truths are of quadratic elements of half the size, and the estimate knows that its mesh is wrong.
+        Truths are of quadratic elements of half the size, and the estimate knows that its mesh is wrong. Tissue is more
+        compressible then: near nu = 1/2 a mesh as small as this is too coarse, as an estimate of it says.
     registration : bool
         Recordings are shifted and turned, and the estimate knows that they may be.
     """
@@ -71,7 +72,7 @@ class Setting:
 
 def body(setting: Setting) -> Case:
     """The case without recordings; its laws are those that an estimate does not know."""
-    cells = 4 if setting.shape == "round" and not setting.other_elements else 3
+    cells = 4 if setting.shape == "round" or setting.other_elements else 3
     corner = box((cells,) * 3, (2.0,) * 3)
     x = corner.points - 1.0
     if setting.shape == "round":
@@ -96,7 +97,7 @@ def body(setting: Setting) -> Case:
     else:
         weight = Gravity(direction=DOWN, density=1040.0, csf_level=setting.level * height)
     return Case(
-        setting.shape, setting.name, "synthetic", Path("case.toml"), mesh, tissues, 1040.0, 0.45,
+        setting.shape, setting.name, "synthetic", Path("case.toml"), mesh, tissues, 1040.0, 0.3 if setting.other_elements else 0.45,
         boundaries=(Fixed(name="table", nodes="table"),), mechanisms=(weight,),
     )  # fmt: skip
 

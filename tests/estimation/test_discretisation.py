@@ -44,7 +44,7 @@ def test_derivatives_by_tissue_are_differences_of_errors(error) -> None:
     for k, found in enumerate(error.by_theta(values)[0]):
         # each is to first order about its own parameters: its values there
         ends = [THETA + sign * step * np.eye(2)[k] for sign in (1.0, -1.0)]
-        beside = [error_at(CASE, end).at(end, values)[0] for end in ends]
+        beside = [replace(error_at(CASE, end), part=error.part).at(end, values)[0] for end in ends]
         expected = (beside[0] - beside[1]) / (2.0 * step)
         assert np.linalg.norm(found - expected) < 1e-2 * np.linalg.norm(expected)
 
@@ -52,13 +52,28 @@ def test_derivatives_by_tissue_are_differences_of_errors(error) -> None:
 def test_amount_and_shape_act_as_their_matrices(error) -> None:
     rng = np.random.default_rng(1)
     values = rng.normal(size=len(NAMES))
-    fields, forces = error.by_values(THETA)
+    fields, forces = error.by_values(THETA, values)
+    amount, slope = error.amount(values[0])
+    linear = np.array([amount / slope, *values[1:]])
     u, reactions = error.at(THETA, values)
-    np.testing.assert_allclose(u, np.tensordot(values, fields, axes=1), rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(reactions, np.tensordot(values, forces, axes=1), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(u, np.tensordot(linear, fields, axes=1), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(reactions, np.tensordot(linear, forces, axes=1), rtol=1e-12, atol=1e-12)
     # B_xy of the even part turns what is missing along y into x
     number = NAMES.index("shape of the mesh's error xy even")
     np.testing.assert_array_equal(fields[number], error.change.u[:, [1]] * [1.0, 0.0, 0.0])
+
+
+def test_the_amount_is_that_of_an_error_of_the_stiffness(error) -> None:
+    # stiffness too large by e, on elements of half the size by e / 2^p
+    for p, e in ((1.0, 0.5), (2.0, 0.5), (1.5, 0.02)):
+        u, smaller = 1.0 / (1.0 + e), 1.0 / (1.0 + e / 2.0**p)
+        known = replace(error, part=(smaller - u) / smaller)
+        assert known.amount(2.0**p / (2.0**p - 1.0))[0] == pytest.approx((1.0 - u) / (smaller - u))
+    # without a singularity
+    far = replace(error, part=0.3)
+    for b in (1.0, 2.6, 2.7, 4.0):
+        (low, _), (value, slope), (high, _) = (far.amount(b + step) for step in (-1e-6, 0.0, 1e-6))
+        assert low < value < high and slope == pytest.approx((high - low) / 2e-6, rel=1e-4)
 
 
 def test_a_shared_force_keeps_its_resultant_on_the_finer_mesh() -> None:

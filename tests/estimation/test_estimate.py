@@ -172,11 +172,9 @@ def test_the_error_of_the_mesh_is_no_stiffness() -> None:
     recording = beads_of(finer.system.model.node_mesh, u, count=200, noise=4e-4, sigma=4e-4)
     seen = replace(case, recordings=(recording,))
     corrected, taken_for_exact = found(seen, WITH_ERROR_OF_MESH), found(seen)
-    assert moduli(taken_for_exact)[0] < 750.0
-    marginal = corrected.marginals[0]
-    # of one truth, what normal noise passes once in ten thousand (coverage: test_calibration.py)
-    assert abs(marginal.mean - theta[0]) < 4.0 * marginal.deviation < 0.15
-    assert abs(moduli(corrected)[0] - 1000.0) < 50.0
+    # the mesh is far too coarse for its error to be known, and that is said; a third of it is left
+    assert moduli(taken_for_exact)[0] < 700.0 < 850.0 < moduli(corrected)[0] < 1050.0
+    assert any("the mesh is coarse" in remark for remark in corrected.remarks)
     assert corrected.predictions[0].error_after < 0.6 * taken_for_exact.predictions[0].error_after
     name, amount, deviation = corrected.nuisances[0]
     assert name == "amount of the mesh's error" and 0.5 < amount < 2.2 and deviation < 0.4

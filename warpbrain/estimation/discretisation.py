@@ -6,11 +6,17 @@ with a standard deviation that is far smaller than that. So what is recorded is 
 
     H(u_h + (a I + B(x)) d(theta)) + noise,    d = u_(h/2) - u_h
 
-If the error falls with the power p of the size, then `a = 2^p / (2^p - 1)` (Richardson's extrapolation): 4/3 for p = 2,
-as on smooth solutions, and 2 for p = 1, as at the edges of what is held and where elements lock: `a ~ N(5/3, 0.4^2)`
-holds both. What is missing is not quite of the shape of d, nor of one amount everywhere: `B` is a matrix field, affine
-in the position, whose coefficients (of the unit matrices, and of positions in units of the body's root mean square
-radius) are independent, `N(0, 0.2^2)`. All are estimated along with the tissue and integrated out.
+What falls with a power p of the size is the error of the stiffness, since a mesh that is far too stiff shows little of
+its error when halved: `1/u_h = (1 + e)/u` and `1/u_(h/2) = (1 + e/2^p)/u` give, with `k` the part of `u_(h/2)` that is
+`d`,
+
+    a = b (1 - k)/(1 - b k),    b = 2^p/(2^p - 1)
+
+and Richardson's extrapolation, `a = b`, where `k` is small. `b` is 4/3 for p = 2, as on smooth solutions, and 2 for
+p = 1, as at the edges of what is held and where elements lock: `b ~ N(5/3, 0.4^2)` holds both. What is missing is not
+quite of the shape of d, nor of one amount everywhere: `B` is a matrix field, affine in the position, whose coefficients
+(of the unit matrices, and of positions in units of the body's root mean square radius) are independent, `N(0, 0.2^2)`.
+All are estimated along with the tissue and integrated out.
 
 `d` depends on the tissue as the displacement itself does. It is taken to first order in the tissue about the estimate:
 held fixed, it would make the displacement change too little with a modulus, by the share that d is of it.
@@ -35,7 +41,9 @@ from warpbrain.simulation.sensitivity import Sensitivities
 
 Floats = NDArray[np.float64]
 
-#: Names of the numbers: the amount `a`, and `B_ij` by what it is multiplied with, all without a unit.
+#: Of the range of `b` in which the error of the stiffness is finite: beyond, `a` goes on along its tangent.
+_WHOLE = 0.8
+#: Names of the numbers: `b`, and `B_ij` by what it is multiplied with, all without a unit.
 NAMES = (
     "amount of the mesh's error",
     *(
@@ -54,7 +62,7 @@ class Discretisation:
     Attributes
     ----------
     mean, deviation : float
-        Of the amount `a`.
+        Of `b`.
     shape : float
         Standard deviation of each coefficient of `B`.
     """
@@ -72,12 +80,12 @@ class Discretisation:
 
     @property
     def means(self) -> Floats:
-        """Of `a` and the coefficients of `B`, shape (37,)."""
+        """Of `b` and the coefficients of `B`, shape (37,)."""
         return np.concatenate([[self.mean], np.zeros(len(NAMES) - 1)])
 
     @property
     def precisions(self) -> Floats:
-        """Of `a` and the coefficients of `B`, shape (37,)."""
+        """Of `b` and the coefficients of `B`, shape (37,)."""
         return np.concatenate([[self.deviation**-2], np.full(len(NAMES) - 1, self.shape**-2)])
 
 
@@ -154,15 +162,25 @@ class DiscretisationError:
         `d`: what elements of half the size change.
     positions : (n, 3) array
         Of the nodes, from the mean of all in units of their root mean square radius.
+    part : float
+        `k`: the part of the displacement on elements of half the size that is `d`, its projection.
     """
 
     change: Change
     positions: Floats
+    part: float
 
     @property
     def theta(self) -> Floats:
         """Where it was computed, shape (p,)."""
         return self.change.theta
+
+    def amount(self, b: float) -> tuple[float, float]:
+        """`a`, and its derivative by `b`."""
+        k = self.part
+        within = min(b, _WHOLE / k) if k > 0.0 else b
+        slope = (1.0 - k) / (1.0 - within * k) ** 2
+        return within * (1.0 - k) / (1.0 - within * k) + slope * (b - within), slope
 
     def at(self, theta: Floats, values: Floats) -> tuple[Floats, Floats]:
         """What is to be added to displacement and reactions (n, 3); `values` (37,) in the order of `NAMES`."""
@@ -178,18 +196,20 @@ class DiscretisationError:
             np.einsum("nij,pnj->pni", matrices, self.change.dR),
         )
 
-    def by_values(self, theta: Floats) -> tuple[Floats, Floats]:
+    def by_values(self, theta: Floats, values: Floats) -> tuple[Floats, Floats]:
         """Derivatives (37, n, 3) of that by `values`."""
         u, reactions = self.change.at(theta)
-        return self._columns(u), self._columns(reactions)
+        slope = self.amount(float(values[0]))[1]
+        return self._columns(u, slope), self._columns(reactions, slope)
 
     def _matrices(self, values: Floats) -> Floats:
         """`a I + B` at each node, shape (n, 3, 3)."""
-        return values[0] * np.eye(3) + np.einsum("nk,kij->nij", self._basis, values[1:].reshape(-1, 3, 3))
+        amount = self.amount(float(values[0]))[0]
+        return amount * np.eye(3) + np.einsum("nk,kij->nij", self._basis, values[1:].reshape(-1, 3, 3))
 
-    def _columns(self, change: Floats) -> Floats:
+    def _columns(self, change: Floats, slope: float) -> Floats:
         unit = np.einsum("nk,nj,il->kijnl", self._basis, change, np.eye(3))
-        return np.concatenate([change[None], unit.reshape(-1, *change.shape)])
+        return np.concatenate([slope * change[None], unit.reshape(-1, *change.shape)])
 
     @property
     def _basis(self) -> Floats:
@@ -249,7 +269,9 @@ class FinerMesh:
         self._last = finer.u - start
         own = (state.u, state.reactions, *derivatives)
         change = Change.between(state.theta, own, self._restricted(finer, by_theta))
-        return DiscretisationError(change, self._positions)
+        there = state.u + change.u
+        part = float(np.vdot(change.u, there)) / max(float(np.vdot(there, there)), 1e-300)
+        return DiscretisationError(change, self._positions, part)
 
     def _restricted(self, finer: State, derivatives: Sensitivities) -> Sensitive:
         """A state of the finer mesh at the nodes of the mesh that there was."""

@@ -109,7 +109,7 @@ class Nuisances:
         """
         blocks = [] if derivatives is None else [part.derivative(*self.by_theta(values, *derivatives))]
         if self.error is not None:
-            blocks.append(part.derivative(*self.error.by_values(theta)))
+            blocks.append(part.derivative(*self.error.by_values(theta, values[: len(DISCRETISATION_NAMES)])))
         if self.registration is not None:
             blocks.append(-part.rigid)
         return np.concatenate(blocks, axis=2)
