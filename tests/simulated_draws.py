@@ -96,8 +96,9 @@ def body(setting: Setting) -> Case:
         weight = Gravity(direction=DOWN, density=300.0)
     else:
         weight = Gravity(direction=DOWN, density=1040.0, csf_level=setting.level * height)
+    poisson = 0.3 if setting.other_elements else 0.45
     return Case(
-        setting.shape, setting.name, "synthetic", Path("case.toml"), mesh, tissues, 1040.0, 0.3 if setting.other_elements else 0.45,
+        setting.shape, setting.name, "synthetic", Path("case.toml"), mesh, tissues, 1040.0, poisson,
         boundaries=(Fixed(name="table", nodes="table"),), mechanisms=(weight,),
     )  # fmt: skip
 
