@@ -2,8 +2,8 @@
 
 Without other elements the model of the estimate is the one that recordings are drawn from: ranks of the truth are
 uniform if the computation is right. With other elements the truth is of quadratic tetrahedra of half the size, whose
-error no prior was drawn from. That holds on even elements that are not too coarse; where it does not, docs/estimation.md
-says by how much.
+error no prior was drawn from. That holds on even elements that are not too coarse; where it does not hold,
+docs/estimation.md says by how much.
 """
 
 from __future__ import annotations

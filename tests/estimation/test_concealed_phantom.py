@@ -1,4 +1,4 @@
-"""The coarse phantom against what quadratic tetrahedra of another code and another mesh say: repetitions of noise and points."""
+"""The coarse phantom against what quadratic tetrahedra of another code and mesh say, with other noise and points."""
 
 import sys
 from pathlib import Path
