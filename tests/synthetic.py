@@ -51,9 +51,9 @@ def block(laws: Mapping[str, Law], load: str, cells: int = 3, formulation: str =
     )  # fmt: skip
 
 
-def truth(case: Case) -> Result:
+def truth(case: Case, elements: str = "tet4") -> Result:
     """The state of a case under its own laws."""
-    system = System(model_of(case)[0], "cpu")
+    system = System(replace(model_of(case)[0], elements=elements), "cpu")
     solve_equilibrium(system, EquilibriumOptions(tolerance=1e-12))
     return result_of(system)
 
@@ -62,11 +62,18 @@ def beads(
     result: Result, count: int = 40, noise: float = 0.0, sigma: float | None = 1e-4, seed: int = 0
 ) -> PointsRecording:
     """Points spread inside the block, recorded with normal noise [m]."""
+    return beads_of(result.mesh, result.u, count, noise, sigma, seed)
+
+
+def beads_of(
+    mesh: TetMesh, u: Floats, count: int = 40, noise: float = 0.0, sigma: float | None = 1e-4, seed: int = 0
+) -> PointsRecording:
+    """The same of a displacement (n, 3) [m] of the nodes of a mesh of the block."""
     from warpbrain.recordings.location import locate
 
     rng = np.random.default_rng(seed)
     points = rng.uniform(0.02 * SIDE, 0.98 * SIDE, (count, 3))
-    moved = locate(result.mesh.points, result.mesh.tetrahedra, points).interpolate(result.u)
+    moved = locate(mesh.points, mesh.tetrahedra, points).interpolate(u)
     return PointsRecording(
         name="beads", file="", points=points, displacement=moved + noise * rng.normal(size=moved.shape), sigma=sigma
     )

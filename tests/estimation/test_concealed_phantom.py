@@ -1,12 +1,15 @@
-"""The coarse phantom against what quadratic tetrahedra of another code and another mesh say: a few repetitions."""
+"""The coarse phantom against what quadratic tetrahedra of another code and mesh say, with other noise and points."""
 
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.stats import binom
 
 from warpbrain.estimation.estimate import EstimationOptions
 
+REPETITIONS = 10
 BENCH = Path(__file__).parents[2] / "bench"
 
 
@@ -22,9 +25,14 @@ def concealed(monkeypatch: pytest.MonkeyPatch):
         sys.modules.pop(name, None)
 
 
+@pytest.mark.slow
 def test_tissue_is_found_from_another_mesh_and_another_code(concealed) -> None:
-    found = concealed.experiment("single", 3, EstimationOptions(samples=25))
-    assert found["covered"][0] >= 2 and found["first"]["covered"] == [True]
+    """Of one truth and one error of the mesh: noise and points differ, so more than 95 of 100 may cover."""
+    found = concealed.experiment("single", REPETITIONS, EstimationOptions(samples=25))
+    assert found["covered"][0] >= binom.ppf(5e-4, REPETITIONS, 0.95)
+    # the mean of the estimates is within their stated error of the truth: that of the mesh is common to all
+    away = np.log(found["mean_estimate_Pa"][0] / found["truth_Pa"][0])
+    assert abs(away) < 2.0 * found["standard_deviation"][0]
     assert found["rmse_mm"]["median"] < 0.1
     assert not found["without_error_of_mesh"]["covered"][0]
     assert found["pareto_k"] < 0.7

@@ -5,11 +5,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from synthetic import GREY, WHITE, beads, block, lid, scale, truth, with_laws
+from synthetic import GREY, WHITE, beads, beads_of, block, lid, scale, truth, with_laws
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.discretisation import FinerMesh
 from warpbrain.estimation.estimate import EstimationOptions, estimate
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.posterior import Posterior
@@ -21,6 +20,7 @@ from warpbrain.physics.laws import Law, MooneyRivlin, NeoHookean, Ogden
 from warpbrain.recordings.recording import PointsRecording
 
 EXACT = EstimationOptions(discretisation=None, samples=25)
+WITH_ERROR_OF_MESH = EstimationOptions(samples=25)
 TWO = {"grey": GREY, "white": WHITE}
 
 
@@ -64,9 +64,8 @@ def test_shapes_of_laws(law: Law) -> None:
     case = block({"brain": law}, "pushed")
     posterior = found(replace(case, recordings=(beads(truth(case), count=150, noise=2e-5, sigma=2e-5),)))
     for marginal, value in zip(posterior.marginals, posterior.parameters.theta_of([law]), strict=True):
-        low, high = marginal.interval
-        wide = 0.5 * (high - low)
-        assert low - wide <= value <= high + wide
+        # of one truth, what normal noise passes once in ten thousand (coverage: test_calibration.py)
+        assert abs(value - marginal.mean) < 4.0 * marginal.deviation
         assert marginal.shrinkage > 0.2
     assert len(posterior.modes) == (2 if law.name == "ogden" else 1)
 
@@ -165,55 +164,20 @@ def test_a_wrong_registration_is_found_along_with_the_tissue() -> None:
 
 
 def test_the_error_of_the_mesh_is_no_stiffness() -> None:
-    """Observed on a much finer mesh. This one is a fifth too stiff: most of that is taken off, and the rest is said."""
+    """Observed with quadratic tetrahedra on a finer mesh. This mesh is a third too stiff."""
     case = block({"brain": WHITE}, "gravity")
-    mesh = case.mesh
-    for _ in range(2):
-        mesh, _ = refined(mesh)
-    fine = truth(replace(case, mesh=mesh))
-    seen = replace(case, recordings=(beads(fine, count=200, noise=4e-4, sigma=4e-4),))
-    corrected, taken_for_exact = (
-        found(seen, replace(EXACT, discretisation=EstimationOptions().discretisation)),
-        found(seen),
-    )
-    assert moduli(taken_for_exact)[0] < 750.0 < 930.0 < moduli(corrected)[0] < 1000.0
+    theta = np.log([1000.0])
+    finer = Forward(replace(case, mesh=refined(case.mesh)[0]), theta, "cpu", elements="tet10")
+    u = finer.solve(theta).u
+    recording = beads_of(finer.system.model.node_mesh, u, count=200, noise=4e-4, sigma=4e-4)
+    seen = replace(case, recordings=(recording,))
+    corrected, taken_for_exact = found(seen, WITH_ERROR_OF_MESH), found(seen)
+    # the mesh is far too coarse for its error to be known, and that is said; a third of it is left
+    assert moduli(taken_for_exact)[0] < 700.0 < 850.0 < moduli(corrected)[0] < 1050.0
     assert any("the mesh is coarse" in remark for remark in corrected.remarks)
     assert corrected.predictions[0].error_after < 0.6 * taken_for_exact.predictions[0].error_after
     name, amount, deviation = corrected.nuisances[0]
-    assert name == "amount of the mesh's error" and 1.0 < amount < 2.2 and deviation < 0.4
-
-
-def test_the_difference_is_that_of_two_meshes() -> None:
-    case = block({"brain": WHITE}, "gravity")
-    theta = np.log([1000.0])
-    state = Forward(case, theta, "cpu").solve(theta)
-    difference = FinerMesh(case, theta, "cpu").difference(state)
-    fine = truth(replace(case, mesh=refined(case.mesh)[0]))
-    count = len(case.mesh.points)
-    # the difference is solved to what is far below any noise
-    np.testing.assert_allclose(difference.u, fine.u[:count] - state.u, atol=1e-4 * np.abs(difference.u).max())
-    total = (state.reactions + difference.reactions).sum(axis=0)
-    np.testing.assert_allclose(total, fine.reactions.sum(axis=0), rtol=1e-3, atol=1e-4 * np.abs(total).max())
-
-
-def test_a_shared_force_keeps_its_resultant_on_the_finer_mesh() -> None:
-    case = block({"brain": WHITE}, "pushed")
-    theta = np.log([1000.0])
-    state = Forward(case, theta, "cpu").solve(theta)
-    difference = FinerMesh(case, theta, "cpu").difference(state)
-    np.testing.assert_allclose((state.reactions + difference.reactions).sum(axis=0), [-0.1, -0.05, 0.2], rtol=1e-4)
-
-
-def test_intervals_cover() -> None:
-    """Twenty repetitions with other noise and other points: of 20, 15 or fewer covered have a chance of 1 in 400."""
-    case = block({"brain": WHITE}, "pushed", cells=2)
-    result = truth(case)
-    covered = 0
-    for seed in range(20):
-        posterior = found(replace(case, recordings=(beads(result, noise=2e-4, sigma=2e-4, seed=seed),)))
-        low, high = posterior.marginals[0].interval
-        covered += low <= np.log(1000.0) <= high
-    assert covered > 15
+    assert name == "amount of the mesh's error" and 0.5 < amount < 2.2 and deviation < 0.4
 
 
 def test_the_same_twice() -> None:

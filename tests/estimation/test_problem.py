@@ -8,7 +8,7 @@ from scipy.stats import multivariate_t, norm
 from synthetic import GREY, WHITE, beads, block, lid, scale, truth
 
 from warpbrain.errors import InputError
-from warpbrain.estimation.discretisation import Discretisation, FinerMesh
+from warpbrain.estimation.discretisation import NAMES, Discretisation, FinerMesh
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.likelihood import Likelihood, at_normal_noise
@@ -30,29 +30,33 @@ def problem(request: pytest.FixtureRequest) -> Problem:
     case = block({"grey": GREY, "white": WHITE}, "moved")
     result = truth(case)
     sigma = 2e-4 if request.param == "given" else None
-    recordings = (beads(result, noise=3e-4, sigma=sigma), lid(result, sigma=sigma), scale(case, result, "plate", 1e-2))
+    recordings = (beads(result, noise=3e-4, sigma=sigma), lid(result, sigma=2e-4), scale(case, result, "plate", 1e-2))
     case = replace(case, recordings=recordings)
     forward = Forward(case, THETA, "cpu")
-    difference = FinerMesh(case, THETA, "cpu").difference(forward.solve(THETA))
+    state = forward.solve(THETA)
+    derivatives = forward.differentiate(state)
+    error = FinerMesh(case, THETA, "cpu").error(state, (derivatives.u, derivatives.reactions))
     mode = PriorMode(
         1.0, Gaussian(np.log([1000.0, 900.0]), np.diag([0.5, 0.6])), np.full(2, -np.inf), np.full(2, np.inf)
     )
-    nuisances = Nuisances(Discretisation(), difference, Registration())
+    nuisances = Nuisances(Discretisation(), error, Registration())
     return Problem(forward, Observations.to_fit(case), mode, Likelihood(), nuisances)
 
 
-VALUES = np.array([1.2, 1e-4, -2e-4, 5e-5, 1e-3, 2e-3, -1e-3])
+SHAPE = 0.1 * np.random.default_rng(5).normal(size=len(NAMES) - 1)
+VALUES = np.array([1.2, *SHAPE, 1e-4, -2e-4, 5e-5, 1e-3, 2e-3, -1e-3])
 
 
 def test_the_gradient_is_that_of_the_objective(problem: Problem) -> None:
     def objective(point: np.ndarray) -> float:
         return problem.at(problem.forward.solve(point[:2]), point[2:]).objective
 
-    here = np.concatenate([THETA, VALUES])
-    gradient = problem.linearise(problem.at(problem.forward.solve(THETA), VALUES)).gradient
-    steps = np.array([1e-3, 1e-3, 1e-3, *[1e-6] * 3, *[1e-5] * 3])
+    # beside the tissue that the error of the mesh was computed at
+    here = np.concatenate([THETA + np.array([0.1, -0.05]), VALUES])
+    gradient = problem.linearise(problem.at(problem.forward.solve(here[:2]), VALUES)).gradient
+    steps = np.array([*[1e-3] * (2 + len(NAMES)), *[1e-6] * 3, *[1e-5] * 3])
     for k, step in enumerate(steps):
-        beside = [objective(here + sign * step * np.eye(9)[k]) for sign in (1.0, -1.0)]
+        beside = [objective(here + sign * step * np.eye(len(here))[k]) for sign in (1.0, -1.0)]
         expected = (beside[0] - beside[1]) / (2.0 * step)
         scale_of = np.abs(gradient[k]) + 1e-6 * np.abs(gradient).max() / step
         assert abs(gradient[k] - expected) < 1e-4 * scale_of

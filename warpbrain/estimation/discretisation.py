@@ -4,12 +4,22 @@ Linear tetrahedra are too stiff, near nu = 1/2 by several percent of the displac
 Recordings know nothing of elements: fitted as it is, such a mesh finds tissue that is too soft by as much, and says so
 with a standard deviation that is far smaller than that. So what is recorded is taken to be
 
-    H(u_h + a d) + noise,    d = u_(h/2) - u_h,    a ~ N(5/3, 0.4^2)
+    H(u_h + (a I + B(x)) d(theta)) + noise,    d = u_(h/2) - u_h
 
-If the error falls with the power p of the size, then `a = 2^p / (2^p - 1)` (Richardson's extrapolation): 4/3 for p = 2,
-as on smooth solutions, and 2 for p = 1, as at the edges of what is held and where elements lock. The prior holds both;
-`a` is estimated along with the tissue and integrated out of what is said of it. `d` is computed near the estimate and
-kept, since it changes little as the parameters do.
+What falls with a power p of the size is the error of the stiffness, since a mesh that is far too stiff shows little of
+its error when halved: `1/u_h = (1 + e)/u` and `1/u_(h/2) = (1 + e/2^p)/u` give, with `k` the part of `u_(h/2)` that is
+`d`,
+
+    a = b (1 - k)/(1 - b k),    b = 2^p/(2^p - 1)
+
+and Richardson's extrapolation, `a = b`, where `k` is small. `b` is 4/3 for p = 2, as on smooth solutions, and 2 for
+p = 1, as at the edges of what is held and where elements lock: `b ~ N(5/3, 0.4^2)` holds both. What is missing is not
+quite of the shape of d, nor of one amount everywhere: `B` is a matrix field, affine in the position, whose coefficients
+(of the unit matrices, and of positions in units of the body's root mean square radius) are independent, `N(0, 0.2^2)`.
+All are estimated along with the tissue and integrated out.
+
+`d` depends on the tissue as the displacement itself does. It is taken to first order in the tissue about the estimate:
+held fixed, it would make the displacement change too little with a modulus, by the share that d is of it.
 """
 
 from __future__ import annotations
@@ -27,27 +37,56 @@ from warpbrain.estimation.parameters import Parameters
 from warpbrain.physics.force import NodalForce
 from warpbrain.simulation.finer import FinerCase, restricted
 from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.sensitivity import Sensitivities
 
 Floats = NDArray[np.float64]
+
+#: Of the range of `b` in which the error of the stiffness is finite: beyond, `a` goes on along its tangent.
+_WHOLE = 0.8
+#: Names of the numbers: `b`, and `B_ij` by what it is multiplied with, all without a unit.
+NAMES = (
+    "amount of the mesh's error",
+    *(
+        f"shape of the mesh's error {i}{j} {by}"
+        for by in ("even", "by x", "by y", "by z")
+        for i in "xyz"
+        for j in "xyz"
+    ),
+)
 
 
 @dataclass(frozen=True)
 class Discretisation:
-    """What is believed of the amount `a` of the error of the mesh: normal.
+    """What is believed of the amount and the shape of what smaller elements change: normal.
 
     Attributes
     ----------
     mean, deviation : float
+        Of `b`.
+    shape : float
+        Standard deviation of each coefficient of `B`.
     """
 
     mean: float = 5.0 / 3.0
     deviation: float = 0.4
+    shape: float = 0.2
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.mean):
             raise InputError(f"discretisation: mean = {self.mean}: expected a finite number")
-        if not (math.isfinite(self.deviation) and self.deviation > 0.0):
-            raise InputError(f"discretisation: deviation = {self.deviation}: expected a positive number")
+        for name, value in (("deviation", self.deviation), ("shape", self.shape)):
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"discretisation: {name} = {value}: expected a positive number")
+
+    @property
+    def means(self) -> Floats:
+        """Of `b` and the coefficients of `B`, shape (37,)."""
+        return np.concatenate([[self.mean], np.zeros(len(NAMES) - 1)])
+
+    @property
+    def precisions(self) -> Floats:
+        """Of `b` and the coefficients of `B`, shape (37,)."""
+        return np.concatenate([[self.deviation**-2], np.full(len(NAMES) - 1, self.shape**-2)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +123,100 @@ class Difference:
         return Difference(factor * self.u, factor * self.reactions, self.theta)
 
 
+#: Displacement, reactions (n, 3) and their derivatives (p, n, 3).
+Sensitive = tuple[Floats, Floats, Floats, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Change(Difference):
+    """The error of a mesh to first order in the parameters.
+
+    Attributes
+    ----------
+    du, dR : (p, n, 3) array
+        Derivatives by `theta`.
+    """
+
+    du: Floats
+    dR: Floats
+
+    @classmethod
+    def between(cls, theta: Floats, first: Sensitive, second: Sensitive) -> Change:
+        """From the first state to the second."""
+        u, reactions, du, dR = (after - before for before, after in zip(first, second, strict=True))
+        return cls(u, reactions, theta, du, dR)
+
+    def at(self, theta: Floats) -> tuple[Floats, Floats]:
+        """Displacement and reactions (n, 3) with other parameters (p,)."""
+        step = theta - self.theta
+        return self.u + np.tensordot(step, self.du, axes=1), self.reactions + np.tensordot(step, self.dR, axes=1)
+
+
+@dataclass(frozen=True, eq=False)
+class DiscretisationError:
+    """The error of a mesh, of an amount and a shape that are not known.
+
+    Attributes
+    ----------
+    change : Change
+        `d`: what elements of half the size change.
+    positions : (n, 3) array
+        Of the nodes, from the mean of all in units of their root mean square radius.
+    part : float
+        `k`: the part of the displacement on elements of half the size that is `d`, its projection.
+    """
+
+    change: Change
+    positions: Floats
+    part: float
+
+    @property
+    def theta(self) -> Floats:
+        """Where it was computed, shape (p,)."""
+        return self.change.theta
+
+    def amount(self, b: float) -> tuple[float, float]:
+        """`a`, and its derivative by `b`."""
+        k = self.part
+        within = min(b, _WHOLE / k) if k > 0.0 else b
+        slope = (1.0 - k) / (1.0 - within * k) ** 2
+        return within * (1.0 - k) / (1.0 - within * k) + slope * (b - within), slope
+
+    def at(self, theta: Floats, values: Floats) -> tuple[Floats, Floats]:
+        """What is to be added to displacement and reactions (n, 3); `values` (37,) in the order of `NAMES`."""
+        matrices = self._matrices(values)
+        u, reactions = self.change.at(theta)
+        return np.einsum("nij,nj->ni", matrices, u), np.einsum("nij,nj->ni", matrices, reactions)
+
+    def by_theta(self, values: Floats) -> tuple[Floats, Floats]:
+        """Derivatives (p, n, 3) of that."""
+        matrices = self._matrices(values)
+        return (
+            np.einsum("nij,pnj->pni", matrices, self.change.du),
+            np.einsum("nij,pnj->pni", matrices, self.change.dR),
+        )
+
+    def by_values(self, theta: Floats, values: Floats) -> tuple[Floats, Floats]:
+        """Derivatives (37, n, 3) of that by `values`."""
+        u, reactions = self.change.at(theta)
+        slope = self.amount(float(values[0]))[1]
+        return self._columns(u, slope), self._columns(reactions, slope)
+
+    def _matrices(self, values: Floats) -> Floats:
+        """`a I + B` at each node, shape (n, 3, 3)."""
+        amount = self.amount(float(values[0]))[0]
+        return amount * np.eye(3) + np.einsum("nk,kij->nij", self._basis, values[1:].reshape(-1, 3, 3))
+
+    def _columns(self, change: Floats, slope: float) -> Floats:
+        unit = np.einsum("nk,nj,il->kijnl", self._basis, change, np.eye(3))
+        return np.concatenate([slope * change[None], unit.reshape(-1, *change.shape)])
+
+    @property
+    def _basis(self) -> Floats:
+        """1, x, y and z at each node, shape (n, 4)."""
+        return np.concatenate([np.ones((len(self.positions), 1)), self.positions], axis=1)
+
+
 class FinerMesh:
     """A case on elements of half the size.
 
@@ -98,6 +231,8 @@ class FinerMesh:
     def __init__(self, case: Case, theta: Floats, device: str | None = None) -> None:
         finer = FinerCase(case)
         self._prolong = finer.prolongation
+        away = case.remaining[0].points - case.remaining[0].points.mean(axis=0)
+        self._positions = away / np.sqrt(np.mean(np.sum(away**2, axis=1)))
         added = finer.spread(_shared_forces(Parameters.of(case).applied(case, theta)))
         self._forward = Forward(finer.case, theta, device, added)
         #: The last error on the finer mesh, with which the next state there is predicted.
@@ -108,25 +243,50 @@ class FinerMesh:
         """Equilibria on this mesh."""
         return self._forward.solves
 
-    def difference(self, state: State) -> Difference:
+    def error(self, state: State, derivatives: tuple[Floats, Floats]) -> DiscretisationError:
         """The error of a state.
+
+        Parameters
+        ----------
+        state : State
+        derivatives : pair of (p, n, 3) arrays
+            Of its displacement and its reactions by the parameters.
 
         Raises
         ------
         SolveError
-            If there is no equilibrium on the finer mesh.
+            If there is no stable equilibrium on the finer mesh.
         """
         start = self._prolong @ state.u
         try:
-            finer = self._forward.solve(state.theta, start + self._last, ROUGH)
+            finer = _solve(self._forward, state.theta, start + self._last)
+            by_theta = self._forward.differentiate(finer)
         except SolveError as error:
             raise SolveError(
                 f"the error of the mesh is not known: on elements of half the size {error}; it can be left out, and "
                 "then the estimate holds for this mesh only"
             ) from None
         self._last = finer.u - start
-        u, reactions = restricted(self._prolong, finer.u, finer.reactions)
-        return Difference(u - state.u, reactions - state.reactions, state.theta)
+        own = (state.u, state.reactions, *derivatives)
+        change = Change.between(state.theta, own, self._restricted(finer, by_theta))
+        there = state.u + change.u
+        part = float(np.vdot(change.u, there)) / max(float(np.vdot(there, there)), 1e-300)
+        return DiscretisationError(change, self._positions, part)
+
+    def _restricted(self, finer: State, derivatives: Sensitivities) -> Sensitive:
+        """A state of the finer mesh at the nodes of the mesh that there was."""
+        pairs = zip(derivatives.u, derivatives.reactions, strict=True)
+        both = [restricted(self._prolong, du, dR) for du, dR in pairs]
+        du, dR = (np.array([one[k] for one in both]) for k in range(2))
+        return *restricted(self._prolong, finer.u, finer.reactions), du, dR
+
+
+def _solve(forward: Forward, theta: Floats, start: Floats) -> State:
+    """From a start that may turn elements inside out, or be of another branch; from rest, if it is."""
+    try:
+        return forward.solve(theta, start, ROUGH)
+    except SolveError:
+        return forward.solve(theta, None, ROUGH)
 
 
 def _shared_forces(case: Case) -> Floats:

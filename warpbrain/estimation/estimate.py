@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.chain import Chain, run_chain
-from warpbrain.estimation.discretisation import Difference, Discretisation, FinerMesh
+from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, FinerMesh
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gauss_newton import GaussNewton, GaussNewtonOptions, GaussNewtonStep, require_explained
 from warpbrain.estimation.importance import Importance, importance_sampling
@@ -41,7 +41,7 @@ _BEFORE = 0.1
 #: A mesh whose displacements change by more than this on elements of half the size is too coarse to be corrected well.
 _TOO_COARSE = 0.15
 #: And no more often than this.
-_MOST_DIFFERENCES = 4
+_MOST_ERRORS = 4
 
 
 @dataclass(frozen=True)
@@ -172,10 +172,10 @@ class Estimation:
         with self._timed("estimate"):
             modes = self.fit(Nuisances(registration=self.options.registration))
         solves = {"estimate": self.forward.solves}
-        differences: list[Difference] = []
+        errors: list[DiscretisationError] = []
         if self.options.discretisation is not None:
             with self._timed("error of the mesh"):
-                modes = self._without_error_of_mesh(modes, self.options.discretisation, differences, solves)
+                modes = self._without_error_of_mesh(modes, self.options.discretisation, errors, solves)
         require_explained(modes[0].estimate)
         before = self.forward.solves
         with self._timed("check of the posterior"):
@@ -193,7 +193,7 @@ class Estimation:
             self.prior,
             modes,
             tuple(self._remarks),
-            tuple(differences),
+            tuple(errors),
             importance,
             doubts,
             chain,
@@ -237,7 +237,7 @@ class Estimation:
         self.listener.stage(text if start is None else f"{text}, with the error of the mesh")
         problem = Problem(self.forward, self.observations, prior_mode, self.options.likelihood, nuisances)
         # what is only the start of something better need not be exact
-        final = self.options.discretisation is None or nuisances.difference is not None
+        final = self.options.discretisation is None or nuisances.error is not None
         tolerance = self.options.tolerance if final else max(self.options.tolerance, _BEFORE)
         search = GaussNewton(problem, GaussNewtonOptions(tolerance), self.listener.step)
         if start is None:
@@ -252,24 +252,30 @@ class Estimation:
         return Mode.of(found)
 
     def _without_error_of_mesh(
-        self, modes: tuple[Mode, ...], believed: Discretisation, differences: list[Difference], solves: dict[str, int]
+        self,
+        modes: tuple[Mode, ...],
+        believed: Discretisation,
+        errors: list[DiscretisationError],
+        solves: dict[str, int],
     ) -> tuple[Mode, ...]:
         before = self.forward.solves
         finer: FinerMesh | None = None
-        for _ in range(_MOST_DIFFERENCES):
+        for _ in range(_MOST_ERRORS):
             self.listener.stage("error of the mesh: one equilibrium on elements of half the size")
             best = modes[0]
             if finer is None:
                 finer = FinerMesh(self.case, best.estimate.theta, self._device)
-            differences.append(finer.difference(best.estimate.point.state))
-            nuisances = Nuisances(believed, differences[-1], self.options.registration)
+            derivatives = best.estimate.linearised.du, best.estimate.linearised.dR
+            errors.append(finer.error(best.estimate.point.state, derivatives))
+            nuisances = Nuisances(believed, errors[-1], self.options.registration)
             modes = self.fit(nuisances, modes)
-            moved = modes[0].estimate.theta - differences[-1].theta
+            moved = modes[0].estimate.theta - errors[-1].theta
             if np.sqrt(moved @ np.linalg.solve(modes[0].laplace.covariance, moved)) <= _SETTLED:
                 break
         else:
             self._remarks.append("the error of the mesh was still changing when it was last computed")
-        part = differences[-1].size / float(np.sqrt(np.mean(np.sum(modes[0].estimate.point.state.u ** 2, axis=1))))
+        whole = float(np.sqrt(np.mean(np.sum(modes[0].estimate.point.state.u ** 2, axis=1))))
+        part = errors[-1].change.size / whole
         if part > _TOO_COARSE:
             self._remarks.append(
                 f"the mesh is coarse: on elements of half the size displacements change by {100.0 * part:.0f} %; what "

@@ -59,6 +59,8 @@ class Forward:
     device : str, optional
     added : (n, 3) array, optional
         Nodal forces [N] beside the loads of the case.
+    elements : str
+        See `Model`.
 
     Attributes
     ----------
@@ -66,10 +68,18 @@ class Forward:
         Equilibria that were asked for.
     """
 
-    def __init__(self, case: Case, theta: Floats, device: str | None = None, added: Floats | None = None) -> None:
+    def __init__(
+        self,
+        case: Case,
+        theta: Floats,
+        device: str | None = None,
+        added: Floats | None = None,
+        elements: str = "tet4",
+    ) -> None:
         self.parameters = Parameters.of(case)
         self._mechanisms = case.mechanisms
-        self._plain, _ = plain_model_of(self.parameters.applied(case, theta))
+        plain, _ = plain_model_of(self.parameters.applied(case, theta))
+        self._plain = replace(plain, elements=elements)
         self.system = System(self._model(theta), device)
         self._last: State | None = None
         self.solves = 0

@@ -81,6 +81,12 @@ class Laplace:
         ends = np.stack([self.theta - away, self.theta + away], axis=1)
         return np.clip(ends, self.parameters.low[:, None], self.parameters.high[:, None])
 
+    def probability_below(self, theta: Floats) -> Floats:
+        """Of each parameter, shape (p,), that it is less than that of a vector (p,)."""
+        from scipy.special import ndtr
+
+        return np.asarray(ndtr((theta - self.theta) / self.standard_deviations))
+
     @property
     def gains(self) -> Floats:
         """Information of the data over that of the prior along independent directions, shape (p,), falling."""

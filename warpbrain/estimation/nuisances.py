@@ -1,6 +1,6 @@
 """What is estimated along with the tissue because it acts on the recordings, and is no property of the tissue.
 
-The error of the mesh (`discretisation`), one number, and a rigid error of registration, six. Both are given normal
+The error of the mesh (`discretisation`), 37 numbers, and a rigid error of registration, six. Both are given normal
 distributions beforehand and are integrated out of what is said of the tissue.
 """
 
@@ -12,10 +12,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.estimation.discretisation import Difference, Discretisation
+from warpbrain.estimation.discretisation import NAMES as DISCRETISATION_NAMES
+from warpbrain.estimation.discretisation import Discretisation, DiscretisationError
 from warpbrain.estimation.forward import State
 from warpbrain.estimation.observations import Residuals
-from warpbrain.estimation.registration import NAMES, Registration
+from warpbrain.estimation.registration import NAMES as REGISTRATION_NAMES
+from warpbrain.estimation.registration import Registration
 
 Floats = NDArray[np.float64]
 
@@ -26,21 +28,21 @@ class Nuisances:
 
     Attributes
     ----------
-    discretisation, difference : Discretisation and Difference, or None
+    discretisation, error : Discretisation and DiscretisationError, or None
         The amount of the mesh's error, and that error; without them states are taken for exact.
     registration : Registration or None
         Without it positions are taken as they were recorded.
     """
 
     discretisation: Discretisation | None = None
-    difference: Difference | None = None
+    error: DiscretisationError | None = None
     registration: Registration | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
         """With units."""
-        first = ("amount of the mesh's error",) if self.difference is not None else ()
-        return first + (NAMES if self.registration is not None else ())
+        first = DISCRETISATION_NAMES if self.error is not None else ()
+        return first + (REGISTRATION_NAMES if self.registration is not None else ())
 
     def __len__(self) -> int:
         return len(self.names)
@@ -49,16 +51,17 @@ class Nuisances:
     def mean(self) -> Floats:
         """Before anything was observed, shape (q,)."""
         values = np.zeros(len(self))
-        if self.difference is not None and self.discretisation is not None:
-            values[0] = self.discretisation.mean
+        if self.error is not None and self.discretisation is not None:
+            values[: len(DISCRETISATION_NAMES)] = self.discretisation.means
         return values
 
     @cached_property
     def precision(self) -> Floats:
         """Inverse covariance before anything was observed, shape (q, q)."""
         matrix = np.zeros((len(self), len(self)))
-        if self.difference is not None and self.discretisation is not None:
-            matrix[0, 0] = self.discretisation.deviation**-2
+        if self.error is not None and self.discretisation is not None:
+            count = len(DISCRETISATION_NAMES)
+            matrix[:count, :count] = np.diag(self.discretisation.precisions)
         if self.registration is not None:
             matrix[-6:, -6:] = self.registration.precision
         return matrix
@@ -70,21 +73,43 @@ class Nuisances:
 
     def observed(self, state: State, values: Floats) -> tuple[Floats, Floats]:
         """Displacement and reactions (n, 3) without the error of the mesh."""
-        if self.difference is None:
+        if self.error is None:
             return state.u, state.reactions
-        return state.u + values[0] * self.difference.u, state.reactions + values[0] * self.difference.reactions
+        u, reactions = self.error.at(state.theta, values[: len(DISCRETISATION_NAMES)])
+        return state.u + u, state.reactions + reactions
 
     def residuals(self, part: Residuals, values: Floats) -> Floats:
         """Residuals (n, d) of a recording, the rigid motion taken off."""
         return part.values if self.registration is None else part.values - part.rigid @ values[-6:]
 
-    def jacobian(self, part: Residuals, du: Floats | None = None, dR: Floats | None = None) -> Floats:
-        """Derivatives (n, d, p + q) of residuals by `theta`, along which displacement and reactions have derivatives
-        (p, N, 3), and by the nuisances; by the nuisances alone if these are left out.
+    def by_theta(self, values: Floats, du: Floats, dR: Floats) -> tuple[Floats, Floats]:
+        """Derivatives (p, n, 3) of what is observed by `theta`, from those of a state."""
+        if self.error is None:
+            return du, dR
+        more_du, more_dR = self.error.by_theta(values[: len(DISCRETISATION_NAMES)])
+        return du + more_du, dR + more_dR
+
+    def jacobian(
+        self, part: Residuals, theta: Floats, values: Floats, derivatives: tuple[Floats, Floats] | None = None
+    ) -> Floats:
+        """Derivatives of residuals.
+
+        Parameters
+        ----------
+        part : Residuals
+        theta : (p,) array
+        values : (q,) array
+        derivatives : pair of (p, n, 3) arrays, optional
+            Of the displacement and the reactions of the state by `theta`.
+
+        Returns
+        -------
+        (n, d, p + q) array
+            By `theta` and by the nuisances; by the nuisances alone (n, d, q) without derivatives of the state.
         """
-        blocks = [] if du is None or dR is None else [part.derivative(du, dR)]
-        if self.difference is not None:
-            blocks.append(part.derivative(self.difference.u[None], self.difference.reactions[None]))
+        blocks = [] if derivatives is None else [part.derivative(*self.by_theta(values, *derivatives))]
+        if self.error is not None:
+            blocks.append(part.derivative(*self.error.by_values(theta, values[: len(DISCRETISATION_NAMES)])))
         if self.registration is not None:
             blocks.append(-part.rigid)
         return np.concatenate(blocks, axis=2)

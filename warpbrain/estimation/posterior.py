@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.estimation.chain import Chain
-from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.discretisation import DiscretisationError
 from warpbrain.estimation.identifiability import Identifiability, identifiability
 from warpbrain.estimation.importance import Importance
 from warpbrain.estimation.modes import Mode, probabilities
@@ -68,7 +68,7 @@ class Posterior:
         The most probable first.
     remarks : tuple of str
         What a user should know of how it was found.
-    differences : tuple of Difference
+    mesh_errors : tuple of DiscretisationError
         The error of the mesh each time it was computed; the last one counts. Empty if it was left out.
     importance : Importance
         The check of Laplace's approximation.
@@ -86,7 +86,7 @@ class Posterior:
     prior: Prior
     modes: tuple[Mode, ...]
     remarks: tuple[str, ...]
-    differences: tuple[Difference, ...]
+    mesh_errors: tuple[DiscretisationError, ...]
     importance: Importance
     doubts: tuple[str, ...]
     chain: Chain | None
@@ -131,15 +131,25 @@ class Posterior:
         deviations = np.sqrt(np.diag(self.covariance))
         return self.covariance / np.outer(deviations, deviations)
 
+    def interval(self, probability: float) -> Floats:
+        """Central interval of each parameter, shape (p, 2)."""
+        if self.chain is None:
+            return self.best.laplace.interval(probability)
+        ends = [50.0 - 50.0 * probability, 50.0 + 50.0 * probability]
+        return np.asarray(np.percentile(self.chain.theta, ends, axis=0).T)
+
+    def probability_below(self, theta: Floats) -> Floats:
+        """Of each parameter, shape (p,), that it is less than that of a vector (p,)."""
+        if self.chain is None:
+            return self.best.laplace.probability_below(theta)
+        return np.asarray(np.mean(self.chain.theta < theta, axis=0))
+
     @cached_property
     def marginals(self) -> tuple[Marginal, ...]:
         """Each parameter."""
         prior = np.percentile(self.prior.theta, [2.5, 97.5], axis=0).T
-        if self.chain is None:
-            mean, interval = self.theta, self.best.laplace.interval()
-        else:
-            mean = self.chain.theta.mean(axis=0)
-            interval = np.percentile(self.chain.theta, [2.5, 97.5], axis=0).T
+        mean = self.theta if self.chain is None else self.chain.theta.mean(axis=0)
+        interval = self.interval(0.95)
         deviations = np.sqrt(np.diag(self.covariance))
         return tuple(
             Marginal(

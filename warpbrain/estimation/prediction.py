@@ -85,7 +85,9 @@ def predictions(mode: Mode, role: str, observations: Observations, joint: Floats
     found = []
     for observation, before, part in zip(observations.each, rest, parts, strict=True):
         after = problem.nuisances.residuals(part, point.nuisances)
-        jacobian = problem.nuisances.jacobian(part, derivatives.du, derivatives.dR)
+        jacobian = problem.nuisances.jacobian(
+            part, point.state.theta, point.nuisances, (derivatives.du, derivatives.dR)
+        )
         deviation = np.sqrt(np.einsum("ndp,pq,ndq->nd", jacobian, joint, jacobian))
         sigma = observation.sigma if observation.sigma is not None else estimated.get(observation.name)
         gross = np.zeros(len(after), dtype=bool) if sigma is None else gross_errors(after, deviation, sigma)

@@ -122,7 +122,7 @@ class Problem:
         found = self.forward.differentiate(point.state)
         gradient, hessian, information = np.zeros(p + q), np.zeros((p + q, p + q)), np.zeros((p + q, p + q))
         for part, residuals, weighed in zip(point.parts, point.residuals, point.weighed, strict=True):
-            jacobian = self.nuisances.jacobian(part, found.u, found.reactions)
+            jacobian = self.nuisances.jacobian(part, point.state.theta, point.nuisances, (found.u, found.reactions))
             gradient += weighed.gradient(residuals, jacobian)
             hessian += weighed.hessian(residuals, jacobian)
             information += weighed.information(jacobian)
@@ -159,7 +159,7 @@ class Problem:
         gradient = self.nuisances.precision @ (point.nuisances - self.nuisances.mean)
         hessian = self.nuisances.precision.copy()
         for part, residuals, weighed in zip(point.parts, point.residuals, point.weighed, strict=True):
-            jacobian = self.nuisances.jacobian(part)
+            jacobian = self.nuisances.jacobian(part, point.state.theta, point.nuisances)
             gradient += weighed.gradient(residuals, jacobian)
             hessian += weighed.hessian(residuals, jacobian)
         return gradient, hessian

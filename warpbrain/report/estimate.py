@@ -169,16 +169,18 @@ def _describe_prediction(prediction: Prediction) -> dict[str, Any]:
 
 
 def _describe_discretisation(posterior: Posterior, options: EstimationOptions) -> dict[str, Any] | None:
-    if not posterior.differences or options.discretisation is None:
+    if not posterior.mesh_errors or options.discretisation is None:
         return None
-    _, amount, deviation = posterior.nuisances[0]
+    _, value, deviation = posterior.nuisances[0]
+    error = posterior.mesh_errors[-1]
+    (amount, slope), (expected, spread) = error.amount(value), error.amount(options.discretisation.mean)
     return {
         "amount": amount,
-        "standard_deviation": deviation,
-        "prior_mean": options.discretisation.mean,
-        "prior_standard_deviation": options.discretisation.deviation,
-        "difference_root_mean_square_mm": MILLIMETRES * posterior.differences[-1].size,
-        "computed": len(posterior.differences),
+        "standard_deviation": slope * deviation,
+        "prior_mean": expected,
+        "prior_standard_deviation": spread * options.discretisation.deviation,
+        "difference_root_mean_square_mm": MILLIMETRES * error.change.size,
+        "computed": len(posterior.mesh_errors),
     }
 
 

@@ -1,0 +1,92 @@
+"""Intervals of `estimate` hold the truth as often as they say: truths drawn from its prior, recordings from its noise.
+
+Without other elements the model of the estimate is the one that recordings are drawn from: ranks of the truth are
+uniform if the computation is right. With other elements the truth is of quadratic tetrahedra of half the size, whose
+error no prior was drawn from. That holds on even elements that are not too coarse; where it does not hold,
+docs/estimation.md says by how much.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+from scipy.stats import binom, kstest
+from simulated_draws import Setting, ranks
+
+PROBABILITIES = (0.5, 0.9, 0.95)
+DRAWS = 100
+SETTINGS = (
+    Setting("block", 1, None, 0.03),
+    Setting("block", 1, 0.2, 0.1),
+    Setting("round", 1, 0.5, 0.5),
+    Setting("round", 2, 0.8, 0.1),
+    Setting("block", 2, 0.4, 0.1, registration=True),
+)
+OTHER_ELEMENTS = (Setting("block", 1, 0.5, 0.1, other_elements=True),)
+
+
+def covered(found: np.ndarray, probability: float) -> np.ndarray:
+    """Truths in the central interval of a probability, for each parameter."""
+    return np.count_nonzero(np.abs(2.0 * found - 1.0) <= probability, axis=0)
+
+
+def excess(count: int, draws: int, probability: float, band: float) -> float:
+    """How far a count is outside of its binomial band; 0 inside."""
+    low, high = binom.interval(band, draws, probability)
+    return float(max(low - count, count - high, 0.0))
+
+
+@pytest.fixture(scope="module")
+def drawn() -> dict[Setting, np.ndarray]:
+    """Ranks of every setting, as many settings at once as there are cores."""
+    every = (*SETTINGS, *OTHER_ELEMENTS)
+    with ProcessPoolExecutor(min(len(every), os.cpu_count() or 1), get_context("spawn")) as pool:
+        jobs = [pool.submit(ranks, setting, DRAWS, seed) for seed, setting in enumerate(every)]
+        return {setting: job.result() for setting, job in zip(every, jobs, strict=True)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("setting", [*SETTINGS, *OTHER_ELEMENTS], ids=lambda setting: setting.name)
+def test_intervals_cover_as_often_as_they_say(setting, drawn, verify) -> None:
+    for probability in PROBABILITIES:
+        worst = max(excess(count, DRAWS, probability, 0.999) for count in covered(drawn[setting], probability))
+        verify(
+            f"`estimate`: {100 * probability:g} % intervals hold the truth ({setting.name})",
+            f"binomial band of 99.9 % of {DRAWS} truths drawn from the prior",
+            worst,
+            0.0,
+            "truths",
+        )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("setting", SETTINGS, ids=lambda setting: setting.name)
+def test_ranks_are_uniform(setting, drawn) -> None:
+    for column in drawn[setting].T:
+        assert kstest(column, "uniform").pvalue > 1e-3
+
+
+@pytest.mark.slow
+def test_intervals_of_all_settings_together_cover(drawn, verify) -> None:
+    together = np.concatenate([drawn[setting].T.ravel() for setting in SETTINGS])
+    for probability in PROBABILITIES:
+        outside = excess(int(covered(together, probability)), len(together), probability, 0.95)
+        verify(
+            f"`estimate`: {100 * probability:g} % intervals hold the truth, all settings on one mesh together",
+            f"binomial band of 95 % of {len(together)} parameters drawn from the prior",
+            outside,
+            0.0,
+            "truths",
+        )
+    assert kstest(together, "uniform").pvalue > 1e-3
+
+
+def test_intervals_of_a_few_draws_cover() -> None:
+    found = ranks(Setting("block", 1, 0.4, 0.1), 16, 100)
+    for probability in PROBABILITIES:
+        assert excess(int(covered(found, probability)[0]), len(found), probability, 0.999) == 0.0
+    assert kstest(found[:, 0], "uniform").pvalue > 1e-3
