@@ -174,11 +174,11 @@ def record(
     rng: np.random.Generator,
     count: int = 40,
 ) -> PointsRecording:
-    """Points spread evenly over the body, recorded with the noise that an estimate takes."""
+    """Points spread evenly over the body, recorded with normal noise of the standard deviation that is declared."""
     chosen = mesh.tetrahedra[rng.choice(len(mesh.tetrahedra), count, p=mesh.volumes / mesh.volumes.sum())]
     points = np.einsum("ni,nij->nj", rng.dirichlet(np.ones(4), count), mesh.points[chosen])
     moved = locate(truths.mesh.points, truths.mesh.tetrahedra, points).interpolate(truth.u)
-    moved = moved + sigma * rng.normal(size=moved.shape) / np.sqrt(rng.chisquare(NU, (count, 1)) / NU)
+    moved = moved + sigma * rng.normal(size=moved.shape)
     if registration is not None:
         shift, turn = registration.shift * rng.normal(size=3), registration.turn * rng.normal(size=3)
         # what is recorded less its motion is what was: the motion is of the recorded positions
