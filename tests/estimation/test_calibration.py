@@ -26,7 +26,7 @@ SETTINGS = (
     Setting("round", 2, 0.8, 0.1),
     Setting("block", 2, 0.4, 0.1, registration=True),
 )
-OTHER_ELEMENTS = (Setting("block", 1, 0.5, 0.1, other_elements=True),)
+OTHER_ELEMENTS = (Setting("block", 1, None, 0.1, other_elements=True),)
 
 
 def covered(found: np.ndarray, probability: float) -> np.ndarray:
