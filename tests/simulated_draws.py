@@ -31,8 +31,6 @@ Floats = NDArray[np.float64]
 SIDE = 0.03
 #: A level that cuts elements, none of whose faces lies in it.
 DOWN = (0.3, 0.2, -1.0)
-#: Degrees of freedom of the noise, those that an estimate takes unless told.
-NU = 4.0
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ class Setting:
     level : float or None
         Of the fluid, relative to the body's height; None: there never was any, and a weight of 300 kg/m3 acts.
     noise : float
-        Root mean square length of the noise's scale, relative to that of the motion in the middle of the prior.
+        Root mean square length of the noise, relative to that of the motion in the middle of the prior.
     other_elements : bool
         Truths are of quadratic elements of half the size, and the estimate knows that its mesh is wrong. Tissue is more
         compressible then: near nu = 1/2 a mesh as small as this is too coarse, as an estimate of it says.
