@@ -15,7 +15,10 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean, Ogden
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.gravity import Gravity
+from warpbrain.physics.mechanisms.residual_stress import ResidualStress
+from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, NewtonStep, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.relaxation import RelaxationOptions, relax_to_rest
@@ -353,3 +356,29 @@ def test_an_unstable_state_is_passed_and_said(device: str) -> None:
     assert np.linalg.norm((found.internal - external)[free]) <= 1e-7 * np.linalg.norm(external)
     assert all(step.min_J > 0.0 for step in found.history)
     assert found.energy - np.vdot(external, found.u) < 0.0
+
+
+@pytest.mark.parametrize(
+    ("acting", "poisson", "expected"),
+    [
+        (Swelling(amount=124.0), 0.3, 4.0),
+        (ResidualStress(direction=(0.0, 0.0, 1.0), tension=300.0), 0.4999, None),
+    ],
+    ids=["grown to 125 times its volume", "contracted, nearly incompressible"],
+)
+def test_a_state_without_any_force_is_found(
+    acting: Mechanism, poisson: float, expected: float | None, device: str
+) -> None:
+    """Nothing but rounding is left of the forces, which a residual relative to them cannot tell from imbalance."""
+    mesh = distorted(cube(2), 0.03)
+    constrained = np.zeros(mesh.points.shape, dtype=bool)
+    for corner, axes in (((0, 0, 0), (0, 1, 2)), ((1, 0, 0), (1, 2)), ((0, 1, 0), (2,))):
+        constrained[np.argmin(np.linalg.norm(mesh.points - corner, axis=1)), list(axes)] = True
+    material = Material(NeoHookean(1000.0), poisson, "uncoupled")
+    system = System(model_of(mesh, material, constrained=constrained, mechanisms=[acting]), device)
+    u = solve_equilibrium(system).u
+    stretches = np.linalg.svd(system.deformation_gradients(), compute_uv=False)
+    assert np.ptp(stretches, axis=0).max() < 1e-7
+    if expected is not None:
+        np.testing.assert_allclose(stretches, 1.0 + expected, rtol=1e-7)
+    assert np.isfinite(u).all()

@@ -27,6 +27,9 @@ from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
 
+#: Rounding errors in the forces of an element, in units of the last place of its stiffest modulus.
+_ROUNDINGS = 20.0
+
 
 @dataclass(frozen=True)
 class NewtonStep:
@@ -191,7 +194,7 @@ class EquilibriumSolver:
         self.tolerance = max(self.options.tolerance, 50.0 * system.precision.epsilon)
         # force and energy of the order of rounding, so that a body without any load is in equilibrium
         stiffest = max(m.law.shear_modulus + abs(m.volumetric_modulus) for m in system.model.materials.values())
-        self._noise = system.precision.epsilon * stiffest * system.model.mesh.volume ** (2.0 / 3.0)
+        self._noise = _ROUNDINGS * system.precision.epsilon * stiffest * system.model.mesh.volume ** (2.0 / 3.0)
         self._energy_noise = system.precision.epsilon * stiffest * system.model.mesh.volume
 
     def solve(self, external: Floats | None = None, start: Floats | None = None) -> Equilibrium:
@@ -337,8 +340,9 @@ class EquilibriumSolver:
             r = self._free * (external - internal)
             scale = float(np.linalg.norm(internal) + np.linalg.norm(external))
             norm = float(np.linalg.norm(r))
-            # converged when norm <= tolerance * scale + noise
-            relative = norm / (scale + self._noise / self.tolerance)
+            # converged when norm <= tolerance * scale + noise; what has grown has larger faces for the same stress
+            noise = self._noise * float(system.growth_stretches.max()) ** 2
+            relative = norm / (scale + noise / self.tolerance)
             prescribed = np.where(system.model.constrained, target - u, 0.0)
             moving = bool(np.any(prescribed))
             if not np.isfinite(norm):
