@@ -1,0 +1,121 @@
+"""Probabilities of sets against the densities of joint normal distributions written out, and against their draws."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.special import logsumexp
+
+from warpbrain.inference.causes import Cause, Place
+from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.subsets import Search, posterior
+
+N = 30
+SCALES = Search(np.array([0.8, 1.25]), np.log([0.4, 0.6]), negligible=1e-12, beam=10_000)
+
+
+def model(random: np.random.Generator) -> GaussianModel:
+    return GaussianModel(np.diag(random.uniform(0.5, 1.5, N)), random.normal(size=(N, 3)))
+
+
+def some_causes(random: np.random.Generator) -> list[Cause]:
+    """Causes of one to five columns, of one to four places, one with a mean."""
+
+    def places(count: int, width: int, mean: bool = False) -> tuple[Place, ...]:
+        each = range(count)
+        return tuple(
+            Place(random.normal(size=(N, width)), random.normal(size=N) if mean else None, 1.0 + k) for k in each
+        )
+
+    sizes = np.array([0.3, 1.0, 3.0])
+    return [
+        Cause("patch", places(4, 3), -2.0, sizes),
+        Cause("level", places(3, 1, mean=True), -2.5, sizes / 3.0),
+        Cause("field", places(2, 5), -3.0, sizes),
+        Cause("switch", places(2, 1), -3.5, sizes),
+    ]
+
+
+def by_hand(one: GaussianModel, residual: np.ndarray, causes: list[Cause], members: tuple[int, ...]) -> float:
+    """Log density of the rows with these causes, every sum written out."""
+    logs = []
+    for scale, log_scale in zip(SCALES.scales, SCALES.log_scale_prior, strict=True):
+        base = one.with_scale(scale).covariance
+        choices = [[]]
+        for c in members:
+            cause = causes[c]
+            weights = np.array([place.weight for place in cause.places])
+            weights = weights / weights.sum()
+            choices = [
+                [*chosen, (place, size, np.log(weight / len(cause.sizes)))]
+                for chosen in choices
+                for place, weight in zip(cause.places, weights, strict=True)
+                for size in cause.sizes
+            ]
+        for chosen in choices:
+            covariance, mean = base.copy(), np.zeros(N)
+            for place, size, _ in chosen:
+                covariance += size**2 * place.columns @ place.columns.T
+                mean += 0.0 if place.mean is None else place.mean
+            density = stats.multivariate_normal(mean, covariance).logpdf(residual)
+            logs.append(density + log_scale + sum(log for *_, log in chosen))
+    return float(logsumexp(logs))
+
+
+def test_evidence_is_the_sum_of_the_densities_written_out() -> None:
+    random = np.random.default_rng(0)
+    one, causes = model(random), some_causes(random)
+    residual = one.draws(1, random)[:, 0] + 2.0 * causes[0].places[1].columns @ [1.0, 0.3, -0.5]
+    found = {hypothesis.causes: hypothesis for hypothesis in posterior(one, residual, causes, SCALES).hypotheses}
+    for count in range(3):
+        for members in combinations(range(4), count):
+            expected = by_hand(one, residual, causes, members)
+            names = tuple(causes[c].name for c in members)
+            assert found[names].log_evidence == pytest.approx(expected, abs=1e-9), names
+            assert found[names].log_prior == pytest.approx(sum(causes[c].log_prior for c in members))
+    for members in combinations(range(4), 3):
+        # with a beam that leaves nothing out the sum over the best configurations of pairs is a lower bound
+        expected = by_hand(one, residual, causes, members)
+        assert expected - 1.5 < found[tuple(causes[c].name for c in members)].log_evidence < expected + 1e-9
+
+
+def test_best_configuration_has_the_greatest_density() -> None:
+    random = np.random.default_rng(1)
+    one, causes = model(random), some_causes(random)
+    residual = one.draws(1, random)[:, 0] + 4.0 * causes[0].places[2].columns @ [1.0, 1.0, -0.5]
+    best = posterior(one, residual, causes, SCALES).hypotheses[0]
+    assert "patch" in best.causes
+    assert next(member.place for member in best.best.members if member.cause == 0) == 2
+
+
+def test_probabilities_are_calibrated_over_draws_of_the_model(verify) -> None:
+    """Of sets that are drawn with their prior, those that are given the probability p are right in a share p."""
+    random = np.random.default_rng(2)
+    one, causes = model(random), some_causes(random)[:3]
+    sets = [(), (0,), (1,), (2,), (0, 1), (0, 2), (1, 2)]
+    log_prior = np.array([sum(causes[c].log_prior for c in members) for members in sets])
+    prior = np.exp(log_prior - logsumexp(log_prior))
+    scores, variance = 0.0, 0.0
+    search = Search(np.ones(1), np.zeros(1), beam=0)
+    for _ in range(150):
+        members = sets[random.choice(len(sets), p=prior)]
+        rows = one.draws(1, random)[:, 0]
+        for c in members:
+            weights = np.array([place.weight for place in causes[c].places])
+            place = causes[c].places[random.choice(len(weights), p=weights / weights.sum())]
+            size = random.choice(causes[c].sizes)
+            rows += size * place.columns @ random.normal(size=place.columns.shape[1])
+            rows += 0.0 if place.mean is None else place.mean
+        found = posterior(one, rows, causes, search)
+        for p, names in zip(found.probabilities, (hypothesis.causes for hypothesis in found.hypotheses), strict=True):
+            if names == ("patch",) or names == ("patch", "level"):
+                scores += float(tuple(causes[c].name for c in members) == names) - p
+                variance += p * (1.0 - p)
+    verify(
+        "probabilities of sets of causes, over draws of the model: sum of (right - p)",
+        "its standard deviation if they are calibrated",
+        abs(scores) / np.sqrt(variance),
+        3.0,
+        "standard deviations",
+    )

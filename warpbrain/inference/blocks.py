@@ -1,0 +1,145 @@
+"""Columns of all places of all causes in coordinates in which rows without a cause are `N(0, I)`, and their products.
+
+The log of a Bayes factor of columns `Z` with means `m` and prior deviations `s` is
+
+    ln p(r | cause) - ln p(r | none) = |r|^2/2 - |r - m|^2/2 + b^T (M + D^-1)^-1 b / 2 - ln |I + D M| / 2
+    b = Z^T (r - m),   M = Z^T Z,   D = diag(s^2)
+
+Of two blocks the second is seen after the first has been eliminated, a Schur complement: all second ones at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.inference.causes import Cause
+from warpbrain.inference.gaussian import GaussianModel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Columns that are there already: standardised (n, k), prior deviations (k,), and their mean (n,)."""
+
+    columns: Floats
+    deviations: Floats
+    mean: Floats
+
+
+class Blocks:
+    """Blocks of columns, one a place, those of a cause one after the other, wide causes first.
+
+    Parameters
+    ----------
+    model : GaussianModel
+        Of the rows without a cause.
+    residual : (n,) array
+    causes : sequence of Cause
+        All with equally many sizes.
+
+    Attributes
+    ----------
+    cause, place : (p,) int arrays
+        Which cause and which of its places each block is.
+    """
+
+    def __init__(self, model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> None:
+        widths = [max(place.columns.shape[1] for place in cause.places) for cause in causes]
+        order = np.argsort([-width for width in widths], kind="stable").tolist()
+        self.cause = np.concatenate([np.full(len(causes[c].places), c) for c in order]).astype(np.int64)
+        self.place = np.concatenate([np.arange(len(causes[c].places)) for c in order]).astype(np.int64)
+        self._width = np.array(widths, dtype=np.int64)[self.cause]
+        self._first = np.concatenate([[0], np.cumsum(self._width)])
+        self._sizes = np.array([cause.sizes for cause in causes])[self.cause]
+        self.log_weights = np.concatenate([causes[c].log_weights for c in order])
+        columns = np.zeros((len(model), self._first[-1]))
+        means = np.zeros((len(model), len(self.cause)))
+        for block, (c, p) in enumerate(zip(self.cause.tolist(), self.place.tolist(), strict=True)):
+            place = causes[c].places[p]
+            at = self._first[block]
+            columns[:, at : at + place.columns.shape[1]] = place.columns
+            if place.mean is not None:
+                means[:, block] = place.mean
+        self._r = model.standardised(residual)
+        self._Z = model.standardised(columns)
+        self._m = model.standardised(means) if means.any() else means
+
+    def __len__(self) -> int:
+        return len(self.cause)
+
+    def some(self, chosen: Ints) -> Blocks:
+        """Some of the blocks, in the same order."""
+        other: Blocks = object.__new__(Blocks)
+        keep = np.sort(chosen)
+        other.cause, other.place, other.log_weights = self.cause[keep], self.place[keep], self.log_weights[keep]
+        other._width, other._sizes = self._width[keep], self._sizes[keep]
+        other._first = np.concatenate([[0], np.cumsum(other._width)])
+        columns = np.concatenate([np.arange(self._first[k], self._first[k + 1]) for k in keep.tolist()])
+        other._r, other._Z, other._m = self._r, self._Z[:, columns], self._m[:, keep]
+        return other
+
+    def given(self, members: Sequence[tuple[int, int]]) -> Given:
+        """Blocks by number with the numbers of their sizes, as what is there already."""
+        columns = [self._Z[:, self._first[k] : self._first[k + 1]] for k, _ in members]
+        deviations = [np.full(self._width[k], self._sizes[k, size]) for k, size in members]
+        mean = self._m[:, [k for k, _ in members]].sum(axis=1)
+        return Given(np.concatenate(columns, axis=1), np.concatenate(deviations), mean)
+
+    def log_factors(self, given: Given | None = None, start: int = 0) -> Floats:
+        """Log Bayes factors (p - start, s) of blocks from `start` on, with every size.
+
+        Parameters
+        ----------
+        given : Given, optional
+            Columns that act together with each block: the factor is then of both together, against none.
+        start : int
+        """
+        found = np.empty((len(self) - start, self._sizes.shape[1]))
+        widths = self._width[start:]
+        # causes of one width lie together
+        edges = np.flatnonzero(np.diff(widths)) + 1
+        for low, high in zip([0, *edges.tolist()], [*edges.tolist(), len(widths)], strict=True):
+            found[low:high] = self._of_one_width(np.arange(start + low, start + high), given)
+        return found
+
+    def _of_one_width(self, blocks: Ints, given: Given | None) -> Floats:
+        """Log Bayes factors (b, s) of blocks that are all as wide as each other."""
+        count, width = len(blocks), int(self._width[blocks[0]])
+        at = slice(self._first[blocks[0]], self._first[blocks[-1] + 1])
+        Z, means, sizes = self._Z[:, at], self._m[:, blocks], self._sizes[blocks]
+        each = Z.reshape(len(Z), count, width)
+        M = np.einsum("nbi,nbj->bij", each, each, optimize=True)
+        with_means = bool(means.any())
+        if given is None:
+            left = self._r[:, None] - means if with_means else self._r[:, None]
+        else:
+            rest = self._r - given.mean
+            left = rest[:, None] - means if with_means else rest[:, None]
+        b = (
+            np.einsum("nbi,nb->bi", each, np.broadcast_to(left, (len(Z), count)), optimize=True)
+            if with_means
+            else (left[:, 0] @ Z).reshape(count, width)
+        )
+        log = 0.5 * (self._r @ self._r - np.sum(left**2, axis=0)) * np.ones(count)
+        if given is not None:
+            W = given.columns
+            A = np.linalg.inv(W.T @ W + np.diag(given.deviations**-2.0))
+            seen = W.T @ left
+            C = (W.T @ Z).reshape(W.shape[1], count, width)
+            AC = np.einsum("kl,lbi->kbi", A, C)
+            M = M - np.einsum("kbi,kbj->bij", C, AC)
+            b = b - np.einsum("kbi,kb->bi", AC, np.broadcast_to(seen, (W.shape[1], count)))
+            log = log + 0.5 * np.einsum("kb,kl,lb->b", seen, A, seen) * np.ones(count)
+            log = log + 0.5 * np.linalg.slogdet(A)[1] - np.log(given.deviations).sum()
+        values, vectors = np.linalg.eigh(M)
+        along = np.einsum("bij,bi->bj", vectors, b) ** 2
+        ratio = sizes[:, :, None] ** 2
+        explained = np.sum(ratio * along[:, None] / (1.0 + ratio * np.maximum(values, 0.0)[:, None]), axis=2)
+        volume = np.sum(np.log1p(ratio * np.maximum(values, 0.0)[:, None]), axis=2)
+        return np.asarray(log[:, None] + 0.5 * (explained - volume))

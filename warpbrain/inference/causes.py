@@ -1,0 +1,69 @@
+"""What may have caused residuals: physics, fields without a name, or what is no physics, all in one shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class Kind(Enum):
+    """Of which kind a cause is; a verdict speaks differently of each."""
+
+    PHYSICS = "physics"
+    UNKNOWN = "unknown"
+    NOT_PHYSICS = "not physics"
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A cause at one place, level, node set or course.
+
+    Parameters
+    ----------
+    columns : (n, k) array
+        What a unit of size of each coefficient changes of each row.
+    mean : (n,) array, optional
+        What is expected of it whatever its size, such as the weight at a level of the fluid; zero if not given.
+    weight : float
+        Probability among the places of its cause.
+    """
+
+    columns: Floats
+    mean: Floats | None = None
+    weight: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """One cause.
+
+    Coefficients are normal with the standard deviation `s`, and `s` is one of a few sizes: a scale mixture, so that a
+    cause that is small but plain to see pays as little for its width as one that is large.
+
+    Parameters
+    ----------
+    name : str
+    places : tuple of Place
+    log_prior : float
+        Logarithm of the odds that it acts, before anything was recorded.
+    sizes : (s,) array
+        Standard deviations of the coefficients, in units of the columns.
+    kind : Kind
+    """
+
+    name: str
+    places: tuple[Place, ...]
+    log_prior: float
+    sizes: Floats = field(default_factory=lambda: np.ones(1))
+    kind: Kind = Kind.PHYSICS
+
+    @property
+    def log_weights(self) -> Floats:
+        """Logarithm of the probability of each place and size, (p, s): sizes are all alike probable."""
+        weights = np.array([place.weight for place in self.places])
+        return np.log(weights / weights.sum())[:, None] - np.log(len(self.sizes)) + np.zeros(len(self.sizes))

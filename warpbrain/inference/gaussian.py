@@ -1,0 +1,136 @@
+"""A normal distribution of recorded rows: correlated noise of an unknown scale, and columns with normal coefficients.
+
+    r = U xi + kappa L eps,   xi, eps ~ N(0, I),   Cov r = S = kappa^2 L L^T + U U^T
+
+With the eigenvectors of `(L^-1 U)^T (L^-1 U)` the square root of `S` is known for every `kappa`, at the cost of
+products of n by q, the number of columns, which is smaller than the number n of rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class GaussianModel:
+    """Rows with noise and normal coefficients.
+
+    Parameters
+    ----------
+    noise_factor : (n, n) array
+        Lower triangular factor `L` of the covariance of the noise.
+    columns : (n, q) array
+        `U`: what one standard deviation of each coefficient changes of each row.
+    scale : float
+        `kappa`, factor on the standard deviation of the noise.
+    """
+
+    noise_factor: Floats
+    columns: Floats
+    scale: float = 1.0
+
+    def __len__(self) -> int:
+        return len(self.noise_factor)
+
+    def with_scale(self, scale: float) -> GaussianModel:
+        """The same with another factor on the noise; nothing is factorised again."""
+        other = GaussianModel(self.noise_factor, self.columns, scale)
+        other.__dict__["_whitened_columns"] = self._whitened_columns
+        other.__dict__["_spectrum"] = self._spectrum
+        return other
+
+    def with_columns(self, columns: Floats) -> GaussianModel:
+        """The same with more columns (n, k) of normal coefficients."""
+        return GaussianModel(self.noise_factor, np.column_stack([self.columns, columns]), self.scale)
+
+    def rows(self, rows: NDArray[np.bool_]) -> GaussianModel:
+        """The marginal distribution of some rows, (n,) bool."""
+        noise = self.noise_factor[rows]
+        return GaussianModel(np.linalg.cholesky(noise @ noise.T), self.columns[rows], self.scale)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """`S` (n, n)."""
+        return self.scale**2 * self.noise_factor @ self.noise_factor.T + self.columns @ self.columns.T
+
+    @cached_property
+    def _whitened_columns(self) -> Floats:
+        return self._by_noise(self.columns)
+
+    @cached_property
+    def _spectrum(self) -> tuple[Floats, Floats]:
+        """Eigenvalues (q,) of `W^T W`, `W = L^-1 U`, and `W` times its eigenvectors (n, q)."""
+        W = self._whitened_columns
+        values, vectors = np.linalg.eigh(W.T @ W)
+        return np.maximum(values, 0.0), W @ vectors
+
+    def _by_noise(self, rows: Floats) -> Floats:
+        """`L^-1` of rows (n,) or (n, b)."""
+        from scipy.linalg import solve_triangular
+
+        return np.asarray(solve_triangular(self.noise_factor, rows, lower=True, check_finite=False))
+
+    def standardised(self, rows: Floats) -> Floats:
+        """Rows (n,) or (n, b) in coordinates in which the model is `N(0, I)`.
+
+        `(kappa^2 I + W W^T)^(-1/2) L^-1 r`, whose products are those with `S^-1`.
+        """
+        values, directions = self._spectrum
+        white = self._by_noise(rows)
+        root = np.sqrt(self.scale**2 + values)
+        seen = directions.T @ white
+        weights = 1.0 / (root * (root + self.scale))
+        return np.asarray((white - directions @ (weights * seen.T).T) / self.scale)
+
+    @cached_property
+    def log_determinant(self) -> float:
+        """`ln |S|`."""
+        values, _ = self._spectrum
+        n, k2 = len(self), self.scale**2
+        of_noise = 2.0 * float(np.log(np.diag(self.noise_factor)).sum())
+        return of_noise + n * float(np.log(k2)) + float(np.log1p(values / k2).sum())
+
+    def log_density(self, rows: Floats) -> Floats:
+        """`ln N(r; 0, S)` of rows (n,) or (n, b): () or (b,)."""
+        squares = np.sum(self.standardised(rows) ** 2, axis=0)
+        return np.asarray(-0.5 * (squares + self.log_determinant + len(self) * np.log(2.0 * np.pi)))
+
+    def coefficients(self, rows: Floats) -> tuple[Floats, Floats]:
+        """Mean (q,) and covariance (q, q) of the coefficients `xi` after rows (n,)."""
+        W = self._whitened_columns / self.scale
+        covariance = np.linalg.inv(np.eye(W.shape[1]) + W.T @ W)
+        return covariance @ (W.T @ self._by_noise(rows)) / self.scale, covariance
+
+    def conditional(self, rows: Floats, observed: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+        """Distribution of the rows that were not observed given those that were.
+
+        Parameters
+        ----------
+        rows : (n,) array
+            Only the observed ones count.
+        observed : (n,) bool array
+
+        Returns
+        -------
+        mean, covariance : (m,), (m, m) arrays
+            Of the others, their noise included.
+        """
+        S = self.covariance
+        hidden = ~observed
+        gain = np.linalg.solve(S[np.ix_(observed, observed)], S[np.ix_(observed, hidden)])
+        return gain.T @ rows[observed], S[np.ix_(hidden, hidden)] - S[np.ix_(hidden, observed)] @ gain
+
+    def log_density_of_hidden(self, rows: Floats, observed: NDArray[np.bool_]) -> float:
+        """`ln p(r_hidden | r_observed)`: the joint log density less that of the observed rows."""
+        return float(self.log_density(rows)) - float(self.rows(observed).log_density(rows[observed]))
+
+    def draws(self, count: int, random: np.random.Generator) -> Floats:
+        """Rows (n, count) drawn from the model."""
+        noise = self.noise_factor @ random.normal(size=(len(self), count))
+        return np.asarray(self.scale * noise + self.columns @ random.normal(size=(self.columns.shape[1], count)))
