@@ -9,8 +9,8 @@ import pytest
 PACKAGE = Path(str(files("warpbrain")))
 #: From the ground up; docs/house.md says what each is for.
 FLOORS = [
-    *("kernels", "mesh", "physics", "recordings", "gp", "cases", "simulation", "ensemble", "estimation", "diagnosis"),
-    *("report", "terminal", "bench", "cli"),
+    *("kernels", "mesh", "physics", "recordings", "gp", "cases", "simulation", "ensemble", "inference", "estimation"),
+    *("diagnosis", "report", "terminal", "bench", "cli"),
 ]
 #: Modules that any floor may use, and that use none.
 LEAVES = ["errors", "atomic", "frame", "problems", "threads", "values"]

@@ -24,6 +24,7 @@ SECTIONS: dict[str, str] = {
     "tests/simulation/": "Equilibria, motions, specimens and derivatives",
     "tests/gp/": "The generative model",
     "tests/estimation/": "Estimation",
+    "tests/inference/": "Inference",
     "tests/diagnosis/": "Diagnosis",
     "tests/referee/": "Referee",
     "tests/bench/": "Benchmarks",

@@ -4,12 +4,26 @@ A world (a body, a specimen) gives the residuals `r` of its recorded rows at a s
 columns of what is always uncertain (nuisances), and `Cause`s, each with the columns of its possible places. From these
 
     GaussianModel       marginal, conditional and posterior distributions of rows and coefficients
-    Posterior           evidence of no cause, of every cause, every pair, and of triples
-    Decision            the verdict of least expected loss
+    with_gross_errors   the density of rows where some points may be mispaired, for each hypothesis by itself
+    posterior           probabilities of no cause, of every cause, every pair, and of triples
 
 Nothing here knows Warp, a mesh or the name of a mechanism.
 """
 
+from warpbrain.inference.causes import Cause, Kind, Place
 from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.gross_errors import GrossErrors, Outliers, with_gross_errors
+from warpbrain.inference.subsets import Posterior, Search, posterior
 
-__all__ = ["GaussianModel"]
+__all__ = [
+    "Cause",
+    "GaussianModel",
+    "GrossErrors",
+    "Kind",
+    "Outliers",
+    "Place",
+    "Posterior",
+    "Search",
+    "posterior",
+    "with_gross_errors",
+]

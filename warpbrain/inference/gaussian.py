@@ -52,7 +52,8 @@ class GaussianModel:
     def rows(self, rows: NDArray[np.bool_]) -> GaussianModel:
         """The marginal distribution of some rows, (n,) bool."""
         noise = self.noise_factor[rows]
-        return GaussianModel(np.linalg.cholesky(noise @ noise.T), self.columns[rows], self.scale)
+        factor: Floats = np.asarray(np.linalg.cholesky(noise @ noise.T), dtype=np.float64)
+        return GaussianModel(factor, self.columns[rows], self.scale)
 
     @cached_property
     def covariance(self) -> Floats:
@@ -104,7 +105,7 @@ class GaussianModel:
     def coefficients(self, rows: Floats) -> tuple[Floats, Floats]:
         """Mean (q,) and covariance (q, q) of the coefficients `xi` after rows (n,)."""
         W = self._whitened_columns / self.scale
-        covariance = np.linalg.inv(np.eye(W.shape[1]) + W.T @ W)
+        covariance: Floats = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
         return covariance @ (W.T @ self._by_noise(rows)) / self.scale, covariance
 
     def conditional(self, rows: Floats, observed: NDArray[np.bool_]) -> tuple[Floats, Floats]:
@@ -124,7 +125,8 @@ class GaussianModel:
         S = self.covariance
         hidden = ~observed
         gain = np.linalg.solve(S[np.ix_(observed, observed)], S[np.ix_(observed, hidden)])
-        return gain.T @ rows[observed], S[np.ix_(hidden, hidden)] - S[np.ix_(hidden, observed)] @ gain
+        covariance: Floats = S[np.ix_(hidden, hidden)] - S[np.ix_(hidden, observed)] @ gain
+        return gain.T @ rows[observed], covariance
 
     def log_density_of_hidden(self, rows: Floats, observed: NDArray[np.bool_]) -> float:
         """`ln p(r_hidden | r_observed)`: the joint log density less that of the observed rows."""

@@ -5,8 +5,8 @@ With the indicator `w_i` of point i its noise is W times as large: the covarianc
 
     ln p(r | w_i = 1) / p(r | w_i = 0) = v^T (Delta_i^-1 + P_ii)^-1 v / 2 - ln |I + Delta_i P_ii| / 2
 
-with `v = (S^-1 r)_i` and `P_ii = (S^-1)_ii`. What one hypothesis takes for gross errors is what another one explains, so
-nothing is set aside before a hypothesis is asked.
+with `v = (S^-1 r)_i` and `P_ii = (S^-1)_ii`. What one hypothesis takes for gross errors is what another one explains,
+so nothing is set aside before a hypothesis is asked.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def with_gross_errors(
     covariance = model.covariance
     gross = np.zeros(len(points), dtype=bool)
     for _ in range(sweeps * max(len(points), 1)):
-        precision = np.linalg.inv(covariance)
+        precision: Floats = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
         weighted = precision @ residual
         odds = log_prior_odds + np.array(
             [
@@ -97,7 +97,8 @@ def with_gross_errors(
     log_density = -0.5 * (
         float(residual @ weighted) + float(np.linalg.slogdet(covariance)[1]) + len(residual) * np.log(2.0 * np.pi)
     )
-    log_indicators = np.where(gross, np.log(prior.probability), np.log1p(-prior.probability)).sum()
+    count = int(np.count_nonzero(gross))
+    log_indicators = count * np.log(prior.probability) + (len(points) - count) * np.log1p(-prior.probability)
     others = np.log1p(np.exp(-np.abs(odds))).sum()
     return GrossErrors(float(log_density + log_indicators + others), odds)
 
