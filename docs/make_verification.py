@@ -33,6 +33,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         rows = Path(folder) / "rows.json"
         command = [sys.executable, "-m", "pytest", "-m", "verification", "--verification-rows", str(rows), "-rs"]
+        command += ["-n", "auto", "--dist", "loadfile"]
         status = subprocess.run(command, cwd=ROOT, check=False).returncode
         if status:
             print(f"{PAGE.name} is as it was: not every test passed", file=sys.stderr)

@@ -34,8 +34,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    if file := session.config.getoption("--verification-rows"):
-        session.config.stash[ROWS].write(file)
+    rows = session.config.stash[ROWS]
+    if hasattr(session.config, "workeroutput"):
+        # a process of pytest-xdist, which hands its rows to the one that it works for
+        session.config.workeroutput["verification"] = rows.as_dicts()
+    elif file := session.config.getoption("--verification-rows"):
+        rows.write(file)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: object) -> None:
+    rows = node.config.stash[ROWS]
+    rows.add_dicts(getattr(node, "workeroutput", {}).get("verification", []))
 
 
 ROWS = pytest.StashKey[Rows]()

@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,14 @@ class Rows:
     def add(self, row: Row) -> None:
         self.measurements.extend(row.measurements)
 
+    def as_dicts(self) -> list[dict[str, Any]]:
+        return [asdict(m) for m in self.measurements]
+
+    def add_dicts(self, rows: Iterable[dict[str, Any]]) -> None:
+        self.measurements.extend(Measurement(**row) for row in rows)
+
     def write(self, file: str) -> None:
-        Path(file).write_text(json.dumps([asdict(m) for m in self.measurements], indent=1), encoding="utf-8")
+        Path(file).write_text(json.dumps(self.as_dicts(), indent=1), encoding="utf-8")
 
 
 def worst(measurements: Iterable[Measurement]) -> list[Measurement]:

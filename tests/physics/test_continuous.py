@@ -32,10 +32,10 @@ BRANCHES = Viscoelasticity(moduli=(1.0, 2.0), times=(3.0, 40.0))
         (BRANCHES, ["moduli 1", "moduli 2", "times 1", "times 2"]),
         (Cavity(pressure=1.0), ["pressure"]),
         (Contact(nodes="a"), ["friction"]),
-        (Gravity(direction=(0, 0, -1), density=1000.0), DOWN),
+        (Gravity(direction=(0, 0, -1), density=1000.0), [*DOWN, "tissue_density"]),
         (
             Gravity(direction=(0, 0, -1), density=1000.0, csf_level=0.1),
-            [*DOWN, "csf_level"],
+            [*DOWN, "tissue_density", "csf_level"],
         ),
         (Resection(), []),
     ],

@@ -67,10 +67,10 @@ class Coregionalised:
         variance = np.diag(covariance) + self.parameters.noise[task_of(group)]
         return mean, np.sqrt(np.maximum(variance, 0.0))
 
-    def curve(self, group: str, stretches: ArrayLike, k: float = 0.0) -> Floats:
+    def curve(self, group: str, stretches: ArrayLike, k: ArrayLike = 0.0) -> Floats:
         """The curve `k` standard deviations from the mean, see `Process`."""
         mean, spread = self.log_energy(group, stretches)
-        return mean + k * spread
+        return mean + np.multiply.outer(np.asarray(k, dtype=np.float64), spread)
 
     def draw(self, groups: Sequence[str], stretches: ArrayLike, number: int | tuple[int, ...], seed: int = 0) -> Floats:
         """Draw `number` of a seed, see `Process`.

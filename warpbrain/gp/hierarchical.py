@@ -92,10 +92,11 @@ class Hierarchical:
         numbered = enumerate(map(task_of, groups))
         return _places([(-1 - index, -1, task, stretch, False) for index, task in numbered for stretch in l])
 
-    def curve(self, group: str, stretches: ArrayLike, k: float = 0.0) -> Floats:
+    def curve(self, group: str, stretches: ArrayLike, k: ArrayLike = 0.0) -> Floats:
         """The curve `k` standard deviations from the mean, see `Process`."""
         mean, covariance = self.modulus([group], stretches)
-        return log_energy(stretches, mean[0] + k * np.sqrt(np.diag(covariance)))
+        away = np.multiply.outer(np.asarray(k, dtype=np.float64), np.sqrt(np.diag(covariance)))
+        return log_energy(stretches, mean[0] + away)
 
     def draw(self, groups: Sequence[str], stretches: ArrayLike, number: int | tuple[int, ...], seed: int = 0) -> Floats:
         """Draw `number` of a seed, see `Process`."""

@@ -40,8 +40,8 @@ class Process(Protocol):
         """Groups that it has seen studies of."""
         ...
 
-    def curve(self, group: str, stretches: ArrayLike, k: float = 0.0) -> Floats:
-        """The curve `k` standard deviations from the mean (the paper's samples), shape of `stretches` (n,)."""
+    def curve(self, group: str, stretches: ArrayLike, k: ArrayLike = 0.0) -> Floats:
+        """Curves `k` standard deviations from the mean (the paper's samples), shape of `k` and `stretches` (..., n)."""
         ...
 
     def draw(self, groups: Sequence[str], stretches: ArrayLike, number: int | tuple[int, ...], seed: int = 0) -> Floats:

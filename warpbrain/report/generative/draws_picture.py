@@ -63,7 +63,7 @@ def draw_draws(model: Process, group: str | None = None, seed: int = 0) -> Any:
 def _draw(energy: Any, modulus: Any, model: Process, group: str, seed: int) -> None:
     low, high = page.stretches_of(model, group)
     l = page.sides(low, high, _NEAREST, _STEPS)
-    bands = [_energy(model.curve(group, l, k)) for k in (-page.MOST, -page.HALF, 0.0, page.HALF, page.MOST)]
+    bands = list(_energy(model.curve(group, l, (-page.MOST, -page.HALF, 0.0, page.HALF, page.MOST))))
     draws = [_energy(model.draw([group], l, number, seed)[0]) for number in range(_DRAWS)]
     far = np.where(l < 1.0, (1.0 - l) / (1.0 - low), (l - 1.0) / (high - 1.0)) >= _SHOWN
     # no line from one side to the other

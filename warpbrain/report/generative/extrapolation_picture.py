@@ -75,7 +75,7 @@ def _draw(axes: Any, model: Process, other: Process, group: str) -> None:
 
 def _curves(model: Process, group: str) -> list[Floats]:
     """Lower end of the band, mean and upper end, energies (n,) in Pa; a band may be hundreds of decades wide."""
-    return [np.exp(np.clip(model.curve(group, _STRETCHES, k), -500.0, 500.0)) for k in (-page.MOST, 0.0, page.MOST)]
+    return list(np.exp(np.clip(model.curve(group, _STRETCHES, (-page.MOST, 0.0, page.MOST)), -500.0, 500.0)))
 
 
 def _entries(model: Process, other: Process) -> list[tuple[Any, str]]:
