@@ -1,4 +1,6 @@
-"""What kinds of elements are worth: `python bench/elements.py [cpu|cuda:0] [cells ...]` writes results/elements_*.json.
+"""What kinds of elements are worth: `python bench/elements.py [cpu|cuda:0] [brain | cells ...]`, to results/elements_*.
+
+`brain` measures the first of three bodies alone, into a file of its own.
 
 A brain at nu = 0.45 (case 0529 as declared: its weight above the level of the fluid): how far the wall of its
 ventricles moves in the mean, on its own mesh and with every element cut into eight. Two bodies near incompressibility,
@@ -36,7 +38,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from taylor_hood import SHEAR_MODULUS, WEIGHT, block, clamped, taylor_hood_work
 
 DEVICE = sys.argv[1] if len(sys.argv) > 1 else "cpu"
-CELLS = [int(n) for n in sys.argv[2:]] or [8, 16, 32]
+BRAIN_ALONE = sys.argv[2:] == ["brain"]
+CELLS = [] if BRAIN_ALONE else [int(n) for n in sys.argv[2:]] or [8, 16, 32]
 POISSON = (0.49, 0.499)
 #: Of the block: points moved at random, along its height less one; and Poisson ratios.
 BLOCK_CELLS, BLOCK_POISSON = (3, 4, 6), (0.45, 0.49, 0.499, 0.4999)
@@ -152,7 +155,8 @@ def sink(elements: str, finer: bool) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    name = f"elements_{DEVICE.split(':')[0]}_{datetime.date.today().isoformat()}.json"
+    what = "elements_brain" if BRAIN_ALONE else "elements"
+    name = f"{what}_{DEVICE.split(':')[0]}_{datetime.date.today().isoformat()}.json"
     rows: list[dict[str, Any]] = []
 
     def keep(row: dict[str, Any]) -> None:
@@ -165,7 +169,7 @@ if __name__ == "__main__":
         keep(sink(elements, finer=False))
     for elements in ("tet4", "tet4-averaged"):
         keep(sink(elements, finer=True))
-    for n in BLOCK_CELLS:
+    for n in () if BRAIN_ALONE else BLOCK_CELLS:
         for poisson in BLOCK_POISSON:
             reference = taylor_hood_work(block(n), poisson)
             for elements in ELEMENTS:
