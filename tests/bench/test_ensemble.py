@@ -33,6 +33,7 @@ def test_every_time_is_written(monkeypatch, capsys, tmp_path):
         slots, best, faster, iterations, megabytes, bandwidth, _ = (float(word) for word in line.split())
         assert slots == measured["slots"] == measured["samples"] and measured["failed"] == 0
         assert best == pytest.approx(min(measured["milliseconds"]), abs=1e-4)
+        # as printed, with one decimal or, of bandwidth, none
         assert faster == pytest.approx(written["single_milliseconds"] / best, abs=0.06)
         assert iterations == pytest.approx(measured["cg_iterations"], abs=0.06)
         assert megabytes == pytest.approx(measured["bytes_per_step"] / 1e6, abs=0.06)

@@ -42,6 +42,7 @@ def test_cut_finds_the_surface_and_keeps_the_volume():
     assert volumes.sum() == pytest.approx(whole)
     assert labels.max() < len(tets)
     ball_points, ball = compact(points, tets[inside])
+    # discretisation: flat faces in edges of 0.2, for a radius of 0.6, leave out 3.6 %
     assert volumes[inside].sum() == pytest.approx(4 / 3 * np.pi * 0.6**3, rel=0.05)
     surface = np.unique(boundary_faces(ball))
     # nodes lie on the sphere, but for those that were so near that they were taken to be on it
@@ -74,7 +75,7 @@ def test_open_angles_opens_them_and_keeps_the_shape():
     after = open_angles(before, 20.0)
     assert dihedral_angles(after.points, tets).min() > 2 * dihedral_angles(points, tets).min()
     assert (signed_volumes(after.points, tets) > 0).all()
-    assert signed_volumes(after.points, tets).sum() == pytest.approx(signed_volumes(points, tets).sum(), rel=0.1)
+    assert signed_volumes(after.points, tets).sum() == pytest.approx(signed_volumes(points, tets).sum(), rel=1e-3)
 
 
 def test_individual_warp_is_smooth_repeatable_and_invertible():

@@ -256,7 +256,7 @@ def test_fields_keep_volumes(voxel, shape):
     found = {label: ((ruling == label) & inside & ~hollow).sum() * cell for label in (2, 3)}
     found[4] = (inside & hollow).sum() * cell
     for label, volume in found.items():
-        assert volume == pytest.approx(volume_of(label), rel=0.03)
+        assert volume == pytest.approx(volume_of(label), rel=0.01)
     assert min(fields.in_place.values()) > 0.9
     np.testing.assert_allclose(fields.sample(fields.body, CENTRE[None]), 1 + fields.body.min(), atol=1e-5)
 
@@ -290,18 +290,21 @@ def test_mesh_conforms_and_is_good(made):
     assert len(pinched_nodes(boundary_faces(made.tetrahedra))) == 0
     assert dihedral_angles(made.points, made.tetrahedra).min() > 15
     edges = np.diff(made.points[made.tetrahedra[:, [0, 1]]], axis=1)
-    assert np.linalg.norm(edges, axis=-1).mean() == pytest.approx(SIZE, rel=0.1)
+    # a size is asked of the lattice, which is cut at surfaces: 1.8 % off
+    assert np.linalg.norm(edges, axis=-1).mean() == pytest.approx(SIZE, rel=0.03)
 
 
 def test_mesh_has_the_volumes_of_the_labels(made):
     volumes = signed_volumes(made.points, made.tetrahedra)
     assert set(np.unique(made.tissue)) == {2, 3}
+    # discretisation: flat faces in edges of 14 mm, on layers of half axes of 46 mm, leave out 6.9 % of grey matter and
+    # 2.4 % of the whole
     for label in (2, 3):
         assert 1e-9 * volumes[made.tissue == label].sum() == pytest.approx(volume_of(label), rel=0.08)
-        assert 1e-9 * made.labelled[label] == pytest.approx(volume_of(label), rel=0.03)
+        assert 1e-9 * made.labelled[label] == pytest.approx(volume_of(label), rel=0.01)
     assert 1e-9 * volumes.sum() == pytest.approx(volume_of(2) + volume_of(3), rel=0.03)
     np.testing.assert_allclose(
-        np.average(made.points[made.tetrahedra].mean(axis=1), axis=0, weights=volumes), CENTRE, atol=1
+        np.average(made.points[made.tetrahedra].mean(axis=1), axis=0, weights=volumes), CENTRE, atol=0.15
     )
 
 
@@ -324,8 +327,9 @@ TILTED = np.array([[0.0, 0.8, 0.6], [1, 0, 0], [0, 0.6, -0.8]])
 def test_mesh_lies_where_the_affine_says(voxel, shape, turn, tmp_path):
     made = meshed(write_ellipsoids(tmp_path / "a.nii", voxel, shape, turn))
     lower, upper = made.points.min(axis=0), made.points.max(axis=0)
-    np.testing.assert_allclose((lower + upper) / 2, CENTRE, atol=1.5)
-    np.testing.assert_allclose((upper - lower) / 2, (48, 58, 46), atol=2.5)
+    # [mm], of voxels of 2 to 4 mm and edges of 14 mm: 0.3 and 0.6 off, and flat faces leave out 2.4 % of the volume
+    np.testing.assert_allclose((lower + upper) / 2, CENTRE, atol=0.6)
+    np.testing.assert_allclose((upper - lower) / 2, (48, 58, 46), atol=1.0)
     assert 1e-9 * signed_volumes(made.points, made.tetrahedra).sum() == pytest.approx(
         volume_of(2) + volume_of(3), rel=0.03
     )

@@ -108,7 +108,8 @@ def test_summary_says_what_was_made(started):
     for command in ("cases check", "cases show", "run --case"):
         assert f"warpbrain {command} {case.folder}" in text
     # what labels and mesh give is compared, and said where it is far off
-    assert case.labelled[2] == pytest.approx(volume_of(2), rel=0.03)
+    assert case.labelled[2] == pytest.approx(volume_of(2), rel=0.01)
+    # discretisation: a cavity as small as two edges of 14 mm, 24 % off
     assert case.cavity == pytest.approx(volume_of(4), rel=0.3)
     assert any(note.startswith("ventricle: ") for note in case.notes) == (
         abs(case.cavity / case.labelled_cavity - 1) > 0.1

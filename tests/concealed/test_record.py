@@ -46,7 +46,8 @@ def test_moduli_are_the_generative_model_s(whole):
     assert 532.1 <= tissue.moduli()[1] <= 2334.15
     assert 316.59 <= tissue.moduli()[2] <= 1212.35
     points = np.random.default_rng(0).uniform(-0.2, 0.2, (4000, 3))
-    assert tissue.field(points).std() == pytest.approx(tissue.field_sd, rel=0.15)
+    # a standard deviation of 4,000 numbers has a Monte Carlo error of 1.1 %, and more where they are near: 0.4 % off
+    assert tissue.field(points).std() == pytest.approx(tissue.field_sd, rel=0.02)
 
 
 def test_a_truth_comes_back_from_its_seal(whole):

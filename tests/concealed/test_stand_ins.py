@@ -53,7 +53,7 @@ def test_as_many_points_as_were_published(name):
 
 def test_motion_before_any_model_has_the_published_medians():
     motion = np.array([[rms(recording(name, wall)[1]) for wall in WALLS] for name in COUNTS])
-    np.testing.assert_allclose(1e3 * np.median(motion, axis=0), (1.37, 5.89), rtol=0.1)
+    np.testing.assert_allclose(1e3 * np.median(motion, axis=0), (1.37, 5.89), rtol=0.007)
     # eight individuals, not one
     assert (motion.std(axis=0) > 0.1 * motion.mean(axis=0)).all()
 
@@ -67,9 +67,9 @@ def test_every_point_is_in_the_mesh_or_beside_it(name, tissue):
         points, _ = recording(name, wall)
         place = locate(left.points, left.tetrahedra, points)
         assert (place.distance <= place.edge).all()
-        # and by its own wall
+        # and by its own wall: nearer to one of its nodes than an edge is long, at most 8.2 mm
         nodes = left.points[left.node_sets[ours]]
-        assert np.linalg.norm(points[:, None] - nodes[None], axis=2).min(axis=1).max() < 0.02
+        assert np.linalg.norm(points[:, None] - nodes[None], axis=2).min(axis=1).max() < 0.012
 
 
 @pytest.mark.parametrize("name", COUNTS)

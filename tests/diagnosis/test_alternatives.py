@@ -41,7 +41,7 @@ def test_a_surface_is_off_alike_where_it_is_near_and_turned_alike(sensors: Senso
     apart = np.linalg.norm(sensors.positions[wall][:, None] - sensors.positions[wall][None], axis=2)
     turned = 0.5 + 0.5 * sensors.directions[wall] @ sensors.directions[wall].T
     near = apart < 0.005
-    np.testing.assert_allclose(covariance[np.ix_(wall, wall)][near], turned[near], atol=0.1)
+    np.testing.assert_allclose(covariance[np.ix_(wall, wall)][near], turned[near], atol=1e-12)
 
 
 def test_a_force_may_be_wrong_in_size_and_direction_by_a_part_of_it(sensors: Sensors) -> None:

@@ -43,4 +43,4 @@ def test_a_fit_is_compared_as_where_it_was_fitted(small_diagnosis, kind):
     _, error = check_errors(
         replace(case, recordings=(beads, replace(beads, name="again", role="check"))), small_diagnosis.base, [fit]
     )
-    assert error == pytest.approx(np.sqrt(np.mean(fit.residual**2)), rel=0.02)
+    assert error == pytest.approx(np.sqrt(np.mean(fit.residual**2)), rel=1e-9)

@@ -48,7 +48,7 @@ def test_what_relaxes_is_found_with_its_times(diagnosed: tuple[str, Diagnosis]) 
     assert found.explained is not None
     [acting] = found.explained.mechanisms
     assert isinstance(acting, Viscoelasticity)
-    # they tell what has not relaxed at the recorded times, and next to nothing of what did before
+    # they tell what has not relaxed at the recorded times, and next to nothing of what did before: at most 0.083 off
     assert [_left(acting, time) for time in TIMES] == pytest.approx([_left(expected, time) for time in TIMES], abs=0.1)
     values = {value.name: value for value in found.ranking[0].values}
     together = values["moduli"]
@@ -66,9 +66,9 @@ def test_the_permeability_is_found_with_its_spread(diagnosed: tuple[str, Diagnos
     if cause != "drainage":
         pytest.skip("nothing flows")
     [value] = [value for value in found.ranking[0].values if value.name == "permeability"]
-    assert 0.0 < value.sd < 0.3 * PERMEABILITY
-    # steps in time are as coarse as the fit's own
-    assert abs(value.value - PERMEABILITY) < 0.3 * PERMEABILITY
+    assert 0.0 < value.sd < 0.1 * PERMEABILITY
+    # steps in time are as coarse as the fit's own: 7.3 % off, with a spread of 4.8 %
+    assert abs(value.value - PERMEABILITY) < 0.12 * PERMEABILITY
 
 
 def test_one_course_is_that_of_every_permeability(tmp_path) -> None:
@@ -80,7 +80,8 @@ def test_one_course_is_that_of_every_permeability(tmp_path) -> None:
     for pace in (0.1, 0.3, 1.0):
         other = states.solve(replace(hypothesis, mechanisms=(Drainage(permeability=pace * 1e-9),)))
         expected = other.sensors.computed - base.sensors.computed
-        assert np.linalg.norm(course.at(pace) - expected) < 0.05 * np.linalg.norm(expected)
+        # interpolated, and of other steps in time: at most 1.2 % off
+        assert np.linalg.norm(course.at(pace) - expected) < 0.02 * np.linalg.norm(expected)
 
 
 @pytest.fixture(scope="module")
@@ -113,8 +114,8 @@ def test_what_relaxes_moves_less_as_its_times_say(relaxing: tuple[Base, Candidat
         for mechanisms in ((), (proposal.make(np.array(c)),))
     )
     expected = acting.sensors.computed - without.sensors.computed
-    # creep is a little slower than relaxation
-    assert np.linalg.norm(effect.mean - expected) < 0.1 * np.linalg.norm(expected)
+    # creep is a little slower than relaxation: at most 2.2 % off
+    assert np.linalg.norm(effect.mean - expected) < 0.04 * np.linalg.norm(expected)
 
 
 def test_a_course_holds_all_recorded_times_at_all_paces(small_diagnosis: Diagnosis) -> None:

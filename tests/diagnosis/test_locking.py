@@ -34,7 +34,8 @@ def test_it_is_known_of_tissue_that_is_less_compressible(base: Base) -> None:
     said = known.with_tissue(here.theta, volume, base.prior)
     grown = np.linalg.norm(solved.u - known.own.u)
     assert grown > 0.02 * np.linalg.norm(known.own.u)
-    assert np.linalg.norm(said.u - solved.u) < 0.25 * grown
+    # taken as linear in the logarithm of bulk moduli: 4.1 % off
+    assert np.linalg.norm(said.u - solved.u) < 0.06 * grown
 
 
 def test_the_candidate_changes_what_the_nuisance_does(base: Base) -> None:

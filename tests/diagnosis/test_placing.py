@@ -58,7 +58,8 @@ def test_a_place_is_found_between_sites(refit):
     stage, centre, best, effect = refit
     where, _ = effect.proposed.place(effect.coefficients(begun(stage, effect)))
     off = np.linalg.norm(where - centre)
-    assert off < 0.005
+    # what noise leaves open: at most 1.6 mm off
+    assert off < 0.003
     assert off <= np.linalg.norm(best.proposed.centre - centre) + 1e-4
 
 
@@ -82,7 +83,7 @@ def test_its_columns_are_what_moving_it_changes(refit):
             changes.append(stage.candidates.makes.of([beside])[0])
         first = [one.mean + one.columns @ z[:count] for one in changes]
         slope = (first[1] - first[0]) / 0.04
-        assert np.linalg.norm(slope - effect.columns[:, k]) < 0.05 * np.linalg.norm(slope)
+        assert np.linalg.norm(slope - effect.columns[:, k]) < 1e-3 * np.linalg.norm(slope)
 
 
 def test_what_is_said_of_it_are_its_amount_its_centre_and_its_radius(refit):

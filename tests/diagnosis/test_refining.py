@@ -26,9 +26,9 @@ def test_a_patch_is_found_between_places(stage):
     assert effect.columns.shape[1] == 4 and found.unresolved.shape == (len(stage.residual), 3)
     begin = linear_point(stage.explanation, stage.residual, stage.explanation.nuisances, effect, 1.0)
     centre, radius = effect.proposed.place(effect.coefficients(begin[-4:]))
-    # of a mesh with edges of 12 mm
-    assert np.linalg.norm(centre - CENTRE) < 0.006
-    assert radius == pytest.approx(RADIUS, rel=0.25)
+    # of a mesh with edges of 12 mm, which neither resolves: 1.2 mm and 3.4 mm, 13 %, off
+    assert np.linalg.norm(centre - CENTRE) < 0.0025
+    assert radius == pytest.approx(RADIUS, rel=0.2)
     scanned = stage.screen.places[number, 0] + stage.screen.none[0]
     white = stage.explanation.whitened(stage.residual)[:, None]
     assert StackEvidence(stage.explanation, stage.explanation.stack([effect])).log_places(white)[0, 0] > scanned - 1.0

@@ -97,6 +97,7 @@ def test_it_is_the_mean_over_all_hypotheses(proposals, recorded):
         proposal = next(one for one in proposals if len(one) == size and np.exp(one.mean[1]) > 2.0)
         z = np.array([1.2, *np.full(size - 1, 0.2)])
         amount, spread = amount_in_all(effects, _fit(proposal, recorded, z), 0, factor)
-        assert np.log(amount) == pytest.approx(mean, abs=0.25 * sd)
-        assert spread / amount == pytest.approx(sd, rel=0.2)
+        # Monte Carlo error of both, which draw: 0.007 standard deviations and 2.1 % apart
+        assert np.log(amount) == pytest.approx(mean, abs=0.015 * sd)
+        assert spread / amount == pytest.approx(sd, rel=0.04)
         assert abs(amount - true) < 2.0 * spread

@@ -52,7 +52,8 @@ def test_standardised_rows_have_the_length_that_detectability_counts(virtual, ka
     own = explanation.standardised(rows, kappa)
     np.testing.assert_allclose(own.T @ own, rows.T @ explanation.precision_times(rows, kappa), rtol=1e-9, atol=1e-9)
     drawn = explanation.standardised(explanation.draws(20_000, kappa, np.random.default_rng(4)), kappa)
-    np.testing.assert_allclose(np.cov(drawn), np.eye(N), atol=0.06)
+    # Monte Carlo error of 20,000 draws: 0.007, on the diagonal 0.010; the largest of all is 0.026
+    np.testing.assert_allclose(np.cov(drawn), np.eye(N), atol=0.04)
 
 
 def test_evidence_is_that_of_screening_at_one_factor(virtual):

@@ -96,15 +96,15 @@ def test_displacements_that_displacements_cause_tell_ratios_only() -> None:
     assert verdict.hidden == ("a change of the shear moduli of grey and white by one factor",)
     assert any("Absolute stiffness cannot be told" in sentence for sentence in verdict.sentences)
     ratio = np.diff(np.log(moduli(posterior)))
-    assert ratio == pytest.approx(np.log(1.0 / 1.37), abs=0.1)
+    assert ratio == pytest.approx(np.log(1.0 / 1.37), abs=0.006)
     # the mean of both is the prior's
     both = posterior.covariance.sum()
-    assert both == pytest.approx(posterior.prior.covariance.sum(), rel=0.15)
+    assert both == pytest.approx(posterior.prior.covariance.sum(), rel=0.01)
     # one recorded force, and both are told
     weighed = replace(seen, recordings=(*seen.recordings, scale(case, result, "plate", sigma=1e-3)))
     told = found(weighed)
     assert not told.identifiability.hidden and not told.identifiability.scale_is_hidden
-    np.testing.assert_allclose(moduli(told), [1370.0, 1000.0], rtol=0.05)
+    np.testing.assert_allclose(moduli(told), [1370.0, 1000.0], rtol=0.004)
 
 
 def test_one_tissue_moved_by_displacements_is_not_identifiable() -> None:
@@ -112,7 +112,7 @@ def test_one_tissue_moved_by_displacements_is_not_identifiable() -> None:
     posterior = found(replace(case, recordings=(beads(truth(case)),)))
     assert posterior.identifiability.nothing and posterior.identifiability.scale_is_hidden
     assert "no finding" in posterior.identifiability.sentences[0]
-    assert abs(posterior.marginals[0].shrinkage) < 0.05
+    assert abs(posterior.marginals[0].shrinkage) < 1e-6
 
 
 def test_points_that_cannot_move_pin_nothing() -> None:
@@ -128,7 +128,7 @@ def test_a_fifth_of_gross_errors_is_found_and_does_not_count() -> None:
     wrong = recording.displacement.copy()
     wrong[::5] += 0.01 * np.random.default_rng(3).normal(size=wrong[::5].shape)
     posterior = found(replace(case, recordings=(replace(recording, displacement=wrong),)))
-    np.testing.assert_allclose(moduli(posterior), 1000.0, rtol=0.05)
+    np.testing.assert_allclose(moduli(posterior), 1000.0, rtol=0.006)
     assert posterior.predictions[0].gross[::5].all() and posterior.predictions[0].gross.sum() <= 13
 
 
@@ -145,7 +145,8 @@ def test_noise_that_is_not_given_is_estimated() -> None:
     posterior = found(replace(case, recordings=(beads(truth(case), count=300, noise=1e-4, sigma=None),)), EXACT)
     # three standard deviations of the estimate from 900 numbers
     assert posterior.predictions[0].sigma[0] == pytest.approx(1e-4, rel=0.08)
-    np.testing.assert_allclose(moduli(posterior), 1000.0, rtol=0.05)
+    # what noise leaves open: 0.8 % off
+    np.testing.assert_allclose(moduli(posterior), 1000.0, rtol=0.015)
 
 
 def test_a_wrong_registration_is_found_along_with_the_tissue() -> None:

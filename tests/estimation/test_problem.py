@@ -67,7 +67,7 @@ def test_nuisances_are_at_their_best_and_integrated_out(problem: Problem) -> Non
     misfit, best = problem.without_nuisances(state, problem.nuisances.mean)
     gradient = problem.linearise(best).gradient[2:]
     size = np.sqrt(np.diag(problem.linearise(best).hessian)[2:])
-    assert np.abs(gradient / size).max() < 0.02
+    assert np.abs(gradient / size).max() < 1e-4
     other, _ = problem.without_nuisances(state, VALUES)
     assert other == pytest.approx(misfit, abs=1e-3)
 
@@ -113,6 +113,7 @@ def test_sigma_is_the_standard_deviation_of_normal_noise(verify) -> None:
     )
     residuals[:400] *= 30.0
     [weighed] = Likelihood().weigh([many], [residuals])
+    # one row of fifty is a gross error: 2.9 % off
     assert weighed.sigma[0] == pytest.approx(3e-4, rel=0.05)
 
 

@@ -19,7 +19,8 @@ MEAN, DEVIATION = np.array([1.0, -2.0]), np.array([0.5, 0.1])
 def test_the_shape_of_a_pareto_tail(k: float) -> None:
     x = np.sort(genpareto.rvs(k, scale=2.0, size=5000, random_state=1))
     found, sigma = generalised_pareto(x)
-    assert found == pytest.approx(k, abs=0.06) and sigma == pytest.approx(2.0, rel=0.08)
+    # Monte Carlo error of 5,000 draws: at most (1 + k) / sqrt(5000) = 0.027 and 2.8 %; 0.028 and 1.6 % off
+    assert found == pytest.approx(k, abs=0.04) and sigma == pytest.approx(2.0, rel=0.03)
 
 
 def test_weights_that_are_alike_are_trusted_and_one_that_is_all_is_not() -> None:
@@ -56,15 +57,17 @@ def proposal() -> Proposal:
 def test_weighted_draws_have_the_moments_of_what_weighs_them(proposal: Proposal) -> None:
     found = importance_sampling(Known(), proposal, 4000, np.random.default_rng(0))
     assert found.smoothed.k < 0.5 and found.smoothed.effective > 2000
-    np.testing.assert_allclose((found.mean - MEAN) / DEVIATION, 0.0, atol=0.06)
-    np.testing.assert_allclose(found.standard_deviations, DEVIATION, rtol=0.06)
+    # Monte Carlo error of 3,500 independent draws: 0.017 and 1.2 %; 0.012 and 0.9 % off
+    np.testing.assert_allclose((found.mean - MEAN) / DEVIATION, 0.0, atol=0.025)
+    np.testing.assert_allclose(found.standard_deviations, DEVIATION, rtol=0.02)
 
 
 def test_a_chain_has_the_moments_of_its_target(proposal: Proposal) -> None:
     chain = run_chain(Known(), proposal, MEAN, 4000, np.random.default_rng(0))
     assert chain.solves == 4000 and chain.effective.min() > 500 and 0.3 < chain.accepted < 1.0
-    np.testing.assert_allclose((chain.theta.mean(axis=0) - MEAN) / DEVIATION, 0.0, atol=0.1)
-    np.testing.assert_allclose(chain.theta.std(axis=0), DEVIATION, rtol=0.08)
+    # Monte Carlo error of 500 independent draws: 0.045 and 3.2 %; 0.034 and 4.5 % off
+    np.testing.assert_allclose((chain.theta.mean(axis=0) - MEAN) / DEVIATION, 0.0, atol=0.06)
+    np.testing.assert_allclose(chain.theta.std(axis=0), DEVIATION, rtol=0.06)
 
 
 def test_independent_draws_of_a_chain() -> None:
@@ -72,7 +75,7 @@ def test_independent_draws_of_a_chain() -> None:
     x = np.zeros(20_000)
     for k in range(1, len(x)):
         x[k] = 0.9 * x[k - 1] + rng.normal()
-    # (1 - rho) / (1 + rho)
-    assert effective_size(x) == pytest.approx(len(x) / 19.0, rel=0.2)
-    assert effective_size(rng.normal(size=5000)) == pytest.approx(5000, rel=0.15)
+    # (1 - rho) / (1 + rho), of autocorrelations that are estimated from one chain: 10 % off
+    assert effective_size(x) == pytest.approx(len(x) / 19.0, rel=0.15)
+    assert effective_size(rng.normal(size=5000)) == pytest.approx(5000, rel=0.01)
     assert effective_size(np.ones(10)) == 1.0

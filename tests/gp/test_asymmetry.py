@@ -91,6 +91,7 @@ def test_draws_respect_what_papers_show(group):
     assert 0.02 < found.tension < 0.3 and (1.0 - found.tension) ** 5 > 1.0 / 6.0
     assert beta.ppf(0.975, 1, 5) > found.tension
     low, high = np.quantile(drawn, [0.025, 0.975])
+    # Monte Carlo error of the outermost quantiles of 600 draws: at most 0.18 off
     assert (low, high) == pytest.approx((found.new_low, found.new_high), abs=0.25)
     # what every paper published is within
     papers = asymmetries_of_papers(read_studies("corrected"))
@@ -138,7 +139,7 @@ def test_mean_asymmetry_against_a_regression():
     V = REST**2 * np.eye(len(modulus)) + 0.04 * np.outer(sides, sides) * (places.source[:, None] == places.source)
     inverse = np.linalg.inv(x.T @ np.linalg.solve(V, x))
     np.testing.assert_allclose(mean, (inverse @ x.T @ np.linalg.solve(V, modulus))[:2], atol=2e-3)
-    np.testing.assert_allclose(covariance, inverse[:2, :2], rtol=2e-2, atol=1e-5)
+    np.testing.assert_allclose(covariance, inverse[:2, :2], rtol=1e-4, atol=1e-7)
 
 
 @pytest.mark.slow

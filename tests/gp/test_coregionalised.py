@@ -71,7 +71,8 @@ def test_draws_scatter_as_the_model_says_and_are_functions():
     for i, group in enumerate(groups):
         mean, spread = model.log_energy(group, stretches)
         assert np.all(np.abs(drawn[:, i].mean(axis=0) - mean) < 4 * spread / np.sqrt(400))
-        np.testing.assert_allclose(drawn[:, i].std(axis=0), spread, rtol=0.15)
+        # Monte Carlo error of 400 draws: 1 / sqrt(800) = 3.5 %; 2.3 % off
+        np.testing.assert_allclose(drawn[:, i].std(axis=0), spread, rtol=0.04)
     finer = model.draw(groups, np.linspace(0.9, 1.1, 41), 7)[:, ::10]
     np.testing.assert_allclose(finer, model.draw(groups, stretches, 7), atol=1e-6)
 

@@ -21,7 +21,7 @@ def test_without_sides_it_is_scotts():
     at = samples[:20] + 0.1
     expected = gaussian_kde(samples.T).logpdf(at.T)
     # SciPy divides the covariance by n - 1
-    np.testing.assert_allclose(found.log_density(at), expected, atol=0.02)
+    np.testing.assert_allclose(found.log_density(at), expected, atol=0.0025)
 
 
 @pytest.mark.parametrize("samples", [np.random.default_rng(1).beta(0.3, 0.2, 500), np.ones(50), np.zeros(50)])

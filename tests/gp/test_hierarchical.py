@@ -54,7 +54,7 @@ def test_the_shipped_one_is_at_the_top():
     model = trained()
     hierarchy, fitted = fit_hierarchy(observations(model.studies), first=model.hierarchy)
     assert fitted.converged and fitted.condition < 1e12
-    np.testing.assert_allclose(hierarchy.to_vector(), model.hierarchy.to_vector(), atol=0.05)
+    np.testing.assert_allclose(hierarchy.to_vector(), model.hierarchy.to_vector(), atol=1e-3)
 
 
 def test_elastography_and_linear_studies_count_once():
@@ -77,7 +77,7 @@ def test_many_studies_that_agree_outweigh_the_prior():
     studies = tuple(neo_hookean(f"a-Author{2000 + i}", GREY, 700.0) for i in range(12))
     hierarchy, _ = fit_hierarchy(observations(studies))
     mean, covariance = Hierarchical(studies, hierarchy).modulus([GREY], np.array([0.95, 1.05]))
-    assert mean == pytest.approx(np.log(700.0), abs=0.05)
+    assert mean == pytest.approx(np.log(700.0), abs=0.01)
     # of the mean of both sides: of their difference neo-Hookean studies say nothing
     assert np.sqrt(covariance.mean()) < 0.5 < np.sqrt(covariance[0, 0])
 
@@ -98,9 +98,10 @@ def test_draws_have_the_mean_spread_and_correlation_of_the_model():
     mean, covariance = model.modulus([GREY, WHITE], stretches)
     spread = np.sqrt(np.diag(covariance))
     assert np.all(np.abs(drawn.mean(axis=0) - mean.ravel()) < 4 * spread / np.sqrt(600))
+    # Monte Carlo error of 600 draws: some 3 % and 0.03; of these 9.1 % and 0.07, of other seeds at most 3.4 % and 0.03
     np.testing.assert_allclose(drawn.std(axis=0), spread, rtol=0.12)
     expected = covariance / np.outer(spread, spread)
-    np.testing.assert_allclose(np.corrcoef(drawn.T), expected, atol=0.12)
+    np.testing.assert_allclose(np.corrcoef(drawn.T), expected, atol=0.1)
     # grey and white matter of one subject go together
     assert expected[0, 4] > 0.4
 
@@ -163,7 +164,7 @@ def test_the_overall_level_is_not_pulled_to_the_centre():
     studies = tuple(neo_hookean(f"a-Author{2000 + i}", GREY, 4e4) for i in range(6))
     hierarchy, _ = fit_hierarchy(observations(studies))
     mean, _ = Hierarchical(studies, hierarchy).modulus([GREY], np.array([0.95]))
-    assert mean[0, 0] == pytest.approx(np.log(4e4), abs=0.15) and np.exp(CENTRE) == pytest.approx(1500.0)
+    assert mean[0, 0] == pytest.approx(np.log(4e4), abs=1e-3) and np.exp(CENTRE) == pytest.approx(1500.0)
 
 
 def test_a_study_of_a_paper_that_is_known_is_known_better():

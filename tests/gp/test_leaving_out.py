@@ -130,7 +130,8 @@ def test_levels_are_those_of_the_curves_that_a_model_draws(candidate):
         values = {"mu": (mu,), "alpha": (2.0,)}  # neo-Hookean in a form that need not be
         study = Study("a-Nobody2030", GREY, "ogden", values, values, (0.9, 1.1))
         level = np.log(study.energy(at) + 1e-4).mean()
-        assert fitted.level_pit([study], [at]) == pytest.approx(np.mean(drawn < level), abs=0.04)
+        # Monte Carlo error of 2,000 draws: at most 0.008; 0.005 off
+        assert fitted.level_pit([study], [at]) == pytest.approx(np.mean(drawn < level), abs=0.01)
 
 
 def test_the_level_of_a_paper_is_that_of_all_its_studies():

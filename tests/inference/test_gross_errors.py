@@ -43,8 +43,8 @@ def test_density_and_odds_are_those_of_the_sum_written_out(bad: tuple[int, ...])
         residual[POINTS[point]] += 15.0 * random.normal(size=3)
     found = with_gross_errors(one, residual, POINTS, PRIOR)
     log_density, probability = sum_written_out(one, residual)
-    assert found.log_density == pytest.approx(log_density, abs=0.02)
-    np.testing.assert_allclose(1.0 / (1.0 + np.exp(-found.log_odds)), probability, atol=0.03)
+    assert found.log_density == pytest.approx(log_density, abs=1e-6)
+    np.testing.assert_allclose(1.0 / (1.0 + np.exp(-found.log_odds)), probability, atol=1e-6)
     assert set(np.flatnonzero(found.log_odds > 0.0).tolist()) == set(bad)
 
 

@@ -57,7 +57,8 @@ def test_solution(preconditioner: str, precision: Precision, device: str) -> Non
     assert np.linalg.norm(x - expected) <= 1e3 * tolerance * np.linalg.norm(expected)
     residual = np.linalg.norm(A @ x.ravel() - b.ravel())
     assert residual <= 2.0 * tolerance * np.linalg.norm(b)
-    assert result.residual == pytest.approx(residual, rel=1.0 if precision is DOUBLE else 10.0)
+    # it is carried along from step to step, and rounding adds up: 0.05 % off, in single precision 16 %
+    assert result.residual == pytest.approx(residual, rel=2e-3 if precision is DOUBLE else 0.3)
 
 
 def test_preconditioners_help(device: str) -> None:

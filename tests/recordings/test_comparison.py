@@ -115,7 +115,8 @@ def test_noise():
     points = rng.uniform(0.02, 0.08, (20000, 3))
     noisy = locate(MESH.points, MESH.tetrahedra, points).interpolate(U) + 0.001 * rng.normal(size=points.shape)
     compared = compare_points(points_of(noisy, points=points, sigma=0.001), MESH, U)
-    assert compared.after.root_mean_square == pytest.approx(compared.noise, rel=0.02)
+    # Monte Carlo error of 60,000 numbers: 0.3 %
+    assert compared.after.root_mean_square == pytest.approx(compared.noise, rel=0.005)
     surface = replace(surface_of(U), sigma=0.001)
     assert compare_surface(surface, MESH, U).noise == 0.001
 

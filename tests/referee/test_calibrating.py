@@ -26,9 +26,10 @@ def ballots(cases, kinds=9, seed=0):
 
 def test_the_right_scale_is_found():
     found = fit(ballots(3000))
-    assert found.temperature == pytest.approx(TRUE.temperature, rel=0.06)
-    assert found.unknown == pytest.approx(TRUE.unknown, abs=0.6)
-    assert found.alternative == pytest.approx(TRUE.alternative, abs=0.6)
+    # Monte Carlo error of 3,000 truths: 2.9 %, 0.12 and 0.17 off
+    assert found.temperature == pytest.approx(TRUE.temperature, rel=0.05)
+    assert found.unknown == pytest.approx(TRUE.unknown, abs=0.25)
+    assert found.alternative == pytest.approx(TRUE.alternative, abs=0.3)
 
 
 def test_intervals_hold_the_right_scale_and_held_out_probabilities_are_right():
@@ -51,7 +52,8 @@ def test_the_threshold_of_the_alarm_by_hand():
     assert conformal(p[:18], 0.05) is None
     random = np.random.default_rng(0)
     false = [random.random() < conformal(random.random(39).tolist(), 0.05) for _ in range(4000)]
-    assert np.mean(false) == pytest.approx(0.05, abs=0.012)
+    # Monte Carlo error of 4,000 alarms: 0.0034; 0.002 off
+    assert np.mean(false) == pytest.approx(0.05, abs=0.005)
 
 
 def rows(**evidence):

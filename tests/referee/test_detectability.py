@@ -43,7 +43,8 @@ def test_columns_are_those_of_full_equilibria(known):
         found = balance(other, base.u)
         full = Change((found.u - base.u)[None], _cap_force(other, found.u) - _cap_force(problem, base.u))
         rows = sight.rows(full.times(1.0 / step))
-        np.testing.assert_allclose(sight.rows(unknowns.tissues[k]), rows, atol=0.06 * np.abs(rows).max())
+        # a difference over a step of 2 % is of first order: at most 1.3 % off
+        np.testing.assert_allclose(sight.rows(unknowns.tissues[k]), rows, atol=0.02 * np.abs(rows).max())
 
 
 def test_what_is_not_known_does_not_stand_out(known):

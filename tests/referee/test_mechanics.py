@@ -132,7 +132,8 @@ def test_creep_goes_from_the_stiff_answer_to_the_soft_one():
     end = balance(problem).u[:, 2].min()
     times = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 64.0]
     found = [b.u[:, 2].min() for b in creep(problem, [(1.0, 1.0)], times)]
-    # a solid of equal branches creeps in twice the time it relaxes in: u = end (1 - exp(-t/2) / 2), nearly linear here
+    # a solid of equal branches creeps in twice the time it relaxes in: u = end (1 - exp(-t/2) / 2), nearly linear here:
+    # 0.016 off
     assert found[0] > found[3] > found[-1]
     assert found[-1] == pytest.approx(end, rel=1e-3)
-    assert found[3] / end == pytest.approx(1.0 - 0.5 * np.exp(-1.0), abs=0.03)
+    assert found[3] / end == pytest.approx(1.0 - 0.5 * np.exp(-1.0), abs=0.025)

@@ -69,7 +69,8 @@ def test_cook(poisson: float, elements: str) -> None:
     found = estimate(state, elements, solve, prolongation(ends, len(mesh.points)))
     tip = int(np.argmin(np.linalg.norm(mesh.points - [48.0, 52.0, 1.0], axis=1)))
     error = TRUTH[poisson] - state.u[tip, 1]
-    assert 0.9 < found.u[tip, 1] / error < 1.05
+    # what one finer mesh does not show: 5.1 %, 0.4 % and 0.7 % too small
+    assert 0.93 < found.u[tip, 1] / error < 1.02
     if elements == "tet4":
         assert 0.7 < found.locking_share < 0.95
     else:
@@ -118,7 +119,8 @@ def test_thick_sphere(n: int) -> None:
     def radial(u: np.ndarray) -> float:
         return float(np.mean(np.sum(u[inner] * mesh.points[inner], axis=1)))
 
-    assert 0.75 < radial(found.u) / (radial(truth) - radial(state.u)) < 1.1
+    # truth is extrapolated from two finer meshes, the estimate from one: 20 % and 13 % too small
+    assert 0.75 < radial(found.u) / (radial(truth) - radial(state.u)) < 1.0
 
 
 # -- cases ------------------------------------------------------------------------------------------------------------
@@ -158,7 +160,7 @@ def test_a_block_of_48_elements(tmp_path, poisson: float) -> None:
     error = levels[1] + (levels[1] - levels[0]) / 3.0 - result.u
     assert np.linalg.norm(error) > 0.8 * np.linalg.norm(result.u)
     assert 0.9 < np.linalg.norm(found.u) / np.linalg.norm(error) < 1.2
-    # not only as large: the same vectors
+    # not only as large: the same vectors, to 18 % and 22 %, which is the error of an estimate from meshes this coarse
     assert np.linalg.norm(found.u - error) < 0.25 * np.linalg.norm(error)
 
 

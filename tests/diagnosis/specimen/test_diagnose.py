@@ -105,7 +105,8 @@ def test_a_viscous_rod_is_told_by_its_cycles():
     found = diagnosed(tests)
     assert found.verdict == "named" and [one.kind for one in found.named] == ["viscoelasticity"]
     values = {one.name: one for one in found.named[0].values}
-    assert values["moduli"].value == pytest.approx(1.5, rel=0.2)
+    # what noise of 1 % of the peak, and of 2 % that neighbours share, leaves open: 10 % and 14 % off
+    assert values["moduli"].value == pytest.approx(1.5, rel=0.15)
     assert values["times"].value == pytest.approx(12.0, rel=0.2)
     assert found.where is not None and found.where.time is not None
 

@@ -131,6 +131,7 @@ def test_cortex_in_compression_has_the_stress_that_was_measured():
 
 
 def test_row_41_was_too_stiff():
+    # as written, with one decimal
     assert ratio(41, 0.6, 1.4) == pytest.approx([1.6, 2.1], abs=0.06)
     assert CORRECTED[41].shear_moduli[0] == pytest.approx(333.28)
     assert PUBLISHED[41].shear_moduli[0] == pytest.approx(613.0)
@@ -138,6 +139,7 @@ def test_row_41_was_too_stiff():
 
 def test_row_50_was_5_to_21_times_too_stiff():
     low, high = ratio(50, 0.7, 1.3)
+    # as written, with one decimal
     assert low == pytest.approx(5.1, abs=0.05)
     assert 21.0 < high < 22.0
     assert CORRECTED[50].shear_moduli[0] == pytest.approx(960.0)

@@ -236,7 +236,7 @@ def test_it_slides_in_motion_too(device):
     system = System(model_of_case(case)[0], device)
     expected = solve_equilibrium(system).u
     relax_to_rest(system)
-    assert np.abs(system.u.numpy() - expected).max() < 0.03 * np.abs(expected).max()
+    assert np.abs(system.u.numpy() - expected).max() < 1e-4 * np.abs(expected).max()
 
 
 def test_a_body_within_a_given_sphere_moves_up_to_it(device):

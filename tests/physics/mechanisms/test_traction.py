@@ -76,8 +76,8 @@ def test_a_round_body_is_pressed_as_by_a_ball_alone():
     near = np.linalg.norm(ball.points[ball.faces] - centre, axis=2).min(axis=1) < RADIUS
     found = patch_around(ball.points, ball.faces, centre, RADIUS)
     assert set(np.flatnonzero(near)) <= set(found.tolist())
-    # those that only touch the ball in their middle besides
-    assert len(found) - near.sum() < 0.2 * near.sum()
+    # those that only touch the ball in their middle besides: none of 46 here
+    assert len(found) - near.sum() < 0.05 * near.sum()
     assert len(patch_around(ball.points, ball.faces, (0.0, 0.0, 0.0), 0.05)) == 0
 
 
@@ -91,7 +91,7 @@ def test_the_nearest_points_of_triangles():
     others = random.dirichlet((0.5, 0.5, 0.5), 4000)
     least = np.linalg.norm(np.einsum("pc,kci->kpi", others, corners), axis=2).min(axis=1)
     assert np.all(found <= least + 1e-12)
-    assert np.abs(found - least).max() < 0.1
+    assert np.abs(found - least).max() < 4e-3
 
 
 @pytest.mark.parametrize("name", ["phantom", "0529"])

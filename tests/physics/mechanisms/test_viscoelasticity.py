@@ -86,7 +86,7 @@ def test_stress_is_the_hereditary_integral_to_second_order(strain, rate):
         found = stress_over(times, np.array([strain(t) for t in times]))
         errors.append(np.abs(found[-1] - expected).max() / np.abs(expected).max())
     assert errors[1] < 3e-3
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=1e-3)
 
 
 def test_a_step_has_a_potential_and_its_tangent_is_the_slope_of_its_forces():
