@@ -1,7 +1,7 @@
-"""Makes docs/verification.md: `python docs/make_verification.py`.
+"""Makes docs/verification.md: `python docs/make_verification.py [--without-slow]`.
 
-Runs every test that compares with an independent reference, slow ones included, and writes what they measured. If one
-of them fails the page stays as it was.
+Runs every test that compares with an independent reference and writes what they measured. If one of them fails the page
+stays as it was. Without the slow ones their rows are missing, and the page says so.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from verification_page import page  # noqa: E402
 from verification_rows import Measurement  # noqa: E402
 
 PAGE = ROOT / "docs" / "verification.md"
+WITHOUT_SLOW = "--without-slow" in sys.argv[1:]
 #: What computes, and what it is compared with.
 PACKAGES = ("warp-lang", "numpy", "scipy", "felupe", "scikit-fem", "mpmath")
 
@@ -32,7 +33,8 @@ def main() -> int:
     """Run the tests and write the page; returns the exit status of pytest."""
     with tempfile.TemporaryDirectory() as folder:
         rows = Path(folder) / "rows.json"
-        command = [sys.executable, "-m", "pytest", "-m", "verification", "--verification-rows", str(rows), "-rs"]
+        which = "verification and not slow" if WITHOUT_SLOW else "verification"
+        command = [sys.executable, "-m", "pytest", "-m", which, "--verification-rows", str(rows), "-rs"]
         command += ["-n", "auto", "--dist", "loadfile"]
         status = subprocess.run(command, cwd=ROOT, check=False).returncode
         if status:
@@ -53,7 +55,7 @@ def made() -> dict[str, str]:
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "commit": _commit(),
         "versions": ", ".join(f"{name} {value}" for name, value in known.items()),
-    }
+    } | ({"left out": "tests marked slow (`python -m pytest -m 'verification and slow'`)"} if WITHOUT_SLOW else {})
 
 
 def _version(package: str) -> str:

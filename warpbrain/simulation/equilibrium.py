@@ -27,9 +27,6 @@ from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
 
-#: Rounding errors in the forces of an element, in units of the last place of its stiffest modulus.
-_ROUNDINGS = 20.0
-
 
 @dataclass(frozen=True)
 class NewtonStep:
@@ -194,7 +191,7 @@ class EquilibriumSolver:
         self.tolerance = max(self.options.tolerance, 50.0 * system.precision.epsilon)
         # force and energy of the order of rounding, so that a body without any load is in equilibrium
         stiffest = max(m.law.shear_modulus + abs(m.volumetric_modulus) for m in system.model.materials.values())
-        self._noise = _ROUNDINGS * system.precision.epsilon * stiffest * system.model.mesh.volume ** (2.0 / 3.0)
+        self._noise = system.precision.epsilon * stiffest * system.model.mesh.volume ** (2.0 / 3.0)
         self._energy_noise = system.precision.epsilon * stiffest * system.model.mesh.volume
 
     def solve(self, external: Floats | None = None, start: Floats | None = None) -> Equilibrium:
