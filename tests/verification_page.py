@@ -35,7 +35,7 @@ INTRODUCTION = """\
 # Verification
 
 Numbers that this code did not make, and how far it is from them. Every row is a test; this page is made by
-`python docs/make_verification.py`, which runs all of them and writes what they measured: the error that is nearest to
+`python docs/make_verification.py`, which runs them and writes what they measured: the error that is nearest to
 its bound, where a test does the same for several laws, elements or devices. An error without a unit is relative.
 """
 
