@@ -259,13 +259,28 @@ class Model:
         unit_forces : sequence of arrays, optional
             Others in the place of `unit_forces`, such as their derivatives.
         """
-        nodes = self.quadratic or self.mesh
         total = np.zeros(self.constrained.shape)
-        part = self.remaining_part([mechanism.factor(time) for mechanism in self.emptying])[:, None, None]
-        for load, forces in zip(self.loads, self.unit_forces if unit_forces is None else unit_forces, strict=True):
-            at_nodes = summed_at_nodes(nodes, part * forces) if isinstance(load, BodyForce) else forces
-            total += load.factor(time) * at_nodes
+        if unit_forces is None and not self.emptying:
+            at_nodes = self._whole_forces
+        else:
+            part = self.remaining_part([mechanism.factor(time) for mechanism in self.emptying])
+            at_nodes = self._at_nodes(self.unit_forces if unit_forces is None else unit_forces, part)
+        for load, forces in zip(self.loads, at_nodes, strict=True):
+            total += load.factor(time) * forces
         return total
+
+    @cached_property
+    def _whole_forces(self) -> list[Floats]:
+        """Nodal forces (n, 3) [N] of each load at factor 1 on all of the tissue, for every step of a motion."""
+        return self._at_nodes(self.unit_forces, np.ones(len(self.mesh.tetrahedra)))
+
+    def _at_nodes(self, unit_forces: Sequence[Floats], part: Floats) -> list[Floats]:
+        """Forces of each load on the nodes (n, 3) [N], those on the volume times the part (m,) of it that is left."""
+        nodes = self.quadratic or self.mesh
+        return [
+            summed_at_nodes(nodes, part[:, None, None] * forces) if isinstance(load, BodyForce) else forces
+            for load, forces in zip(self.loads, unit_forces, strict=True)
+        ]
 
 
 def unaware_of_midsides(model: Model) -> list[str]:
