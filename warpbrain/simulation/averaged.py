@@ -145,22 +145,22 @@ class AveragedTerm(Term):
         return float(self._density.numpy().astype(np.float64) @ self._volumes)
 
 
-def node_patches(tetrahedra: NDArray[np.integer], kind: NDArray[np.integer]) -> Iterator[tuple[int, Ints, Ints]]:
-    """Kind, elements and nodes of every patch: the elements of one kind (of those of each, (m,)) around each node."""
+def node_patches(tetrahedra: NDArray[np.integer], kinds: NDArray[np.integer]) -> Iterator[tuple[Ints, Ints]]:
+    """Elements and nodes of every patch: around each node the elements of one kind, given the kind (m,) of each."""
     corner_nodes = tetrahedra.ravel()
-    labels = np.repeat(kind, 4)
+    labels = np.repeat(kinds, 4)
     order = np.lexsort((np.arange(len(corner_nodes)), labels, corner_nodes))
     keys = np.stack([corner_nodes[order], labels[order]], axis=1)
     starts = np.flatnonzero(np.r_[True, np.any(keys[1:] != keys[:-1], axis=1)])
     for start, end in zip(starts, np.r_[starts[1:], len(order)], strict=True):
         elements = order[start:end] // 4
-        yield int(keys[start, 1]), elements, np.unique(tetrahedra[elements])
+        yield elements, np.unique(tetrahedra[elements])
 
 
 def averaged_terms(body: Body, labels: Sequence[int], kernels: ElementKernels, kinds: Ints) -> list[AveragedTerm]:
     """The patches of some tissues that have one law, of elements of one kind each: a term for each number of nodes."""
     families: dict[int, list[tuple[Ints, Ints]]] = {}
-    for _, elements, nodes in node_patches(body.tetrahedra, kinds):
+    for elements, nodes in node_patches(body.tetrahedra, kinds):
         if int(body.mesh.tissue[elements[0]]) in labels:
             families.setdefault(len(nodes), []).append((nodes, elements))
     return [
