@@ -220,10 +220,11 @@ def flown(level: int, steps: int, elements: str) -> Floats:
 def test_orders_in_space_and_time_of_tissue_whose_fluid_flows(elements: str, verify: Row) -> None:
     """Backward Euler: steps are quartered where elements are halved.
 
-    Orders come up to 2 from below, 1.6 and 1.8 of plain elements on these three meshes: an order of 0.2 is allowed.
+    Orders come to 2 from below (1.6 and 1.8 of plain elements on these three meshes) and from above (averaged ones):
+    an order of 0.2 is allowed, and the finer pair of meshes is nearer to 2.
     """
     coarse, medium, fine = (flown(level, 4 * 4**level, elements) for level in range(3))
     before, after = orders(coarse, medium), orders(medium, fine)
     claim = f"`drainage`, {elements}: order 2 of displacement and pressure, steps quartered with the elements; short by"
     verify(claim, FLOWING, max((2.0 - after).max(), 0.0), 0.2, "orders")
-    assert np.all(after > before)
+    assert np.all(np.abs(after - 2.0) < np.abs(before - 2.0))
