@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.averaging import averaged_values
-from warpbrain.diagnosis.base import Base
+from warpbrain.worlds.body.base import Base
 from warpbrain.diagnosis.calibration import BODIES, probabilities
-from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.flexible import SCALES
+from warpbrain.worlds.body.evidence import Explanation
+from warpbrain.worlds.body.flexible import SCALES
 from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo, scattered_blocks, spatial_blocks
 from warpbrain.diagnosis.letting_go import where_it_lets_go
 from warpbrain.diagnosis.locating import ball_of
 from warpbrain.diagnosis.options import DiagnosisOptions
-from warpbrain.diagnosis.parameters import scanned_values, values_of
-from warpbrain.diagnosis.refitting import Refit
+from warpbrain.worlds.body.parameters import scanned_values, values_of
+from warpbrain.worlds.body.refitting import Refit
 from warpbrain.diagnosis.result import Ranked
 from warpbrain.diagnosis.screening import UNKNOWN
 from warpbrain.diagnosis.stage import Stage

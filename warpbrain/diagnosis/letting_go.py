@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.calibration import BODIES
-from warpbrain.diagnosis.dictionary import BETWEEN, RADII, patch_of
-from warpbrain.diagnosis.effects import Effect
+from warpbrain.worlds.body.dictionary import BETWEEN, RADII, patch_of
+from warpbrain.worlds.body.effects import Effect
 from warpbrain.diagnosis.result import Value
 from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage

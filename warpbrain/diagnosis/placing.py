@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.effects import Effect
+from warpbrain.worlds.body.effects import Effect
 from warpbrain.diagnosis.refining import Refined, spread_of_place
 from warpbrain.diagnosis.screened import Screened
 from warpbrain.diagnosis.stack_evidence import StackEvidence

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.dictionary import BETWEEN, RADII, patch_of
-from warpbrain.diagnosis.effects import Effect
+from warpbrain.worlds.body.dictionary import BETWEEN, RADII, patch_of
+from warpbrain.worlds.body.effects import Effect
 from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage
 from warpbrain.errors import SolveError

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Stack, log_mean
-from warpbrain.diagnosis.pairs import PairEvidence
+from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.worlds.body.evidence import KAPPAS, Explanation, Stack, log_mean
+from warpbrain.worlds.body.pairs import PairEvidence
 from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.threads import in_threads
 

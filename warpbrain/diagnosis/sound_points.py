@@ -26,10 +26,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.evidence import Explanation, log_mean
-from warpbrain.diagnosis.gross_errors import ASIDE
+from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.worlds.body.evidence import Explanation, log_mean
+from warpbrain.worlds.body.gross_errors import ASIDE
 from warpbrain.diagnosis.placing import placed
 from warpbrain.diagnosis.screened import Screened
 from warpbrain.diagnosis.screening import Screen, Screening

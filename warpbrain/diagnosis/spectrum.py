@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.effects import Effect, faded
-from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.refitting import Refit
-from warpbrain.diagnosis.sensors import Sensors
+from warpbrain.worlds.body.effects import Effect, faded
+from warpbrain.worlds.body.evidence import Explanation
+from warpbrain.worlds.body.refitting import Refit
+from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.physics.proposal import Proposal
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Stack, kappa_log_prior
+from warpbrain.worlds.body.evidence import KAPPAS, Explanation, Stack, kappa_log_prior
 from warpbrain.threads import in_threads
 
 Floats = NDArray[np.float64]

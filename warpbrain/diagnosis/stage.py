@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.effects import Effect, Effects
-from warpbrain.diagnosis.evidence import Explanation, log_mean
-from warpbrain.diagnosis.gross_errors import ASIDE
-from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.refitting import Refit
+from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.worlds.body.effects import Effect, Effects
+from warpbrain.worlds.body.evidence import Explanation, log_mean
+from warpbrain.worlds.body.gross_errors import ASIDE
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.refitting import Refit
 from warpbrain.diagnosis.screened import Screened
 from warpbrain.diagnosis.screening import UNKNOWN, Screening
 from warpbrain.diagnosis.single_points import gain_of_gross_errors, log_evidence_and_odds

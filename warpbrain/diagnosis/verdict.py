@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.alternatives import SENTENCES
+from warpbrain.worlds.body.alternatives import SENTENCES
 from warpbrain.diagnosis.result import (
     CANNOT_SAY,
     GROUP,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.inference.blocks import Blocks
-from warpbrain.inference.causes import Cause
+from warpbrain.inference.causes import Cause, Kind
 from warpbrain.inference.gaussian import GaussianModel
 
 Floats = NDArray[np.float64]
@@ -43,6 +43,8 @@ class Hypothesis:
     Attributes
     ----------
     causes : tuple of str
+    kinds : tuple of Kind
+        Of each of them.
     log_evidence : float
         Log density of the rows, summed over places, sizes and scales.
     log_prior : float
@@ -52,6 +54,7 @@ class Hypothesis:
     """
 
     causes: tuple[str, ...]
+    kinds: tuple[Kind, ...]
     log_evidence: float
     log_prior: float
     best: Configuration
@@ -167,6 +170,7 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
     found = [
         Hypothesis(
             tuple(causes[c].name for c in sorted(members)),
+            tuple(causes[c].kind for c in sorted(members)),
             log,
             sum(causes[c].log_prior for c in members),
             sums.best[members],

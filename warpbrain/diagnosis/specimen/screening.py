@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.effects import Effect
-from warpbrain.diagnosis.evidence import Explanation, Stack, kappa_log_prior
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.evidence import Explanation, Stack, kappa_log_prior
 from warpbrain.diagnosis.screening import log_unknown
 from warpbrain.diagnosis.specimen.acting import Assumption
 from warpbrain.diagnosis.specimen.fitting import SpecimenFit

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.atomic import whole_file
-from warpbrain.diagnosis.noise import noise_factor
+from warpbrain.worlds.body.noise import noise_factor
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.report.files import MILLIMETRES
 

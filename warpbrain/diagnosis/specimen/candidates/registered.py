@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.dictionary import situation_of
+from warpbrain.worlds.body.dictionary import situation_of
 from warpbrain.diagnosis.specimen.acting import Acting, Assumption, Unit
 from warpbrain.diagnosis.specimen.material import can_act
 from warpbrain.diagnosis.specimen.protocol import Protocol, Test
