@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.worlds.body.alternatives import alternatives_at
+from warpbrain.worlds.body.not_physics import not_physics_at
 from warpbrain.worlds.body.base import Base, BaseFinder
 from warpbrain.diagnosis.between import between_neighbours
 from warpbrain.diagnosis.checking import check_errors
@@ -208,7 +208,7 @@ class Diagnosing:
     def _looked_for(self, base: Base) -> tuple[Base, Candidates]:
         """What is looked for at a base, and that with the points that are no gross errors where something acts."""
         with self._timed("candidates"):
-            alternatives = alternatives_at(base.at, base.nuisances)
+            alternatives = not_physics_at(base.at, base.nuisances)
             candidates = candidates_at(
                 self.dictionary, base.effects, alternatives, lambda kind: self.listener.stage(f"candidate: {kind}")
             )

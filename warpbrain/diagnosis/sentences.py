@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from warpbrain.cases.case import Case
-from warpbrain.worlds.body.alternatives import SENTENCES
+from warpbrain.worlds.body.not_physics import SENTENCES
 from warpbrain.worlds.body.base import Base
 from warpbrain.diagnosis.result import (
     CANNOT_SAY,

@@ -6,41 +6,35 @@ not. Where the load is large one round from the declared state is not enough: co
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.effects import Effects
-from warpbrain.worlds.body.evidence import Explanation
-from warpbrain.worlds.body.flexible import LENGTHS, flexible_columns, smooth_forces
-from warpbrain.worlds.body.fraction import likely_fraction
-from warpbrain.worlds.body.gross_errors import ASIDE, gross_errors
-from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
-from warpbrain.worlds.body.nuisances import REGISTRATION_SD, Nuisances, nuisances_at, other_volume
-from warpbrain.diagnosis.options import Listener
-from warpbrain.worlds.body.pairs import PairEvidence, Pairs, pairs_at
-from warpbrain.worlds.body.sensing import explanation_of, known_sigma
-from warpbrain.worlds.body.sensors import Sensors, tracked_points
-from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
-from warpbrain.worlds.body.switching import Known, Solving
-from warpbrain.worlds.body.time_courses import main_courses
-from warpbrain.worlds.body.tissue_prior import declared, tissue_prior
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.inference import GaussianModel
+from warpbrain.inference.beliefs import belief, beliefs
+from warpbrain.inference.gross_errors import columns_of_gross_errors, with_gross_errors
+from warpbrain.inference.noise import noise_factor, outliers, scales
 from warpbrain.simulation.locking import on_linear_elements
 from warpbrain.threads import beside
+from warpbrain.worlds.body.effects import Effects
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
+from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume, registration_sd
+from warpbrain.worlds.body.sensing import noise_of
+from warpbrain.worlds.body.sensors import Sensors, rows_of_points, tracked_points
+from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
+from warpbrain.worlds.body.switching import Known, Solving
+from warpbrain.worlds.body.tissue_prior import declared, tissue_prior
+from warpbrain.worlds.body.unknown import body_forces, fields
+from warpbrain.worlds.listener import Listener
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
-#: How much larger an error of registration may be in the first round.
-_ROUGHLY = 5.0
-#: How often an undeclared noise is found anew without the gross errors that it shows.
-_NOISE_ROUNDS = 3
-#: How far tissue and field may go from the middle of their prior [standard deviations].
-_FARTHEST = 1.5
 #: Rounds at most, and by how much less tissue and field move in the last one [standard deviations].
 _ROUNDS, _NEAR = 3, 0.5
 
@@ -63,17 +57,14 @@ class Base:
     known : Known
         What was solved beside the base for them.
     nuisances : Nuisances
-    flexible : tuple of (n, k) arrays
-        Columns of smooth forces of each length, of 1 m.
-    pairs : Pairs
-        Of places that draw each other.
-    sigma : (n,) array
-        Noise of each row, very large where a row is set aside.
+    unknown : dict of str to (n, k) array
+        Columns of fields without a name, of 1 m.
+    model : GaussianModel
+        Of the rows where nothing is missing: noise of every point as if it were sound, and nuisances.
     noise : (n,) array
-        The same without that.
-    aside : (n,) bool array
-        Gross errors.
-    explanation : Explanation
+        Standard deviation of the independent noise of each row.
+    points : tuple of int arrays
+        Rows of each recorded point.
     residual : (n,) array
         Of the linear model with all nuisances in the middle of their prior.
     mesh_errors : MeshErrors or None
@@ -89,70 +80,32 @@ class Base:
     effects: Effects
     known: Known
     nuisances: Nuisances
-    flexible: tuple[Floats, ...]
-    pairs: Pairs
-    sigma: Floats
+    unknown: dict[str, Floats]
+    model: GaussianModel
     noise: Floats
-    aside: NDArray[np.bool_]
-    explanation: Explanation
+    points: tuple[Ints, ...]
     residual: Floats
     mesh_errors: MeshErrors | None
     remarks: tuple[str, ...]
 
     @property
-    def whitened(self) -> Floats:
-        """The residual, whitened by the noise."""
-        return self.explanation.whitened(self.residual)
-
-    @property
     def typical_noise(self) -> float:
-        """Median of the noise of displacements [m]."""
-        return _typical(self.noise, self.at.sensors)
-
-    @property
-    def constant_forces(self) -> list[Floats]:
-        """Columns of smooth forces of each length and size that are always there."""
-        return smooth_forces(self.flexible, self.typical_noise)
-
-    def pair_evidence(self, explanation: Explanation) -> PairEvidence:
-        """Of two places that draw each other, beside an explanation."""
-        return PairEvidence(explanation, self.pairs, self.typical_noise)
-
-    @property
-    def smooth_forces(self) -> list[Floats]:
-        """The same of each course in time."""
-        times = self.at.sensors.times
-        factors = [course.factor(times)[:, None] for course in main_courses(self.states.times)]
-        return [factor * columns for columns in self.constant_forces for factor in factors]
-
-    def without(self, rows: NDArray[np.bool_]) -> Base:
-        """The same with more rows (n,) set aside as gross errors."""
-        return self._with_aside(self.aside | rows)
-
-    def with_back(self, rows: NDArray[np.bool_]) -> Base:
-        """The same without some of the rows (n,) that are set aside."""
-        return self._with_aside(self.aside & ~rows)
-
-    def _with_aside(self, aside: NDArray[np.bool_]) -> Base:
-        if np.array_equal(aside, self.aside):
-            return self
-        sigma = np.where(aside, ASIDE * self.noise, self.noise)
-        explanation = explanation_of(self.at.sensors, sigma, self.nuisances.columns)
-        return replace(self, sigma=sigma, aside=aside, explanation=explanation)
-
-    def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
-        """What nuisances do to the displacement of other points (k, 3) [m], and what makes effects there."""
-        return self.seen_by(tracked_points(self.at.system.model.mesh, points, self.states.centre))
+        """Median of the noise of displacements [m]; of all rows if none was recorded."""
+        lengths = self.at.sensors.is_displacement
+        return float(np.median(self.noise[lengths] if lengths.any() else self.noise))
 
     def seen_by(self, sensors: Sensors) -> tuple[Nuisances, Effects]:
         """What nuisances do to other sensors, in the coordinates that they have here, and what makes effects there."""
         at = self.at.with_sensors(sensors)
         effects = Effects(at, Solving(self.states, self.state, at.sensors, self.known), self.mesh_errors)
-        theta = self.state.hypothesis.theta
-        own = self.nuisances
+        theta, own = self.state.hypothesis.theta, self.nuisances
         return nuisances_at(
             at, self.states, theta, self.prior, effects, self.mesh_errors, own.anchors, own.fraction
         ), effects
+
+    def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
+        """The same of the displacement of other points (k, 3) [m]."""
+        return self.seen_by(tracked_points(self.at.system.model.mesh, points, self.states.centre))
 
 
 class BaseFinder:
@@ -196,7 +149,7 @@ class BaseFinder:
         self._listener.stage("tissue beside any smooth force")
         state = first
         for _ in range(_ROUNDS):
-            rough = self._linearised(first, state, None)
+            rough = _Linear(self, state, None)
             hypothesis = self._freed(rough)
             before, after = (rough.nuisances.coordinates(self.prior, one) for one in (state.hypothesis, hypothesis))
             try:
@@ -211,30 +164,55 @@ class BaseFinder:
         errors = self._errors_of_mesh(state)
         if errors is not None:
             state = self.states.corrected(state, expected(errors.own))
-        return self._linearised(first, state, errors)
+        return self._base(first, state, errors)
 
     def moved(self, base: Base, fit: SolvedState, errors: MeshErrors | None) -> Base:
-        """The same at another state: one that a fit has found far from the base, where all that is linear is wrong.
+        """The same at another state: one that a fit has found far from the base, where all that is linear is wrong."""
+        return self._base(base.declared, fit, errors)
 
-        Parameters
-        ----------
-        base : Base
-        fit : SolvedState
-        errors : MeshErrors or None
-            There.
-        """
-        return self._linearised(base.declared, fit, errors)
+    def _base(self, first: SolvedState, state: SolvedState, errors: MeshErrors | None) -> Base:
+        linear = _Linear(self, state, errors)
+        unknown = fields(linear.at, self._spacing)
+        nuisances, factor = linear.nuisances, linear.noise_factor
+        if errors is not None and not self._bare:
+            smooth = unknown[next(iter(unknown))]
+            nuisances = _with_likely_fraction(nuisances, factor, linear.residual, linear.typical_noise * smooth)
+        return Base(
+            self.states,
+            self.prior,
+            first,
+            state,
+            linear.at,
+            linear.effects,
+            linear.known,
+            nuisances,
+            unknown,
+            GaussianModel(factor, nuisances.columns),
+            linear.noise,
+            linear.points,
+            linear.residual,
+            errors,
+            tuple(self._remarks),
+        )
 
-    def _freed(self, rough: Base) -> Hypothesis:
+    def _freed(self, rough: _Linear) -> Hypothesis:
         """Tissue and field beside any smooth force; recordings are realigned."""
-        explanation = rough.explanation.with_more(_any_force(rough.flexible, rough.residual, rough.at))
+        nuisances = rough.nuisances
         # before points of a surface are compared with the right faces a registration may be wrong by more than it is
-        registration = rough.nuisances.part("registration")
-        explanation = explanation.with_more(_ROUGHLY * rough.nuisances.columns[:, registration])
-        kappa = explanation.best_kappa(rough.whitened)
-        xi = explanation.nuisances_given(rough.whitened, kappa)
-        self.states.realign((xi[registration] + _ROUGHLY * xi[-6:]) * REGISTRATION_SD)
-        return self._moved(rough.nuisances, xi)
+        part, wider = nuisances.part("registration"), belief("registration.rough")
+        loose = np.column_stack([nuisances.columns, rough.anything, wider * nuisances.columns[:, part]])
+        model = GaussianModel(rough.noise_factor, loose)
+        values, log_prior = scales()
+        model = model.with_scale(model.likely_scale(rough.residual, values, log_prior))
+        gross = with_gross_errors(model, rough.residual, rough.points, outliers()).log_odds > 0.0
+        model = model.with_columns(columns_of_gross_errors(model, rough.points, gross, outliers()))
+        xi, _ = model.coefficients(rough.residual)
+        turned = loose.shape[1]
+        self.states.realign((xi[part] + wider * xi[turned - 6 : turned]) * registration_sd())
+        farthest = belief("tissue.farthest_base")
+        tissue = np.clip(xi[nuisances.part("tissue")], -farthest, farthest)
+        field = np.clip(xi[nuisances.part("stiffness field")], -farthest, farthest)
+        return Hypothesis(self.prior.mean + self.prior.factor @ tissue, field)
 
     def _declared(self) -> Hypothesis:
         field = np.zeros(self.states.modes.shape[1])
@@ -243,11 +221,6 @@ class BaseFinder:
         except InputError:
             theta = self.prior.mean.copy()
         return Hypothesis(theta, field)
-
-    def _moved(self, nuisances: Nuisances, xi: Floats) -> Hypothesis:
-        tissue = np.clip(xi[nuisances.part("tissue")], -_FARTHEST, _FARTHEST)
-        field = np.clip(xi[nuisances.part("stiffness field")], -_FARTHEST, _FARTHEST)
-        return Hypothesis(self.prior.mean + self.prior.factor @ tissue, field)
 
     def _errors_of_mesh(self, state: SolvedState) -> MeshErrors | None:
         if not self._mesh_error:
@@ -258,66 +231,57 @@ class BaseFinder:
             self._remarks.append(f"the error of the mesh is not known: {error}")
             return None
 
-    def _linearised(self, first: SolvedState, state: SolvedState, errors: MeshErrors | None) -> Base:
-        sensors = state.sensors
-        at = Linearisation(state.system, state.u, state.reactions, sensors)
-        known = Known()
-        effects = Effects(at, Solving(self.states, state, sensors, known), errors)
+
+class _Linear:
+    """What is linear about a state: nuisances, residual, noise."""
+
+    def __init__(self, finder: BaseFinder, state: SolvedState, errors: MeshErrors | None) -> None:
+        sensors, states = state.sensors, finder.states
+        self.at = Linearisation(state.system, state.u, state.reactions, sensors)
+        self.known = Known()
+        self.effects = Effects(self.at, Solving(states, state, sensors, self.known), errors)
         # which makes the compliance: with it nuisances are products, where each would have an equilibrium of its own
-        flexible = flexible_columns(at, [length * self._spacing for length in LENGTHS])
-        nuisances = nuisances_at(at, self.states, state.hypothesis.theta, self.prior, effects, errors)
-        if self._bare:
-            nuisances = nuisances.weakened()
+        lengths = finder._spacing * beliefs("unknown.lengths")
+        smooth = np.column_stack(body_forces(self.at, lengths.tolist()))
+        nuisances = nuisances_at(self.at, states, state.hypothesis.theta, finder.prior, self.effects, errors)
+        self.nuisances = nuisances.weakened() if finder._bare else nuisances
         # what the state has of tissue and field is given back, so that their middle is that of their prior
-        z = nuisances.coordinates(self.prior, state.hypothesis)
-        z[nuisances.part("registration")] = self.states.motion / REGISTRATION_SD
-        residual = sensors.residual + nuisances.columns @ z
-        anything = _any_force(flexible, residual, at)
-        loose = np.column_stack([nuisances.columns, anything])
-        aside = np.zeros(len(sensors), dtype=bool)
-        for _ in range(_NOISE_ROUNDS):
-            noise = known_sigma(sensors, residual, nuisances.columns, np.column_stack(flexible), aside)
-            looser = explanation_of(sensors, np.where(aside, ASIDE * noise, noise), loose)
-            kappa = max(1.15, looser.best_kappa(looser.whitened(residual)))
-            found = gross_errors(sensors, explanation_of(sensors, noise, loose), kappa, residual)
-            if not np.any(found & ~aside) or not np.isnan(sensors.sigma).any():
-                aside = found
-                break
-            aside = found
-        sigma = np.where(aside, ASIDE * noise, noise)
-        explanation = explanation_of(sensors, sigma, nuisances.columns)
-        if errors is not None and not self._bare:
-            smooth = smooth_forces(flexible, _typical(noise, sensors))
-            nuisances = nuisances.with_fraction(likely_fraction(explanation.factor, nuisances, residual, smooth))
-            explanation = Explanation(explanation.factor, nuisances.columns)
-        return Base(
-            self.states,
-            self.prior,
-            first,
-            state,
-            at,
-            effects,
-            known,
-            nuisances,
-            flexible,
-            pairs_at(at, self._spacing),
-            sigma,
-            noise,
-            aside,
-            explanation,
-            residual,
-            errors,
-            tuple(self._remarks),
-        )
+        z = self.nuisances.coordinates(finder.prior, state.hypothesis)
+        z[self.nuisances.part("registration")] = states.motion / registration_sd()
+        self.residual = sensors.residual + self.nuisances.columns @ z
+        rows = sensors.is_displacement
+        size = float(np.sqrt(np.mean(self.residual[rows] ** 2))) if rows.any() else 1.0
+        #: Columns of smooth forces as large as the residuals.
+        self.anything = size * smooth
+        self.noise = noise_of(sensors, self.residual, self.nuisances.columns, smooth)
+        self.noise_factor = noise_factor(sensors.positions, sensors.directions, sensors.times, self.noise)
+        self.typical_noise = float(np.median(self.noise[rows] if rows.any() else self.noise))
+        self.points = tuple(rows for alike in rows_of_points(sensors) for rows in alike)
 
 
-def _typical(noise: Floats, sensors: Sensors) -> float:
-    """Median of the noise of displacements [m]."""
-    return float(np.median(noise[sensors.is_displacement]))
+def _with_likely_fraction(nuisances: Nuisances, factor: Floats, residual: Floats, smooth: Floats) -> Nuisances:
+    """Nuisances with the root mean square of what the unknown part of the mesh's error is after the residuals.
 
+    It depends on mesh, load and where is recorded; taken for larger than it is, it hides what is missing. It is weighed
+    with and without any smooth force beside it: what is missing must not be taken for an error of the mesh.
 
-def _any_force(flexible: tuple[Floats, ...], residual: Floats, at: Linearisation) -> Floats:
-    """Columns of smooth forces as large as the residuals."""
-    rows = at.sensors.is_displacement
-    size = float(np.sqrt(np.mean(residual[rows] ** 2))) if rows.any() else 1.0
-    return size * np.column_stack(flexible)
+    Parameters
+    ----------
+    nuisances : Nuisances
+    factor : (n, n) array
+        Of the noise.
+    residual : (n,) array
+    smooth : (n, k) array
+        Columns of a smooth force as large as the noise.
+    """
+    from scipy.special import logsumexp, softmax
+
+    fractions = beliefs("mesh.unknown")
+    values, log_prior = scales()
+    scores = []
+    for fraction in fractions.tolist():
+        model = GaussianModel(factor, nuisances.with_fraction(fraction).columns)
+        each = [model, *(model.with_columns(size * smooth) for size in beliefs("unknown.sizes")[1:-1].tolist())]
+        logs = [one.log_marginal(residual, values, log_prior) for one in each]
+        scores.append(logsumexp([logs[0], logsumexp(logs[1:]) - np.log(len(logs) - 1)]))
+    return nuisances.with_fraction(float(np.sqrt(softmax(scores) @ fractions**2)))

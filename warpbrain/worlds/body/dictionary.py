@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case
-from warpbrain.worlds.body.effects import Effect, Effects
-from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh, face_vectors, nodes_of
 from warpbrain.physics.composition import CompositionError, require_composable
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.threads import in_threads
+from warpbrain.worlds.body.effects import Effect, Effects
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.refitting import Refit
+from warpbrain.worlds.body.sensors import spread_points
 
 Floats = NDArray[np.float64]
 
@@ -224,3 +226,33 @@ def _tried(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | Inp
         return [attempt(proposal) for proposal in proposals]
     # the first makes the surface, with threads of its own
     return [*map(attempt, proposals[:1]), *in_threads(attempt, proposals[1:])]
+
+
+def candidates_beside(fit: Refit, candidates: Candidates) -> Candidates:
+    """The effects of a dictionary at the state of a refit.
+
+    What is solved as a whole or over time keeps the columns that it has at the base, as has what is no physics. A kind
+    of which a case has only one is left out where the refit has it.
+    """
+    state = fit.state
+    known = None if candidates.makes is None else candidates.makes.mesh_errors
+    effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=known)
+    acting = [effect.proposed.make(effect.proposed.mean) for effect in fit.effects]
+    there = {mechanism.kind for mechanism in acting if not mechanism.several}
+    found: list[Effect] = []
+    of_kind: dict[str, NDArray[np.int64]] = {}
+    for kind, numbers in candidates.of_kind.items():
+        if kind in there:
+            continue
+        own = [candidates.effects[k] for k in numbers.tolist()]
+        smooth = [k for k, effect in enumerate(own) if _is_smooth(effect)]
+        for k, effect in zip(smooth, effects.of([own[k].proposed for k in smooth]), strict=True):
+            own[k] = effect
+        of_kind[kind] = np.arange(len(found), len(found) + len(own))
+        found.extend(own)
+    return replace(candidates, kinds=tuple(of_kind), effects=tuple(found), of_kind=of_kind, makes=effects)
+
+
+def _is_smooth(effect: Effect) -> bool:
+    """Whether it is differentiated at a state: neither solved as a whole nor over time, nor no physics."""
+    return effect.proposal is not None and not effect.proposal.is_there_or_not and effect.about is None

@@ -10,17 +10,17 @@ from typing import Any, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.course import Course
-from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer, volume_of
-from warpbrain.worlds.body.sensors import Sensors
-from warpbrain.worlds.body.sparse_columns import SparseColumns
 from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
 from warpbrain.physics.proposal import Proposal
 from warpbrain.simulation.assumed import substituted
 from warpbrain.simulation.system import System
+from warpbrain.worlds.body.course import Course
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer, volume_of
+from warpbrain.worlds.body.sensors import Sensors
+from warpbrain.worlds.body.sparse_columns import SparseColumns
 
 Floats = NDArray[np.float64]
 

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.dense_factors import dense_factors
 from warpbrain.errors import SolveError
 from warpbrain.simulation.symmetric_factors import symmetric_factors
 from warpbrain.threads import fill_columns
+from warpbrain.worlds.body.dense_factors import dense_factors
 
 Floats = NDArray[np.float64]
 

@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.factors import Factors
-from warpbrain.worlds.body.releasing import HeldSurface
-from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.mesh import vertex_normals
 from warpbrain.simulation.system import System
 from warpbrain.threads import fill_columns, in_threads
+from warpbrain.worlds.body.factors import Factors
+from warpbrain.worlds.body.releasing import HeldSurface
+from warpbrain.worlds.body.sensors import Sensors
 
 Floats = NDArray[np.float64]
 

@@ -17,9 +17,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.factors import Factors
-from warpbrain.worlds.body.sensors import Sensors
-from warpbrain.worlds.body.states import TOLERANCE, Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference, Discretisation
 from warpbrain.estimation.gaussian import Gaussian
@@ -30,6 +27,9 @@ from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolv
 from warpbrain.simulation.finer import FinerCase, free_prolongation, restricted
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System
+from warpbrain.worlds.body.factors import Factors
+from warpbrain.worlds.body.sensors import Sensors
+from warpbrain.worlds.body.states import TOLERANCE, Hypothesis, SolvedState, States
 
 Floats = NDArray[np.float64]
 

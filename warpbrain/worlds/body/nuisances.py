@@ -14,13 +14,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.effects import Effects
-from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
-from warpbrain.worlds.body.sensors import Sensors, alike_near, spread_points
-from warpbrain.worlds.body.states import Hypothesis, States
 from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
 from warpbrain.physics.mechanism import Mechanism
@@ -30,18 +26,21 @@ from warpbrain.physics.proposal import Proposal
 from warpbrain.simulation.assumed import all_substituted
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
+from warpbrain.worlds.body.effects import Effects
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
+from warpbrain.worlds.body.sensors import Sensors, alike_near, spread_points
+from warpbrain.worlds.body.states import Hypothesis, States
 
 Floats = NDArray[np.float64]
 
-#: Standard deviations: of `-ln(1 - 2 nu)`, of an exponent of the law, of a share of I2, of the size of known loads.
-_VOLUME, _EXPONENT, _SECOND, _LOADS = 0.4, 2.0, 0.25, 0.04
-#: Of a rigid error of registration: shift [m] and turn [rad].
-_SHIFT, _TURN = 1e-3, math.radians(1.0)
-REGISTRATION_SD = np.repeat([_SHIFT, _TURN], 3)
-#: Error of the mesh beside what a finer one shows: the largest part of the displacement, and how far [m] it is alike.
-FRACTION, _ALIKE = 0.06, 0.02
 #: Step of a difference in `theta`.
 _STEP = 1e-3
+
+
+def registration_sd() -> Floats:
+    """Standard deviations (6,) of a rigid error of registration: shift [m] and turn [rad]."""
+    return np.repeat([belief("registration.shift"), belief("registration.turn")], 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +75,7 @@ class Nuisances:
 
     families: tuple[Family, ...]
     anchors: Floats
-    fraction: float = FRACTION
+    fraction: float
 
     @property
     def columns(self) -> Floats:
@@ -119,7 +118,7 @@ def nuisances_at(
     effects: Effects,
     mesh_errors: MeshErrors | None,
     anchors: Floats | None = None,
-    fraction: float = FRACTION,
+    fraction: float | None = None,
 ) -> Nuisances:
     """The nuisances of a state.
 
@@ -137,20 +136,22 @@ def nuisances_at(
         The state on a finer mesh less the state; None: the mesh is taken for exact.
     anchors : (a, 3) array, optional
         Those of other sensors, so that columns mean the same.
-    fraction : float
-        Unknown part of the mesh's error, relative to the displacement.
+    fraction : float, optional
+        Unknown part of the mesh's error, relative to the displacement; the largest that is believed by default.
     """
+    if fraction is None:
+        fraction = float(beliefs("mesh.unknown").max())
     sensors = at.sensors
     if anchors is None:
         where = sensors.positions[sensors.is_displacement]
-        anchors = where[spread_points(where, _ALIKE, 60)]
+        anchors = where[spread_points(where, belief("mesh.alike"), 60)]
     families = [
         Family("tissue", tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors)),
         Family("stiffness field", field_columns(at, states)),
         Family("compressibility", _law_columns(effects, [other_volume(states)])),
         Family("shape of the law", _law_columns(effects, _other_shape())),
         Family("known loads", _known_loads(at)),
-        Family("registration", sensors.rigid * REGISTRATION_SD),
+        Family("registration", sensors.rigid * registration_sd()),
     ]
     if mesh_errors is not None:
         own = mesh_errors.own
@@ -190,7 +191,9 @@ def _law_columns(effects: Effects, proposals: list[Proposal]) -> Floats:
 def other_volume(states: States) -> Proposal:
     """Tissue that is more or less compressible than the case says, as much in all tissues."""
     own = -math.log1p(-2.0 * states.case.poisson)
-    return Proposal.of_one(lambda c: Compressibility(poisson=-0.5 * math.expm1(-c)), own, _VOLUME, "smooth", own)
+    return Proposal.of_one(
+        lambda c: Compressibility(poisson=-0.5 * math.expm1(-c)), own, belief("tissue.volume"), "smooth", own
+    )
 
 
 def mesh_by_tissue(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:
@@ -216,20 +219,22 @@ class _SecondInvariant(Mechanism):
 
 def _other_shape() -> list[Proposal]:
     return [
-        Proposal.of_one(lambda a: Asymmetry(exponent=a), 2.0, _EXPONENT, "smooth", 2.0),
-        Proposal.of_one(lambda share: _SecondInvariant(share=share), 0.5, _SECOND, "smooth", 0.5),
+        Proposal.of_one(lambda a: Asymmetry(exponent=a), 2.0, belief("tissue.exponent"), "smooth", 2.0),
+        Proposal.of_one(
+            lambda share: _SecondInvariant(share=share), 0.5, belief("tissue.second_invariant"), "smooth", 0.5
+        ),
     ]
 
 
 def _known_loads(at: Linearisation) -> Floats:
     """All known loads larger or smaller by one factor, and all prescribed displacements."""
     model = at.system.model
-    columns = [_LOADS * at.answers(model.external_forces()[None])]
+    columns = [belief("loads.size") * at.answers(model.external_forces()[None])]
     if model.prescribed.any():
         moved = (at.stiffness @ model.prescribed.ravel()).reshape(-1, 3)
         own = at.sensors.answer(model.prescribed, np.where(model.constrained, moved, 0.0))
         answer = own + at.answers(np.where(model.constrained, 0.0, -moved)[None])[:, 0]
-        columns.append(_LOADS * answer[:, None])
+        columns.append(belief("loads.size") * answer[:, None])
     found = np.concatenate(columns, axis=1)
     return found[:, found.any(axis=0)]
 
@@ -245,7 +250,7 @@ def _fractional(at: Linearisation, anchors: Floats, fraction: float) -> Floats:
     where = sensors.positions[rows]
     nearest = cKDTree(at.system.model.mesh.points).query(where)[1]
     size = np.linalg.norm(at.u, axis=1)[nearest]
-    near = alike_near(where, anchors, _ALIKE)
+    near = alike_near(where, anchors, belief("mesh.alike"))
     found = np.zeros((len(sensors), 3 * len(anchors)))
     along = sensors.directions[rows]
     found[rows] = (fraction * size[:, None, None] * near[:, :, None] * along[:, None, :]).reshape(len(rows), -1)

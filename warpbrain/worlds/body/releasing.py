@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.factors import Factors
 from warpbrain.errors import SolveError
 from warpbrain.mesh import tangents
+from warpbrain.worlds.body.factors import Factors
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

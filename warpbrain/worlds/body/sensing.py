@@ -1,55 +1,47 @@
-"""Residuals whitened by a noise whose size may have to be found first, gross errors set aside."""
+"""Standard deviation of what was recorded without a declared one: the likeliest beside any smooth force."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.evidence import Explanation
-from warpbrain.worlds.body.noise import noise_factor
+from warpbrain.inference.beliefs import beliefs
 from warpbrain.worlds.body.sensors import Sensors
 
 Floats = NDArray[np.float64]
 
-#: Sizes of an undeclared noise that are tried, as parts of the root mean square of its residuals.
-_PARTS = np.geomspace(0.01, 1.2, 25)
-#: Distance from zero [robust standard deviations] beyond which a row is out of the ordinary.
+#: Distance from zero [robust standard deviations] beyond which a row says nothing of the noise of most.
 _FAR = 3.0
 
 
-def known_sigma(
-    sensors: Sensors, residual: Floats, nuisances: Floats, flexible: Floats, aside: NDArray[np.bool_]
-) -> Floats:
-    """Standard deviation (n,) of each row: declared, or the likeliest under any smooth force.
+def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Floats) -> Floats:
+    """Standard deviation (n,) of each row.
 
     Parameters
     ----------
     sensors : Sensors
     residual : (n,) array
-    nuisances, flexible : (n, k) arrays
-        Columns of one standard deviation; `flexible` of 1 m.
-    aside : (n,) bool array
-        Rows that say nothing of the noise.
+    nuisances : (n, k) array
+        Columns of one standard deviation.
+    field : (n, k) array
+        Of a smooth force of 1 m.
     """
     sigma = sensors.sigma.copy()
-    size = float(np.sqrt(np.mean(residual[sensors.is_displacement] ** 2))) if sensors.is_displacement.any() else 0.0
-    explained = np.column_stack([nuisances, max(size, 1e-9) * flexible])
-    for number in _undeclared(sensors):
-        own = sensors.recordings == number
-        counted = own & ~aside
-        if not aside.any():
-            counted = own & _ordinary(residual, explained)
-        scale = float(np.sqrt(np.mean(residual[counted] ** 2)))
-        tried = max(scale, 1e-12) * _PARTS
-        scores = [_score(counted, part, residual, explained) for part in tried]
-        sigma[own] = tried[int(np.argmax(scores))]
+    undeclared = np.unique(sensors.recordings[np.isnan(sigma)]).tolist()
+    if not undeclared:
+        return sigma
+    lengths = sensors.is_displacement
+    size = float(np.sqrt(np.mean(residual[lengths] ** 2))) if lengths.any() else 0.0
+    explained = np.column_stack([nuisances, max(size, 1e-9) * field])
+    ordinary = _ordinary(residual, explained)
+    for number in undeclared:
+        rows = sensors.recordings == number
+        rows = rows & ordinary if (rows & ordinary).any() else rows
+        scale = max(float(np.sqrt(np.mean(residual[rows] ** 2))), 1e-12)
+        tried = scale * np.geomspace(*beliefs("noise.undeclared"), 25)
+        scores = [_log_density(residual[rows], explained[rows], sigma) for sigma in tried.tolist()]
+        sigma[sensors.recordings == number] = tried[int(np.argmax(scores))]
     return sigma
-
-
-def _undeclared(sensors: Sensors) -> Sequence[int]:
-    return np.unique(sensors.recordings[np.isnan(sensors.sigma)]).tolist()
 
 
 def _ordinary(residual: Floats, explained: Floats) -> NDArray[np.bool_]:
@@ -60,15 +52,10 @@ def _ordinary(residual: Floats, explained: Floats) -> NDArray[np.bool_]:
     return np.asarray(np.abs(left) <= _FAR * 1.4826 * np.median(np.abs(left)))
 
 
-def _score(own: NDArray[np.bool_], sigma: float, residual: Floats, explained: Floats) -> float:
-    W, w = explained[own] / sigma, residual[own] / sigma
+def _log_density(residual: Floats, columns: Floats, sigma: float) -> float:
+    W, w = columns / sigma, residual / sigma
     values, vectors = np.linalg.eigh(W.T @ W)
     projected = (W @ vectors).T @ w
     values = np.maximum(values, 0.0)
     square = float(w @ w - np.sum(projected**2 / (1.0 + values)))
-    return -0.5 * (square + float(np.log1p(values).sum())) - int(own.sum()) * float(np.log(sigma))
-
-
-def explanation_of(sensors: Sensors, sigma: Floats, nuisances: Floats) -> Explanation:
-    """Noise and nuisances."""
-    return Explanation(noise_factor(sensors, sigma), nuisances)
+    return -0.5 * (square + float(np.log1p(values).sum())) - len(residual) * float(np.log(sigma))

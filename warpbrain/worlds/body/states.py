@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.boundary import Boundary, Fixed
 from warpbrain.cases.case import Case
-from warpbrain.worlds.body.realigned import realigned
-from warpbrain.worlds.body.sensors import Sensors, sensors_at
-from warpbrain.worlds.body.stiffness_field import StiffnessField, stiffness_modes
 from warpbrain.errors import SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
@@ -30,6 +27,9 @@ from warpbrain.simulation.model import Material
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
+from warpbrain.worlds.body.realigned import realigned
+from warpbrain.worlds.body.sensors import Sensors, sensors_at
+from warpbrain.worlds.body.stiffness_field import StiffnessField, stiffness_modes
 
 Floats = NDArray[np.float64]
 

@@ -12,19 +12,18 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.sensors import spread_points
+from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Mechanism
+from warpbrain.worlds.body.sensors import spread_points
 
 Floats = NDArray[np.float64]
 
-#: Standard deviation of `ln mu`, distance [m] over which it is alike, and number of modes.
-SPREAD, REACH, MODES = 0.25, 0.026, 16
 
-
-def stiffness_modes(mesh: TetMesh, count: int = MODES) -> Floats:
+def stiffness_modes(mesh: TetMesh, count: int | None = None) -> Floats:
     """Modes (m, count) of `ln mu` of each element, each times its standard deviation."""
-    some = mesh.centres[spread_points(mesh.centres, 0.5 * REACH, 400)]
+    count = int(belief("tissue.field_modes")) if count is None else count
+    some = mesh.centres[spread_points(mesh.centres, 0.5 * belief("tissue.field_reach"), 400)]
     values, vectors = np.linalg.eigh(_covariance(some, some))
     largest = np.argsort(values)[::-1][:count]
     return np.asarray(_covariance(mesh.centres, some) @ vectors[:, largest] / np.sqrt(values[largest]))
@@ -32,7 +31,9 @@ def stiffness_modes(mesh: TetMesh, count: int = MODES) -> Floats:
 
 def _covariance(a: Floats, b: Floats) -> Floats:
     squares = np.sum(a**2, axis=1)[:, None] + np.sum(b**2, axis=1)[None] - 2.0 * a @ b.T
-    return np.asarray(SPREAD**2 * np.exp(-0.5 * np.maximum(squares, 0.0) / REACH**2))
+    return np.asarray(
+        belief("tissue.field") ** 2 * np.exp(-0.5 * np.maximum(squares, 0.0) / belief("tissue.field_reach") ** 2)
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.worlds.body.course import Course, course_times
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState, States
-from warpbrain.physics.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
 

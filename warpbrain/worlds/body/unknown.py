@@ -97,7 +97,10 @@ def fields(at: Linearisation, spacing: float) -> dict[str, Floats]:
         Between sites of a scan [m], which lengths are relative to.
     """
     lengths = spacing * beliefs("unknown.lengths")
-    found = {f"body force, {1e3 * length:.0f} mm": own for length, own in zip(lengths, body_forces(at, lengths.tolist()), strict=True)}
+    found = {
+        f"body force, {1e3 * length:.0f} mm": own
+        for length, own in zip(lengths, body_forces(at, lengths.tolist()), strict=True)
+    }
     for length in lengths.tolist():
         found[f"eigenstress, {1e3 * length:.0f} mm"] = eigenstresses(at, length)
         found[f"traction, {1e3 * length:.0f} mm"] = tractions(at, length)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.inference.beliefs import belief
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.nuisances import Nuisances
@@ -14,17 +13,6 @@ from warpbrain.worlds.body.sensors import Sensors, alike_near, spread_points
 from warpbrain.worlds.body.stiffness_field import stiffness_modes
 
 Floats = NDArray[np.float64]
-
-#: Standard deviations of a registration that went wrong: shift [m] and turn [rad].
-_SHIFT, _TURN = 0.01, math.radians(10.0)
-#: How much larger than it should be another nuisance is.
-_LARGER = 4.0
-#: Modes of stiffness that varies so much: more than the nuisance's, or something stiff in one place fits it better.
-_MODES = 48
-#: Error of where a surface was found [m], and how far [m] it is alike.
-_OFF, _ALIKE = 0.0015, 0.025
-#: Standard deviation of each component of a force that was measured wrongly, as a part of what was recorded.
-_FORCE = 0.3
 
 #: What each says to people.
 SENTENCES = {
@@ -37,17 +25,19 @@ SENTENCES = {
 }
 
 
-def alternatives_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]:
+def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]:
     """Effects by name."""
     sensors, mesh = at.sensors, at.system.model.mesh
     by_name = {family.name: family.columns for family in nuisances.families}
     wide = {
-        "registration": sensors.rigid * np.repeat([_SHIFT, _TURN], 3),
-        "stiffness": _LARGER * at.answers_of_elements(at.element_forces, stiffness_modes(mesh, _MODES)),
-        "loads": _LARGER * by_name["known loads"],
+        "registration": sensors.rigid
+        * np.repeat([belief("registration.wrong_shift"), belief("registration.wrong_turn")], 3),
+        "stiffness": belief("tissue.larger")
+        * at.answers_of_elements(at.element_forces, stiffness_modes(mesh, int(belief("tissue.wrong_modes")))),
+        "loads": belief("tissue.larger") * by_name["known loads"],
     }
     if "mesh" in by_name:
-        wide["mesh"] = _LARGER * by_name["mesh"]
+        wide["mesh"] = belief("tissue.larger") * by_name["mesh"]
     wide["segmentation"] = _off_surfaces(sensors)
     wide["forces"] = _wrong_forces(sensors)
     nothing = np.zeros(len(sensors))
@@ -61,7 +51,7 @@ def _wrong_forces(sensors: Sensors) -> Floats:
     recorded = sensors.computed[rows] + sensors.residual[rows]
     squares = np.bincount(groups, weights=recorded**2, minlength=1)
     found = np.zeros((len(sensors), len(rows)))
-    found[rows, np.arange(len(rows))] = _FORCE * np.sqrt(squares[groups])
+    found[rows, np.arange(len(rows))] = belief("loads.force") * np.sqrt(squares[groups])
     return found
 
 
@@ -69,8 +59,14 @@ def _off_surfaces(sensors: Sensors) -> Floats:
     """Columns (n, k) of recorded surfaces that are off: shifted from place to place, or too far out or in."""
     rows = np.flatnonzero(sensors.of_surfaces)
     where = sensors.positions[rows]
-    near = alike_near(where, where[spread_points(where, _ALIKE, 60)], _ALIKE)
+    near = alike_near(
+        where, where[spread_points(where, belief("mesh.surface_alike"), 60)], belief("mesh.surface_alike")
+    )
     along = np.column_stack([sensors.directions[rows], np.ones(len(rows))])
     found = np.zeros((len(sensors), 4 * near.shape[1]))
-    found[rows] = _OFF / np.sqrt(2.0) * (near[:, :, None] * along[:, None, :]).reshape(len(rows), 4 * near.shape[1])
+    found[rows] = (
+        belief("mesh.surface_off")
+        / np.sqrt(2.0)
+        * (near[:, :, None] * along[:, None, :]).reshape(len(rows), 4 * near.shape[1])
+    )
     return found

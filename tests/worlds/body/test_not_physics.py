@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpbrain.worlds.body.alternatives import _FORCE, _OFF, _off_surfaces, _wrong_forces
+from warpbrain.worlds.body.not_physics import _FORCE, _OFF, _off_surfaces, _wrong_forces
 from warpbrain.worlds.body.sensors import Sensors
 
 POINTS, WALL = 4, 30
