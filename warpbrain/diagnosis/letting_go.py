@@ -65,11 +65,12 @@ def where_it_lets_go(stage: Stage, kind: str) -> Placed:
     ----------
     stage : Stage
     kind : str
-        Whose proposals are releases.
+        Some of whose proposals are releases.
     """
     from scipy.special import softmax
 
-    own = stage.candidates.of_kind[kind]
+    effects_of_all = stage.candidates.effects
+    own = np.array([k for k in stage.candidates.of_kind[kind].tolist() if effects_of_all[k].proposed.patch is not None])
     chances = softmax(stage.screen.places[own, 0] / BODIES.temperature)
     probable = own[chances >= min(_PROBABLE, float(chances.max()))]
     proposals = [stage.candidates.effects[k].proposed for k in probable.tolist()]

@@ -124,7 +124,8 @@ def _spread(stage: Stage, number: int, best: Proposal, along: Floats) -> Floats:
     effects = stage.candidates.effects
     region = effects[number].proposed.released.held
     own = next(own for own in stage.candidates.of_kind.values() if number in own)
-    alike = [k for k in own.tolist() if np.array_equal(effects[k].proposed.released.held, region)]
+    patches = {k: patch for k in own.tolist() if (patch := effects[k].proposed.patch) is not None}
+    alike = [k for k, patch in patches.items() if np.array_equal(patch.held, region)]
     at = np.array([_coordinates(effects[k].proposed, best, along) for k in alike])
     return spread_of_place(at, stage.screen.places[alike, 0], _CELL)
 

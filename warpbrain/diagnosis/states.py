@@ -30,6 +30,7 @@ from warpbrain.simulation.model import Material
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
+from warpbrain.worlds.body.surfaces import with_free_surfaces
 
 Floats = NDArray[np.float64]
 
@@ -105,7 +106,7 @@ class States:
     """
 
     def __init__(self, case: Case, device: str | None = None) -> None:
-        self.case = case
+        self.case = case = with_free_surfaces(case)
         self.device = device
         self.parameters = Parameters.of(case)
         self.times = recorded_times(case)
