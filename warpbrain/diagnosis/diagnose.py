@@ -54,6 +54,7 @@ from warpbrain.diagnosis.verdict import CLAIM, overall
 from warpbrain.diagnosis.virtual import VirtualCases
 from warpbrain.errors import InputError, SolveError
 from warpbrain.threads import beside, in_threads, one_thread_of_blas
+from warpbrain.worlds.body.surfaces import with_sets_that_act
 
 Floats = NDArray[np.float64]
 
@@ -345,7 +346,7 @@ class Diagnosing:
     def _explained(self, fits: dict[str, Refit], named: tuple[Ranked, ...]) -> Case | None:
         if not named:
             return None
-        case = self.states.case_of(fits[EXPLAINED].state.hypothesis)
+        case = with_sets_that_act(self.states.case_of(fits[EXPLAINED].state.hypothesis), self.case.mesh)
         kinds = " and ".join(one.kind for one in named)
         return replace(case, name=f"{case.name}-explained", title=f"{case.title}, with {kinds}")
 

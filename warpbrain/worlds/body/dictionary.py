@@ -16,10 +16,14 @@ from warpbrain.physics.composition import CompositionError, require_composable
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.threads import in_threads
+<<<<<<< HEAD:warpbrain/worlds/body/dictionary.py
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.refitting import Refit
 from warpbrain.worlds.body.sensors import spread_points
+=======
+from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, with_free_surfaces
+>>>>>>> surf:warpbrain/diagnosis/dictionary.py
 
 Floats = NDArray[np.float64]
 
@@ -48,27 +52,21 @@ class Dictionary:
 
 def situation_of(case: Case, instants: int = 1) -> Situation:
     """What mechanisms may know of a case."""
-    mesh, _ = case.remaining
+    free = free_surfaces(case)
+    mesh, _ = with_free_surfaces(case, free).remaining
     faces = mesh.boundary
-    used = {boundary.nodes for boundary in case.boundaries}
     fixed = [
         b.nodes for b in case.boundaries if isinstance(b, Fixed) and mesh.node_sets[b.nodes][faces].all(axis=1).any()
     ]
-    still = np.zeros(len(mesh.points), dtype=bool)
-    for nodes in fixed:
-        still |= mesh.node_sets[nodes]
     held = tuple(patch for nodes in fixed for patch in _patches(mesh, nodes))
-    free = tuple(
-        name
-        for name, members in mesh.node_sets.items()
-        if name not in used and members[faces].all(axis=1).any() and not (members & still).any()
-    )
-    open_faces = faces[~still[faces].any(axis=1)]
-    area = float(np.linalg.norm(face_vectors(mesh.points, open_faces), axis=1).sum())
+    parts = [part.faces for part in connected_parts(case)]
+    area = sum(float(np.linalg.norm(face_vectors(mesh.points, part), axis=1).sum()) for part in parts)
     # points a spacing apart have about 0.7 of its cube each, and 0.85 of its square
     spacing = (mesh.volume / (0.7 * _VOLUME_SITES)) ** (1.0 / 3.0)
     between = (area / (0.85 * _SURFACE_SITES)) ** 0.5
-    on_surface = mesh.points[open_faces].mean(axis=1)
+    middles = [mesh.points[part].mean(axis=1) for part in parts]
+    # on each surface: a near point of another one, such as the other side of a thin mantle, does not stand for it
+    sites = [np.zeros((0, 3)), *(own[spread_points(own, between)] for own in middles)]
     return Situation(
         mesh,
         case.gravity_axis,
@@ -80,7 +78,7 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
         free,
         instants,
         mesh.centres[spread_points(mesh.centres, spacing)],
-        on_surface[spread_points(on_surface, between)],
+        np.concatenate(sites),
         spacing,
     )
 
@@ -222,9 +220,10 @@ def _tried(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | Inp
         except (InputError, SolveError) as error:
             return error
 
-    if any(proposal.follows != "release" for proposal in proposals):
-        return [attempt(proposal) for proposal in proposals]
+    solved = [proposal for proposal in proposals if proposal.follows != "release"]
+    released = [proposal for proposal in proposals if proposal.follows == "release"]
     # the first makes the surface, with threads of its own
+<<<<<<< HEAD:warpbrain/worlds/body/dictionary.py
     return [*map(attempt, proposals[:1]), *in_threads(attempt, proposals[1:])]
 
 
@@ -256,3 +255,8 @@ def candidates_beside(fit: Refit, candidates: Candidates) -> Candidates:
 def _is_smooth(effect: Effect) -> bool:
     """Whether it is differentiated at a state: neither solved as a whole nor over time, nor no physics."""
     return effect.proposal is not None and not effect.proposal.is_there_or_not and effect.about is None
+=======
+    found = [*map(attempt, released[:1]), *in_threads(attempt, released[1:]), *map(attempt, solved)]
+    by_proposal = dict(zip(map(id, (*released, *solved)), found, strict=True))
+    return [by_proposal[id(proposal)] for proposal in proposals]
+>>>>>>> surf:warpbrain/diagnosis/dictionary.py
