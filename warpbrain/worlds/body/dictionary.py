@@ -16,14 +16,11 @@ from warpbrain.physics.composition import CompositionError, require_composable
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.threads import in_threads
-<<<<<<< HEAD:warpbrain/worlds/body/dictionary.py
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.refitting import Refit
 from warpbrain.worlds.body.sensors import spread_points
-=======
 from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, with_free_surfaces
->>>>>>> surf:warpbrain/diagnosis/dictionary.py
 
 Floats = NDArray[np.float64]
 
@@ -223,7 +220,6 @@ def _tried(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | Inp
     solved = [proposal for proposal in proposals if proposal.follows != "release"]
     released = [proposal for proposal in proposals if proposal.follows == "release"]
     # the first makes the surface, with threads of its own
-<<<<<<< HEAD:warpbrain/worlds/body/dictionary.py
     return [*map(attempt, proposals[:1]), *in_threads(attempt, proposals[1:])]
 
 
@@ -255,8 +251,6 @@ def candidates_beside(fit: Refit, candidates: Candidates) -> Candidates:
 def _is_smooth(effect: Effect) -> bool:
     """Whether it is differentiated at a state: neither solved as a whole nor over time, nor no physics."""
     return effect.proposal is not None and not effect.proposal.is_there_or_not and effect.about is None
-=======
     found = [*map(attempt, released[:1]), *in_threads(attempt, released[1:]), *map(attempt, solved)]
     by_proposal = dict(zip(map(id, (*released, *solved)), found, strict=True))
     return [by_proposal[id(proposal)] for proposal in proposals]
->>>>>>> surf:warpbrain/diagnosis/dictionary.py

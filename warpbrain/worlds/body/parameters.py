@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.result import Smallest, Value
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.values import Smallest, Value
 
 Floats = NDArray[np.float64]
 

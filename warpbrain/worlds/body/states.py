@@ -27,14 +27,10 @@ from warpbrain.simulation.model import Material
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
-<<<<<<< HEAD:warpbrain/worlds/body/states.py
 from warpbrain.worlds.body.realigned import realigned
 from warpbrain.worlds.body.sensors import Sensors, sensors_at
 from warpbrain.worlds.body.stiffness_field import StiffnessField, stiffness_modes
 from warpbrain.worlds.body.surfaces import with_free_surfaces
-=======
-
->>>>>>> surf:warpbrain/diagnosis/states.py
 
 Floats = NDArray[np.float64]
 
