@@ -220,7 +220,9 @@ def _tried(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | Inp
     solved = [proposal for proposal in proposals if proposal.follows != "release"]
     released = [proposal for proposal in proposals if proposal.follows == "release"]
     # the first makes the surface, with threads of its own
-    return [*map(attempt, proposals[:1]), *in_threads(attempt, proposals[1:])]
+    found = [*map(attempt, released[:1]), *in_threads(attempt, released[1:]), *map(attempt, solved)]
+    by_proposal = dict(zip(map(id, (*released, *solved)), found, strict=True))
+    return [by_proposal[id(proposal)] for proposal in proposals]
 
 
 def candidates_beside(fit: Refit, candidates: Candidates) -> Candidates:
@@ -251,6 +253,3 @@ def candidates_beside(fit: Refit, candidates: Candidates) -> Candidates:
 def _is_smooth(effect: Effect) -> bool:
     """Whether it is differentiated at a state: neither solved as a whole nor over time, nor no physics."""
     return effect.proposal is not None and not effect.proposal.is_there_or_not and effect.about is None
-    found = [*map(attempt, released[:1]), *in_threads(attempt, released[1:]), *map(attempt, solved)]
-    by_proposal = dict(zip(map(id, (*released, *solved)), found, strict=True))
-    return [by_proposal[id(proposal)] for proposal in proposals]
