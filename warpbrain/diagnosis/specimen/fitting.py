@@ -1,7 +1,7 @@
 """Fits a hypothesis to some of the tests without linearising, and says how probable it then is.
 
 Levenberg's steps to the most probable coefficients; evidence by Laplace about them, averaged over the scale of the
-noise (`warpbrain.worlds.body.evidence`). A step that makes no sense to a mechanism is shortened, never taken.
+noise (`warpbrain.diagnosis.evidence`). A step that makes no sense to a mechanism is shortened, never taken.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.evidence import Explanation
+from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.specimen.forward import Forward, Hypothesis
 from warpbrain.diagnosis.specimen.material import NoStateError
 from warpbrain.errors import InputError
