@@ -116,7 +116,7 @@ def loss(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> float
     if not truth.physical:
         return losses["name where nothing is"]
     if decision.verdict == UNKNOWN:
-        return losses["unknown for a mechanism"] * (not truth.unknown)
+        return losses["name left out" if truth.unknown else "unknown for a mechanism"] * bool(truth.mechanisms)
     if decision.verdict == GROUP:
         return _group(decision, truth, losses)
     return _named(decision, truth, losses)
@@ -143,6 +143,7 @@ def _named(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> flo
     left = len(truth.mechanisms.difference(decision.causes))
     cost = losses["false name"] * false
     if decision.verdict == NAMED_AND_REST:
-        # a rest that is said stands for whatever is left
+        # a rest that is said stands for what is left, without its name
+        cost += losses["rest for a name"] * left
         return cost + losses["rest where nothing is"] * (left == 0 and not truth.unknown)
     return cost + losses["name left out"] * left + losses["rest left out"] * truth.unknown
