@@ -14,8 +14,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m referee", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("make", help="make a set of cases and seal what is true of them")
-    make.add_argument("--set", required=True, choices=("development", "calibration", "scored", "traps"), dest="which")
-    make.add_argument("--count", type=int, help="how many; 18, 80, 120 or 60 if absent")
+    sets = ("development", "calibration", "scored", "traps", "pairs", "unknown")
+    make.add_argument("--set", required=True, choices=sets, dest="which")
+    make.add_argument("--count", type=int, help="how many; 24, 80, 160, 60, 100 or 100 if absent")
     make.add_argument("--out", type=Path, required=True)
     make.add_argument(
         "--geometry", nargs="+", help="bodies, in turn; phantom 0603 or, for what is not scored, phantom 0529"
@@ -64,7 +65,7 @@ def _make(given: argparse.Namespace) -> int:
     from referee.make import make_set
     from referee.plan import SETS
 
-    geometries = given.geometry or (["phantom", "phantom", "0603" if given.which in ("scored", "traps") else "0529"])
+    geometries = given.geometry or (["phantom", "phantom", "0529" if given.which in ("development", "calibration") else "0603"])
     for name in geometries:
         if name not in NAMES:
             raise InputError(f"--geometry {name}: expected one of {', '.join(NAMES)}")
