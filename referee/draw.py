@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from referee.body import Body
 from referee.effects import (
@@ -225,16 +227,23 @@ def _place(vector: Floats) -> Place:
 def _free(body: Body, points: Floats) -> NDArray[np.bool_]:
     """Which points are away from what is held."""
     held = body.points[body.nodes("fixed") | body.nodes("side")]
-    return np.array([np.linalg.norm(held - point, axis=1).min() > _AWAY for point in points])
+    found: NDArray[np.bool_] = cKDTree(held).query(points)[0] > _AWAY
+    return found
+
+
+# many effects are drawn in one body
+@lru_cache(maxsize=4)
+def _surface_of(body: Body, away: float) -> tuple[NDArray[np.int64], Floats]:
+    """Nodes of the outer surface that are so far from what is held, and area vectors of all nodes."""
+    other = body.nodes("ventricle") | body.nodes("superior")
+    nodes = np.setdiff1d(np.unique(body.outer.nodes[:, :3]), np.flatnonzero(other))
+    return nodes[_free(body, body.points[nodes])], body.outer.spread(body.outer.vectors(body.points))
 
 
 def _surface(random: Random, body: Body) -> tuple[Place, Floats]:
     """A point of the outer surface and its outward normal."""
-    other = body.nodes("ventricle") | body.nodes("superior")
-    nodes = np.setdiff1d(np.unique(body.outer.nodes[:, :3]), np.flatnonzero(other))
-    nodes = nodes[_free(body, body.points[nodes])]
+    nodes, normals = _surface_of(body, _AWAY)
     node = int(random.choice(nodes))
-    normals = body.outer.spread(body.outer.vectors(body.points))
     around = np.linalg.norm(body.points - body.points[node], axis=1) < 0.01
     return _place(body.points[node]), unit(normals[around].sum(axis=0))
 
@@ -251,6 +260,6 @@ def _inside(random: Random, body: Body) -> Place:
     """A point well within the tissue."""
     places = body.centroids[random.permutation(len(body.centroids))[:400]]
     surface = body.points[np.unique(body.outer.nodes[:, :3])]
-    depth = np.array([np.linalg.norm(surface - place, axis=1).min() for place in places])
+    depth = cKDTree(surface).query(places)[0]
     deep = places[(depth > 0.006) & _free(body, places)]
     return _place(deep[0])

@@ -95,7 +95,7 @@ def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf)
     problem = setting.problem()
     sensors = place_sensors(setting)
     base = balance(problem, until=until)
-    held = _cap_force(problem, base.u)
+    held = cap_force_of(problem, base.u)
     if not wishes:
         u = np.repeat(base.u[None], max(1, len(setting.times)), axis=0)
         return Truth(setting, (), (), sensors, u, base.u, held, held, 0.0, 0.0, base.left)
@@ -104,7 +104,7 @@ def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf)
     given = conditionals(found, problem, base, seen, setting.times)
     acting, states = _settle(problem, found, setting.times, base, until)
     u = np.stack([state.u for state in states])
-    force = _cap_force(acting, u[-1])
+    force = cap_force_of(acting, u[-1])
     change = Change(u - base.u, force - held)
     whole = seen.d(change)
     if not LEAST <= whole <= MOST:
@@ -157,7 +157,7 @@ def _settle(
     raise AssertionError
 
 
-def _cap_force(problem: Problem, u: Floats) -> Floats:
+def cap_force_of(problem: Problem, u: Floats) -> Floats:
     """Force [N] with which the cap is held, or that acts on it."""
     F = problem.gradient(u)
     cap = problem.body.nodes("superior")
