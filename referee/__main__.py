@@ -1,4 +1,4 @@
-"""The referee: ``python -m referee make|run|see|analyse|score|calibrate``; ``mesh`` makes its meshes. See docs/referee.md."""
+"""The referee: ``python -m referee make|run|see|analyse|score|calibrate|mesh``. See docs/referee.md."""
 
 from __future__ import annotations
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from referee.calibrate import FILE, losses_of
+from referee.calibrate import FILE, losses_of, true_of
 from referee.decision import Posterior, decide
-from referee.diagnoses import UNKNOWN, Diagnosis, Ranked
+from referee.diagnoses import NOT_PHYSICS, UNKNOWN, Diagnosis, Ranked, Tried
 from referee.outcomes import Outcome
 from warpbrain.errors import InputError
 
@@ -74,7 +74,7 @@ def analysts(outcome: Outcome, analyses: Mapping[str, Analysis]) -> Iterator[Out
 
 def rightness(outcome: Outcome, analyses: Mapping[str, Analysis]) -> float | None:
     """How often the analyst's best set is the true one; None if it was not asked."""
-    tops = [any(o.holds(row) for row in o.said.ranking[:1]) for o in analysts(outcome, analyses)]
+    tops = [true_of(o, o.said.hypotheses[0]) for o in analysts(outcome, analyses)]
     return float(np.mean(tops)) if tops else None
 
 
@@ -82,18 +82,20 @@ def _diagnosis(draw: Mapping[str, Any], losses: Mapping[str, float]) -> Diagnosi
     posterior: Posterior = {frozenset(causes): p for causes, p in draw["sets"]}
     said = decide(posterior, losses)
     group = said.causes if said.verdict == "group" else ()
-    ranking = [
-        Ranked(" + ".join(causes) or "nothing", p, None, 0.0, UNKNOWN not in causes and "not physics" not in causes)
+    ranking = tuple(
+        Ranked(" + ".join(causes), p, None, 0.0, not {UNKNOWN, NOT_PHYSICS} & set(causes))
         for causes, p in draw["sets"]
-    ]
+        if causes
+    )
     return Diagnosis(
         verdict=said.verdict,
         p_value=float(draw["p_value"]),
         names=() if group else said.causes,
         probability=said.probability,
         group=group,
-        ranking=tuple(row for row in ranking if row.name != "nothing") if ranking[0].name != "nothing" else (),
+        ranking=ranking,
         parameters={},
         centre=None,
         heldout={},
+        hypotheses=tuple(Tried(frozenset(causes), float(np.log(p))) for causes, p in draw["sets"]),
     )

@@ -26,7 +26,7 @@ from scipy.stats import chi2
 
 from referee.detectability import conditional, covariance
 from referee.diagnoses import NOT_PHYSICS, UNKNOWN
-from referee.draw import MECHANISMS, OUTSIDE, RIGID_SHIFT, RIGID_TURN
+from referee.draw import MECHANISMS, NOISY, OUTSIDE, RIGID_SHIFT, RIGID_TURN, UNEVEN
 from referee.effects.effect import unit
 from referee.equilibrium import Balance, balance
 from referee.evidence import normal, pair, scaled, single
@@ -41,15 +41,15 @@ from referee.sight import Sight
 from referee.sizing import first_order
 from referee.threads import single as one_thread
 from referee.truth import cap_force_of
-from referee.unknowns import unknown_forces
+from referee.unknowns import MODES, unknown_forces
 
 Floats = NDArray[np.float64]
 Random = np.random.Generator
 
 #: Residuals of each case, rigid motions that stand for all, and sets below which probability are not written.
 RESIDUALS, MOTIONS, LEAST = 16, 200, 1e-3
-#: Traps that are hypotheses, with what they are drawn with in `referee.draw`: the noise's factor, the field's spread.
-NOISY, UNEVEN = 3.0, 0.6
+#: Traps that are hypotheses.
+MODELLED = ("registration", "noise", "stiffness")
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +99,8 @@ def analysed(label: Mapping[str, Any]) -> dict[str, Any]:
         nothing and the sets of causes with their probabilities; `seconds` of processor time.
     """
     started = time.process_time()
+    if label["kind"] == "trap" and label["names"][0] not in MODELLED:
+        return {"case": label["case"], "conditional": [], "draws": [], "seconds": 0.0}
     setting = setting_of(label)
     random = np.random.default_rng([setting.seed, 11])
     problem = setting.problem()
@@ -149,7 +151,7 @@ def _known(
             nameless = nameless.and_also(own)
         if "traction" in effect.also:
             named["traction"] = named["traction"].and_also(own)
-    modes = whiten(others[: len(others)])
+    modes = whiten(others[:MODES])
     noise = whiten(whiten(sight.noise).T)
     if len(true) == 1:
         true *= float(label["detectability"]) / float(np.linalg.norm(true))
@@ -157,7 +159,7 @@ def _known(
 
 
 def _residuals(label: Mapping[str, Any], random: Random, known: Known, true: Floats) -> Floats:
-    """Residuals (k, rows) like those of the case; none of a trap that has no model here."""
+    """Residuals (k, rows) like those of the case."""
     w = true + random.normal(size=(RESIDUALS, len(true)))
     if label["kind"] != "trap":
         return w
@@ -167,9 +169,7 @@ def _residuals(label: Mapping[str, Any], random: Random, known: Known, true: Flo
         return w + known.whiten(known.sight.moved_rigidly(shift, turn)[None])
     if trap == "noise":
         return np.asarray(random.normal(size=w.shape) @ np.linalg.cholesky(_noisy(known)).T)
-    if trap == "stiffness":
-        return w + random.normal(size=(len(w), len(known.field))) @ _uneven(known)
-    return w[:0]
+    return w + random.normal(size=(len(w), len(known.field))) @ _uneven(known)
 
 
 def _noisy(known: Known) -> Floats:
@@ -202,6 +202,7 @@ def posteriors(w: Floats, known: Known, random: Random) -> list[dict[str, Any]]:
         )
         for _ in range(MOTIONS)
     ]
+    # in the order of `MODELLED`
     traps = [
         normal(w, known.whiten(np.stack(motions)) / np.sqrt(MOTIONS)),
         scaled(w, _noisy(known)),

@@ -79,7 +79,7 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path, wri
         "",
         *(f"{name:14}{v:8.2f}   {ends[0, k]:.2f} to {ends[1, k]:.2f}" for k, (name, v) in enumerate(values.items())),
         "",
-        f"A false name costs {losses['false name']:g}: spoken names right by what the other four fifths give: {spoken}.",
+        f"A false name costs {losses['false name']:g}: names right by what the other four fifths give: {spoken}.",
         *_before_and_after(chosen, apart),
         f"Written: {write.name}",
     ]

@@ -1,4 +1,4 @@
-"""The verdict of least expected loss by the tool's published table: for the optimal analyst, and to price false names."""
+"""The verdict of least expected loss by the tool's table: of the optimal analyst, and to price false names."""
 
 from __future__ import annotations
 
@@ -73,5 +73,6 @@ def loss(decision: Decision, true: Causes, losses: Mapping[str, float]) -> float
         return losses["member of a group"] * len(decision.causes) + left if holds else losses["false group"]
     cost = losses["false name"] * len(set(decision.causes) - mechanisms)
     if decision.verdict == "named + rest":
-        return cost + losses["rest where nothing is"] * (not left and not unknown)
+        # a rest that has a name is left out as well
+        return cost + left + losses["rest where nothing is"] * (not left and not unknown)
     return cost + left + losses["rest left out"] * unknown

@@ -22,7 +22,7 @@ WIDE = 100.0
 
 
 def covariance(sight: Sight, unknown: Floats) -> Floats:
-    """Covariance (rows, rows) of all that is not known: noise, registration, and rows (k, rows) of amounts of unit sd."""
+    """Covariance (rows, rows) of noise, registration, and rows (k, rows) that are not known by a unit each."""
     spreads = np.repeat([SHIFT, TURN], 3) / np.sqrt(3.0)
     columns = np.concatenate([spreads[:, None] * sight.rigid, unknown])
     whole: Floats = sight.noise + columns.T @ columns

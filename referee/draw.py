@@ -44,6 +44,8 @@ _TILTED = np.deg2rad(8.0)
 _ASIDE = np.deg2rad(40.0)
 #: Least and largest rigid motion of the trap `registration`: shift [m] and turn [rad].
 RIGID_SHIFT, RIGID_TURN = (0.003, 0.008), (float(np.deg2rad(2.0)), float(np.deg2rad(8.0)))
+#: Of the traps `noise` and `stiffness`: factor on all noise, spread of the logarithm of stiffness.
+NOISY, UNEVEN = 3.0, 0.6
 #: How far a local effect is from what is held [m].
 _AWAY = 0.03
 
@@ -201,8 +203,8 @@ def _trap_registration(random: Random, setting: Setting) -> Setting:
 _TRAPS: dict[str, Callable[[Random, Setting], Setting]] = {
     "registration": _trap_registration,
     "mispaired": lambda random, setting: replace(setting, mispaired=0.12),
-    "noise": lambda random, setting: replace(setting, noise=3.0, declares_sigma=True),
-    "stiffness": lambda random, setting: replace(setting, field_sd=0.6, field_length=0.02),
+    "noise": lambda random, setting: replace(setting, noise=NOISY, declares_sigma=True),
+    "stiffness": lambda random, setting: replace(setting, field_sd=UNEVEN, field_length=0.02),
     "coarse": lambda random, setting: replace(setting, mesh="phantom-coarse"),
     "segmentation": lambda random, setting: replace(setting, bent=float(random.uniform(0.001, 0.002))),
 }

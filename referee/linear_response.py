@@ -11,8 +11,8 @@ from referee.sight import Sight
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
-#: Relative residual of the solves, and how many are made together.
-_CLOSE, _TOGETHER = 0.05, 64
+#: Relative residual of the solves, that of the cap's force, a small difference, and how many are made together.
+_CLOSE, _CLOSE_FORCE, _TOGETHER = 0.03, 0.003, 64
 
 
 class LinearResponse:
@@ -39,7 +39,7 @@ class LinearResponse:
             blocks.append(-base.linear.solve(right, _CLOSE).astype(np.float32))
         if sight.has_force:
             whole = np.kron(cap[:, None], np.eye(3))
-            blocks.append(whole - base.linear.solve(base.linear.whole @ whole, _CLOSE))
+            blocks.append(whole - base.linear.solve(base.linear.whole @ whole, _CLOSE_FORCE))
         self._fields: Singles = np.concatenate(blocks, axis=1).astype(np.float32)
 
     def rows(self, forces: Floats, courses: Floats | None = None) -> Floats:

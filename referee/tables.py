@@ -74,8 +74,8 @@ def score_text(
         lines.append(f"| {true} | {' | '.join(str(count) if count else '' for count in counts)} |")
     lines += [
         "",
-        "| case | true | d | each given the other | the tool's d | the old d | effect at points [mm] | said | best candidate "
-        "| the optimal analyst right |",
+        "| case | true | d | each given the other | the tool's d | the old d | effect at points [mm] | said "
+        "| best candidate | the optimal analyst right |",
         "|---" * 10 + "|",
     ]
     for o in outcomes:
