@@ -83,8 +83,8 @@ def test_a_name_needs_the_probability_that_its_losses_say():
         assert (verdict((("traction",), chance), *spread).verdict == NAMED) == named
 
 
-def test_probabilities_follow_evidence_over_temperature():
+def test_probabilities_follow_log_probability_over_temperature():
     each = [hypothesis(log_evidence=0.0), hypothesis("traction", log_evidence=3.0)]
     chances = calibration().probabilities(each)
     weight = calibration().log_weights["nothing"]
-    np.testing.assert_allclose(np.log(chances[1] / chances[0]), 3.0 / calibration().temperature - weight)
+    np.testing.assert_allclose(np.log(chances[1] / chances[0]), (3.0 - weight) / calibration().temperature)

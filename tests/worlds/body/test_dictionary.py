@@ -11,10 +11,10 @@ from slow_block import CAUSES, write_slow
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.reading import read_case
-from warpbrain.worlds.body.dictionary import dictionary_of
-from warpbrain.worlds.body.states import States
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.mechanisms.resection import Resection
+from warpbrain.worlds.body.dictionary import dictionary_of
+from warpbrain.worlds.body.states import States
 
 
 @pytest.fixture(scope="module")
