@@ -10,7 +10,7 @@ PACKAGE = Path(str(files("warpbrain")))
 #: From the ground up; docs/house.md says what each is for.
 FLOORS = [
     *("kernels", "mesh", "physics", "recordings", "gp", "cases", "simulation", "ensemble", "inference", "estimation"),
-    *("diagnosis", "report", "terminal", "bench", "cli"),
+    *("worlds", "diagnosis", "report", "terminal", "bench", "cli"),
 ]
 #: Modules that any floor may use, and that use none.
 LEAVES = ["errors", "atomic", "frame", "problems", "threads", "values"]

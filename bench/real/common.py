@@ -16,7 +16,7 @@ from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.reading import read_case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.cases.writing import write_case
-from warpbrain.diagnosis.options import DiagnosisOptions, Listener
+from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.diagnosis.specimen.result import SpecimenDiagnosis
 from warpbrain.physics.laws import NeoHookean
@@ -26,6 +26,7 @@ from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, spe
 from warpbrain.report.diagnosis.specimen_curves import write_curves
 from warpbrain.report.files import write_summary
 from warpbrain.terminal.quiet import start_warp_quietly
+from warpbrain.worlds.listener import Listener
 
 Floats = NDArray[np.float64]
 

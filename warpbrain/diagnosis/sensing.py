@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.noise import noise_factor
-from warpbrain.diagnosis.sensors import Sensors
+from warpbrain.inference.noise import noise_factor
+from warpbrain.worlds.body.sensors import Sensors
 
 Floats = NDArray[np.float64]
 
@@ -71,4 +71,4 @@ def _score(own: NDArray[np.bool_], sigma: float, residual: Floats, explained: Fl
 
 def explanation_of(sensors: Sensors, sigma: Floats, nuisances: Floats) -> Explanation:
     """Noise and nuisances."""
-    return Explanation(noise_factor(sensors, sigma), nuisances)
+    return Explanation(noise_factor(sensors.positions, sensors.directions, sensors.times, sigma), nuisances)

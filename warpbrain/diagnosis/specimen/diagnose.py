@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.options import DiagnosisOptions, Listener
-from warpbrain.diagnosis.result import Measurement, Ranked, Value
+from warpbrain.diagnosis.options import DiagnosisOptions
+from warpbrain.diagnosis.result import Measurement, Ranked
 from warpbrain.diagnosis.specimen.candidates import candidates_of
 from warpbrain.diagnosis.specimen.confirming import confirm
 from warpbrain.diagnosis.specimen.explaining import explained_case
@@ -30,6 +30,8 @@ from warpbrain.errors import InputError
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.specimen import specimen_of
 from warpbrain.threads import one_thread_of_blas
+from warpbrain.worlds.body.values import Value
+from warpbrain.worlds.listener import Listener
 
 Floats = NDArray[np.float64]
 

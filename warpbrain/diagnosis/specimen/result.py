@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.result import Measurement, Ranked, Smallest
+from warpbrain.diagnosis.result import Measurement, Ranked
 from warpbrain.diagnosis.specimen.confirming import Confirmation
 from warpbrain.diagnosis.specimen.protocol import Protocol
 from warpbrain.diagnosis.specimen.stage import Stage
+from warpbrain.worlds.body.values import Smallest
 
 Floats = NDArray[np.float64]
 

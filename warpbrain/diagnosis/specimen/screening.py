@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import Explanation, Stack, kappa_log_prior
 from warpbrain.diagnosis.screening import log_unknown
 from warpbrain.diagnosis.specimen.acting import Assumption
@@ -22,6 +21,7 @@ from warpbrain.diagnosis.specimen.material import NoStateError
 from warpbrain.diagnosis.specimen.noise import smooth_patterns
 from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.errors import InputError
+from warpbrain.worlds.body.effects import Effect
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.result import GROUP, NOT_PHYSICS, NOTHING, UNKNOWN, Ranked, Smallest
+from warpbrain.diagnosis.result import GROUP, NOT_PHYSICS, NOTHING, UNKNOWN, Ranked
 from warpbrain.diagnosis.specimen.fitting import SpecimenFit
 from warpbrain.diagnosis.specimen.forward import Forward
 from warpbrain.diagnosis.specimen.noise import COMMON, INDEPENDENT
@@ -16,6 +16,7 @@ from warpbrain.diagnosis.specimen.result import Score
 from warpbrain.diagnosis.specimen.shape import ELEMENTS
 from warpbrain.diagnosis.specimen.stage import Stage
 from warpbrain.diagnosis.specimen.verdict import Conclusion
+from warpbrain.worlds.body.values import Smallest
 
 
 def sentence_of(

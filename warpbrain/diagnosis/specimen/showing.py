@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.parameters import SEEN
-from warpbrain.diagnosis.result import Smallest
 from warpbrain.diagnosis.specimen.fitting import SpecimenFit
 from warpbrain.diagnosis.specimen.protocol import Protocol, Test
 from warpbrain.diagnosis.specimen.result import Segment
 from warpbrain.diagnosis.specimen.screening import Columns
+from warpbrain.worlds.body.parameters import SEEN
+from warpbrain.worlds.body.values import Smallest
 
 Floats = NDArray[np.float64]
 

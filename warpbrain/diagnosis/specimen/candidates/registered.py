@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.dictionary import situation_of
 from warpbrain.diagnosis.specimen.acting import Acting, Assumption, Unit
 from warpbrain.diagnosis.specimen.material import can_act
 from warpbrain.diagnosis.specimen.protocol import Protocol, Test
@@ -21,6 +20,7 @@ from warpbrain.physics.mechanisms.fibres import Fibres
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.physics.proposal import NotTestableError, Proposal
 from warpbrain.simulation.history import corners_of
+from warpbrain.worlds.body.dictionary import situation_of
 
 Floats = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""A specimen in a testing machine."""
