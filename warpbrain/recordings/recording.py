@@ -130,6 +130,9 @@ class TestRecording(Recording):
         [s], increasing.
     specimen : str
         Which one was tested, where tests of a case are of several of one shape; empty: the one.
+    axis, sheared : (float, float, float)
+        Directions of the tissue along the machine's axis z, and along its x, in which it shears; of any length but
+        zero. Of `sheared` what is across the axis counts.
     """
 
     # not a test of pytest's
@@ -141,3 +144,18 @@ class TestRecording(Recording):
     response: Floats
     time: Floats | None = None
     specimen: str = ""
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    sheared: tuple[float, float, float] | None = None
+
+    @property
+    def turn(self) -> Floats:
+        """Rotation (3, 3) from directions of the tissue to those of the machine: `R axis = z`.
+
+        Without `sheared` the machine's x is the tissue's, or its y where that is along the axis, less what of it is
+        along the axis.
+        """
+        z = np.array(self.axis) / np.linalg.norm(self.axis)
+        x = np.eye(3)[int(abs(z[0]) > 1.0 - 1e-9)] if self.sheared is None else np.array(self.sheared)
+        x = x - (x @ z) * z
+        x = x / np.linalg.norm(x)
+        return np.stack([x, np.cross(z, x), z])

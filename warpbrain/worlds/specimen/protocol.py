@@ -1,9 +1,12 @@
-"""The tests of a specimen as a diagnosis sees them: few rows of each, stress over strain, in chains of one memory.
+"""The tests of a specimen: stress over strain at the recorded rows, in chains of one memory, and few rows for inference.
 
 Every response is turned into a nominal stress [Pa]: a force over the area of an end, a torque over `int r dA`. Every
-imposed value is turned into a strain: a stretch, a shear, or the shear at the rim of a twisted cylinder. Of a test with
-times so many rows are kept that straight lines between them follow what was imposed, and that a rest is followed at
-ever longer steps (`warpbrain.simulation.history`).
+imposed value is turned into a strain: a stretch, a shear, or the shear at the rim of a twisted cylinder.
+
+A `Protocol` has all recorded rows, of which every printed error is, or few of them, of which densities are: of a test
+with times so many that straight lines between them follow what was imposed, and that a rest is followed at ever longer
+steps (`warpbrain.simulation.history`). What a test is measured by (its largest stress and strain, the way along it) is
+that of the whole record in both.
 
 Tests of one mode and one specimen whose times go on from one to the next are a chain: tissue remembers the earlier one.
 """
@@ -11,7 +14,7 @@ Tests of one mode and one specimen whose times go on from one to the next are a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,30 +26,36 @@ from warpbrain.simulation.history import corners_of, history_of
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Steps of a diagnosis from rest to the largest imposed value, rows of a test without times, and the part of a test's
-#: duration that the first step of a rest takes.
+#: Steps from rest to the largest imposed value, rows of a test without times, and the part of a test's duration that
+#: the first step of a rest takes: how rows are chosen.
 _STEPS, _ROWS, _FIRST = 4, 60, 0.005
-#: What a stress is called in each mode, for people.
-MODES = {"axial": "axial", "shear": "shear", "torsion": "torsion"}
 
 
 @dataclass(frozen=True, eq=False)
 class Test:
-    """One test.
+    """One test at n rows.
 
     Attributes
     ----------
     name, mode, specimen : str
     fitted : bool
         Whether its role is to be fitted.
+    rows : (n,) int array
+        Of its recording.
     strain, stress : (n,) array
-        Stretch or shear, and nominal stress [Pa], at the rows that are kept.
+        Stretch or shear, and nominal stress [Pa].
     time : (n,) array or None
         [s]
+    gone : (n,) array
+        Way along the test: strain that was gone through, over the largest.
     sigma : float
         Of a reading [Pa]: as declared, or as rough as the record is.
     unit : float
         Pascals of one unit of the recording's response.
+    peak, reach : float
+        Largest stress [Pa] and distance of a strain from rest of the whole record.
+    turn : (3, 3) array
+        From directions of the tissue to those of the machine.
     """
 
     # not a test of pytest's
@@ -55,11 +64,16 @@ class Test:
     mode: str
     specimen: str
     fitted: bool
+    rows: Ints
     strain: Floats
     stress: Floats
     time: Floats | None
+    gone: Floats
     sigma: float
     unit: float
+    peak: float
+    reach: float
+    turn: Floats
 
     @property
     def rest(self) -> float:
@@ -67,32 +81,29 @@ class Test:
         return 1.0 if self.mode == "axial" else 0.0
 
     @property
-    def peak(self) -> float:
-        """Largest stress [Pa], by which noise and nuisances are scaled."""
-        return float(np.abs(self.stress).max())
+    def share(self) -> Floats:
+        """Part (n,) of its time that is over; zeros without times."""
+        if self.time is None:
+            return np.zeros(len(self.strain))
+        return (self.time - self.time[0]) / max(float(np.ptp(self.time)), 1e-12)
 
     @property
     def path(self) -> Floats:
-        """Way (n,) along the test from 0: strain that was gone through over the largest, and the share of its time."""
-        reach = max(float(np.abs(self.strain - self.rest).max()), 1e-12)
-        gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self.strain)))]) / reach
-        if self.time is None:
-            return gone
-        return gone + (self.time - self.time[0]) / max(float(np.ptp(self.time)), 1e-12)
+        """Way (n,) along the test from 0: in strain, and in time."""
+        return self.gone + self.share
+
+    def at(self, rows: Ints) -> Test:
+        """The test at some of its rows, by their places among them."""
+        time = None if self.time is None else self.time[rows]
+        return replace(
+            self, rows=self.rows[rows], strain=self.strain[rows], stress=self.stress[rows], time=time,
+            gone=self.gone[rows],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Tests that tissue goes through one after the other.
-
-    Attributes
-    ----------
-    tests : tuple of int
-        Their numbers in the protocol.
-    strain : (n,) array
-        Of all of them.
-    time : (n,) array or None
-    """
+    """Tests that tissue goes through one after the other: their numbers, and strain and time (n,) of all of them."""
 
     tests: tuple[int, ...]
     strain: Floats
@@ -146,9 +157,22 @@ class Protocol:
         """On which the tests were run."""
         return tuple(dict.fromkeys(test.specimen for test in self.tests))
 
+    @property
+    def few(self) -> Protocol:
+        """The same tests at the rows that densities are of."""
+        return protocol(tuple(test.at(_kept(test)) for test in self.tests))
+
+    def spread(self, of_few: Floats, few: Protocol) -> Floats:
+        """Values (m,) at the few rows on all of them (n,): straight from one to the next."""
+        each = [
+            np.interp(test.rows, sparse.rows, of_few[rows])
+            for test, sparse, rows in zip(self.tests, few.tests, few.rows, strict=True)
+        ]
+        return np.concatenate(each)
+
 
 def protocol_of(specimen: Specimen, recordings: Sequence[TestRecording]) -> Protocol:
-    """The tests of a case, in the order of their recordings."""
+    """The tests of a case at all their rows, in the order of their recordings."""
     return protocol(tuple(test_of(specimen, recording) for recording in recordings))
 
 
@@ -164,39 +188,43 @@ def protocol(tests: tuple[Test, ...]) -> Protocol:
             groups.append([number])
     chains = []
     for group in groups:
-        times = [test.time for k, test in enumerate(tests) if k in group and test.time is not None]
+        times = [time for k in group if (time := tests[k].time) is not None]
         strain = np.concatenate([tests[k].strain for k in group])
         chains.append(Chain(tuple(group), strain, np.concatenate(times) if times else None))
     return Protocol(tests, tuple(chains), rows)
 
 
 def _goes_on(before: Test, after: Test) -> bool:
-    same = before.mode == after.mode and before.specimen == after.specimen
+    same = before.mode == after.mode and before.specimen == after.specimen and np.allclose(before.turn, after.turn)
     return same and before.time is not None and after.time is not None and bool(after.time[0] > before.time[-1])
 
 
 def test_of(specimen: Specimen, recording: TestRecording) -> Test:
-    """A recording in stress and strain, at the rows that are kept."""
+    """A recording in stress and strain."""
     unit = stress_unit(specimen, recording)
     strain = strain_of(specimen, recording.mode, recording.quantities[0], recording.imposed)
     stress = unit * recording.response
-    rest = 1.0 if recording.mode == "axial" else 0.0
-    if recording.time is None:
-        kept = np.unique(np.linspace(0, len(strain) - 1, min(_ROWS, len(strain))).round().astype(np.int64))
-    else:
-        kept = _kept(recording.time, strain, rest)
-    sigma = unit * recording.sigma if recording.sigma is not None else roughness(stress)
-    return Test(
+    away = np.abs(strain - (1.0 if recording.mode == "axial" else 0.0))
+    test = Test(
         name=recording.name,
         mode=recording.mode,
         specimen=recording.specimen,
         fitted=recording.role == "fit",
-        strain=strain[kept],
-        stress=stress[kept],
-        time=None if recording.time is None else recording.time[kept],
-        sigma=sigma,
+        rows=np.arange(len(strain)),
+        strain=strain,
+        stress=stress,
+        time=recording.time,
+        gone=np.zeros(len(strain)),
+        sigma=unit * recording.sigma if recording.sigma is not None else roughness(stress),
         unit=unit,
+        peak=float(np.abs(stress).max()),
+        reach=max(float(away.max()), 1e-12),
+        turn=recording.turn,
     )
+    # without the jitter of a reading, which would make every way long
+    kept = _kept(test)
+    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain[kept])))]) / test.reach
+    return replace(test, gone=np.interp(test.rows, kept, gone))
 
 
 test_of.__test__ = False  # type: ignore[attr-defined]  # not a test of pytest's
@@ -232,9 +260,12 @@ def roughness(values: Floats) -> float:
     return float(1.4826 * np.median(np.abs(second - np.median(second))) / np.sqrt(6.0))
 
 
-def _kept(time: Floats, strain: Floats, rest: float) -> Ints:
-    """Rows of a record in time that are enough of it."""
-    reach = max(float(np.abs(strain - rest).max()), 1e-12)
-    history = history_of(time, strain, reach, _STEPS, _FIRST * float(np.ptp(time)))
-    wanted = np.searchsorted(time, history.time).clip(0, len(time) - 1)
-    return np.unique(np.concatenate([wanted, np.array(corners_of(time, strain, 0.02 * reach))])).astype(np.int64)
+def _kept(test: Test) -> Ints:
+    """Rows of a record that are enough of it, the first and the last among them."""
+    count = len(test.strain)
+    if test.time is None:
+        return np.unique(np.linspace(0, count - 1, min(_ROWS, count)).round().astype(np.int64))
+    history = history_of(test.time, test.strain, test.reach, _STEPS, _FIRST * float(np.ptp(test.time)))
+    wanted = np.searchsorted(test.time, history.time).clip(0, count - 1)
+    corners = np.array(corners_of(test.time, test.strain, 0.02 * test.reach))
+    return np.unique(np.concatenate([wanted, corners])).astype(np.int64)

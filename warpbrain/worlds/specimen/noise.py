@@ -1,7 +1,7 @@
 """What the noise of tests is taken to be: independent readings, and a smooth part that a stretch of a curve shares.
 
 Errors of a curve are alike from row to row: of a mean over specimens, of a gauge, of a shape that is not quite what was
-measured. Taking them for independent makes any difference significant. Its scale is unknown and is averaged over.
+measured. Taking them for independent makes any difference significant. Its scale is unknown and is summed over.
 
 How alike two rows are is Matern's function of order 5/2: such errors have a slope and a curvature, but not every
 derivative, as a Gaussian function would have it (Stein 1999, Interpolation of Spatial Data, section 1.7). With a
@@ -14,30 +14,29 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.specimen.protocol import Protocol, Test
+from warpbrain.inference.beliefs import belief
+from warpbrain.worlds.specimen.protocol import Protocol, Test
 
 Floats = NDArray[np.float64]
-
-#: Independent part at least, and the common part, of the largest stress; way along a test over which it is common.
-INDEPENDENT, COMMON, REACH = 0.01, 0.04, 0.4
 
 
 def noise_factor(protocol: Protocol) -> Floats:
     """Lower triangular factor (n, n) of the covariance [Pa^2]."""
     covariance = np.zeros((len(protocol), len(protocol)))
     for test, rows in zip(protocol.tests, protocol.rows, strict=True):
-        own = max(test.sigma, INDEPENDENT * test.peak)
-        covariance[rows, rows] = own**2 * np.eye(len(test.strain)) + (COMMON * test.peak) ** 2 * _alike(test, REACH)
+        reading = max(test.sigma, belief("specimen.reading") * test.peak)
+        shared = (belief("specimen.shared") * test.peak) ** 2 * _alike(test, belief("specimen.reach"))
+        covariance[rows, rows] = reading**2 * np.eye(len(test.strain)) + shared
     return np.asarray(np.linalg.cholesky(covariance))
 
 
-def smooth_patterns(protocol: Protocol, size: float, count: int = 8) -> Floats:
-    """Columns (n, count per test) of any smooth change of a test, of a size relative to its largest stress."""
+def smooth_patterns(protocol: Protocol, reach: float, count: int = 8) -> Floats:
+    """Columns (n, count per test) of any smooth change of a test, as large as its largest stress."""
     columns = []
     for test, rows in zip(protocol.tests, protocol.rows, strict=True):
-        values, vectors = np.linalg.eigh(_alike(test, 2.0 * REACH))
+        values, vectors = np.linalg.eigh(_alike(test, reach))
         own = np.zeros((len(protocol), min(count, len(values))))
-        own[rows] = size * test.peak * vectors[:, -count:] * np.sqrt(np.maximum(values[-count:], 0.0))
+        own[rows] = test.peak * vectors[:, -count:] * np.sqrt(np.maximum(values[-count:], 0.0))
         columns.append(own)
     return np.concatenate(columns, axis=1)
 

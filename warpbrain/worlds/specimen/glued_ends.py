@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
-from warpbrain.diagnosis.specimen.material import HomogeneousMaterial, NoStateError
-from warpbrain.diagnosis.specimen.protocol import Protocol, radius_of, strain_of, stress_unit
+from warpbrain.worlds.specimen.material import HomogeneousMaterial, NoStateError
+from warpbrain.worlds.specimen.protocol import Protocol, radius_of, strain_of, stress_unit
 from warpbrain.errors import SolveError
-from warpbrain.physics.laws import Law
-from warpbrain.physics.mechanism import Substituting
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.specimen import Rig
 
@@ -47,7 +45,7 @@ class Curve:
 
 
 @dataclass(eq=False)
-class Shape:
+class GluedEnds:
     """Factors of a specimen with its ends glued, for any law.
 
     Parameters
@@ -72,17 +70,22 @@ class Shape:
         self._known.append((material, found))
         return found
 
+    def factor(self, material: HomogeneousMaterial, protocol: Protocol) -> Floats:
+        """At all rows (n,) of a protocol of the same tests."""
+        curves = self.curves(material)
+        return np.concatenate([curves[test.mode].at(test.strain) for test in protocol.tests])
+
     def _curve(self, mode: str, material: HomogeneousMaterial) -> Curve:
         rest = 1.0 if mode == "axial" else 0.0
         most = _STRETCH if mode == "axial" else _SHEAR
         strains = np.concatenate([test.strain for test in self.protocol.tests if test.mode == mode]) - rest
         low, high = max(float(strains.min()), -most), min(float(strains.max()), most)
         reach = max(-low, high)
-        elastic = replace(material, moduli=(), times=(), fibres=())
+        elastic = replace(material, moduli=(), times=(), storing=())
         for shrink in (1.0, 0.5, 0.25):
             recording = self._recording(mode, np.array([rest + shrink * low, rest + shrink * high]))
             try:
-                found = self._rig(material.law).run(recording, _STEPS)
+                found = self._rig(material).run(recording, _STEPS)
             except SolveError:
                 continue
             strain = strain_of(self.case_specimen, mode, recording.quantities[0], found.imposed)
@@ -113,14 +116,12 @@ class Shape:
             response=np.zeros(len(strain)),
         )
 
-    def _rig(self, law: Law) -> Rig:
+    def _rig(self, material: HomogeneousMaterial) -> Rig:
         [(label, tissue)] = self.case.tissues.items()
-        kept = tuple(m for m in self.case.mechanisms if isinstance(m, Substituting) and not hasattr(m, "exponent"))
+        law = material.law
+        tissue = replace(tissue, law=law, model=law.name, formulation=material.formulation)
         case = replace(
-            self.case,
-            specimen=self.case_specimen,
-            tissues={label: replace(tissue, law=law, model=law.name)},
-            mechanisms=kept,
+            self.case, specimen=self.case_specimen, tissues={label: tissue}, poisson=material.poisson, mechanisms=()
         )
         return Rig(case, self.device, elements=ELEMENTS)
 

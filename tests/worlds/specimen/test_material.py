@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from testing_machine import EXACT, case_of, recorded
 
 from warpbrain.cases.specimen import Specimen
-from warpbrain.diagnosis.specimen.material import HomogeneousMaterial, memory_of
+from warpbrain.worlds.specimen.material import HomogeneousMaterial, relaxing
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
 from warpbrain.physics.mechanisms.fibres import Fibres
@@ -78,7 +78,7 @@ def test_memory_is_the_hereditary_integral():
                 total += slope * quad(lambda s: np.exp(-(t - s) / tau), a, min(b, t))[0]
         return total
 
-    np.testing.assert_allclose(memory_of(time, tau) @ values, [held(t) for t in time], atol=1e-9)
+    np.testing.assert_allclose(relaxing(values, time, tau), [held(t) for t in time], atol=1e-9)
 
 
 def test_a_viscous_history_is_that_of_the_rig():

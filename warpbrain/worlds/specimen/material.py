@@ -4,16 +4,15 @@ A state is a stretch along z, two lateral ones and a shear of x along z, `F = [[
 Stresses are slopes of the energy, taken by differences, so that every law of the house is the same to them. Lateral
 faces are free: lubricated ends leave `lx` and `ly` to equilibrium. Simple shear prescribes all of `F`.
 
-Memory is that of `warpbrain.physics.mechanisms.viscoelasticity`, integrated exactly for a stress that goes straight
-from row to row: `q_n = sum_m beta (tau/h_m) (1 - exp(-h_m/tau)) exp(-(t_n - t_m)/tau) (S_m - S_(m-1))` (Simo and
-Hughes, Computational Inelasticity, section 10.3, before its midpoint rule).
+Memory is a Prony series (`warpbrain.physics.mechanism.Relaxing`), integrated exactly for a stress that goes straight
+from row to row (Simo and Hughes, Computational Inelasticity, section 10.3, before its midpoint rule).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,20 +21,14 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.total_energy import total_energy
-from warpbrain.physics.mechanism import Mechanism, Substituting
-from warpbrain.physics.mechanisms.fibres import Fibres
-from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
+from warpbrain.physics.mechanism import Mechanism, Relaxing, Storing, Substituting
 
 Floats = NDArray[np.float64]
-#: Further energy [Pa] at `lx`, `ly`, `lz` and `g`.
-Energy = Callable[[Floats, Floats, Floats, Floats], Floats]
 
 _STEP = 2e-5
 _NEWTON, _TOLERANCE = 60, 1e-9
 #: Slope of a branch's lateral stress over its modulus, for Newton steps: near enough to converge.
 _BRANCH_SLOPE = 2.0
-#: Matrices of memory that are kept: a fit asks for the same ones again and again.
-_REMEMBERED = 24
 
 
 class NoStateError(Exception):
@@ -44,7 +37,7 @@ class NoStateError(Exception):
 
 def can_act(kind: type[Mechanism]) -> bool:
     """Whether a kind of mechanism is known to a homogeneous state."""
-    return issubclass(kind, Viscoelasticity | Fibres) or hasattr(kind, "substitute")
+    return issubclass(kind, Substituting | Storing | Relaxing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +49,8 @@ class HomogeneousMaterial:
     law : Law
     poisson : float
     formulation : str
-    fibres : tuple of Fibres
+    storing : tuple of Storing
+        What stores energy beside the law.
     moduli, times : tuple of float
         Branches of its memory: relative to the law's shear modulus, and [s].
     """
@@ -64,13 +58,15 @@ class HomogeneousMaterial:
     law: Law
     poisson: float
     formulation: str
-    fibres: tuple[Fibres, ...] = ()
+    storing: tuple[Storing, ...] = ()
     moduli: tuple[float, ...] = ()
     times: tuple[float, ...] = ()
 
     @classmethod
-    def of_case(cls, case: Case, mechanisms: Sequence[Mechanism]) -> HomogeneousMaterial:
-        """The tissue of a case with all that acts on it, its own mechanisms among that.
+    def of_case(
+        cls, case: Case, mechanisms: Sequence[Mechanism], turn: Floats | None = None
+    ) -> HomogeneousMaterial:
+        """The tissue of a case with all that acts on it, its own mechanisms among that, turned in the machine.
 
         Raises
         ------
@@ -80,15 +76,16 @@ class HomogeneousMaterial:
         [(label, tissue)] = case.tissues.items()
         law, poisson, formulation = tissue.known_law, case.poisson, tissue.formulation
         found = cls(law, poisson, formulation)
-        for mechanism in (*case.mechanisms, *mechanisms):
+        for given in (*case.mechanisms, *mechanisms):
+            mechanism = given if turn is None else given.turned(turn)
             if isinstance(mechanism, Substituting):
                 law, poisson, formulation = mechanism.substitute(label, found.law, found.poisson, found.formulation)
                 found = replace(found, law=law, poisson=poisson, formulation=formulation)
-            elif isinstance(mechanism, Viscoelasticity):
-                moduli, times = (*found.moduli, *mechanism.moduli), (*found.times, *mechanism.times)
-                found = replace(found, moduli=moduli, times=times)
-            elif isinstance(mechanism, Fibres):
-                found = replace(found, fibres=(*found.fibres, mechanism))
+            elif isinstance(mechanism, Relaxing):
+                moduli, times = mechanism.branches()
+                found = replace(found, moduli=(*found.moduli, *moduli), times=(*found.times, *times))
+            elif isinstance(mechanism, Storing):
+                found = replace(found, storing=(*found.storing, mechanism))
             else:
                 raise InputError(
                     f"{case.path}: [[mechanism]] kind = '{mechanism.kind}': a diagnosis of a specimen has no "
@@ -103,8 +100,10 @@ class HomogeneousMaterial:
         first = np.sqrt(0.5 * (lx**2 + lz**2 + g**2 + apart))
         stretches = np.stack([first, ly, lx * lz / first], axis=-1)
         found = total_energy(self.law, stretches, self.poisson, self.formulation)
-        for one in self.fibres:
-            found = found + _fibre_energy(one, lx, ly, lz, g)
+        if self.storing:
+            F = np.zeros((len(lx), 3, 3))
+            F[:, 0, 0], F[:, 1, 1], F[:, 2, 2], F[:, 0, 2] = lx, ly, lz, g
+            found = found + sum(one.stored_energy(F) for one in self.storing)
         return found
 
     def axial(self, stretch: Floats, time: Floats | None) -> Floats:
@@ -116,13 +115,12 @@ class HomogeneousMaterial:
             If lateral faces find no equilibrium.
         """
         g = np.zeros_like(stretch)
-        memory = self._memory(time)
         # what is alike across z stays so
-        groups = ((0,), (1,)) if self.fibres else ((0, 1),)
+        groups = ((0,), (1,)) if self.storing else ((0, 1),)
         lateral = np.repeat(stretch[:, None] ** -self.poisson, 2, axis=1)
         with np.errstate(all="ignore"):
             for _ in range(_NEWTON):
-                residual, slope = self._lateral(groups, lateral, stretch, g, memory)
+                residual, slope = self._lateral(groups, lateral, stretch, g, time)
                 step = np.linalg.solve(slope, residual[..., None])[..., 0]
                 step = np.clip(step, -0.2 * lateral.min(), 0.2 * lateral.min())
                 for j, group in enumerate(groups):
@@ -134,19 +132,18 @@ class HomogeneousMaterial:
             raise NoStateError("lateral faces find no equilibrium")
         lx, ly = lateral.T
         found = _slope(lambda h: self.energy(lx, ly, stretch + h, g))
-        if memory is not None:
+        if time is not None and self.times:
             _, _, Szz, _ = self._isochoric(lx, ly, stretch, g)
-            found = found + stretch * (memory @ Szz)
+            found = found + stretch * self._held(Szz, time)
         return found
 
     def shear(self, shear: Floats, time: Floats | None) -> Floats:
         """Nominal stress [Pa] along x of states in simple shear."""
         one = np.ones_like(shear)
         found = _slope(lambda h: self.energy(one, one, one, shear + h))
-        memory = self._memory(time)
-        if memory is not None:
+        if time is not None and self.times:
             _, _, Szz, Sxz = self._isochoric(one, one, one, shear)
-            found = found + memory @ Sxz + shear * (memory @ Szz)
+            found = found + self._held(Sxz, time) + shear * self._held(Szz, time)
         return found
 
     def torsion(self, rim: Floats, time: Floats | None) -> Floats:
@@ -160,14 +157,10 @@ class HomogeneousMaterial:
         """Nominal stress [Pa] of a chain of one mode."""
         return {"axial": self.axial, "shear": self.shear, "torsion": self.torsion}[mode](strain, time)
 
-    def _memory(self, time: Floats | None) -> Floats | None:
-        """From stresses (n,) to what the branches hold of them (n,); each over the shear modulus."""
-        if time is None or not self.times:
-            return None
-        return sum(
-            (beta * memory_of(time, tau) for beta, tau in zip(self.moduli, self.times, strict=True)),
-            start=np.zeros((len(time), len(time))),
-        )
+    def _held(self, S: Floats, time: Floats) -> Floats:
+        """What all branches hold (n,) of stresses (n,)."""
+        each = (beta * relaxing(S, time, tau) for beta, tau in zip(self.moduli, self.times, strict=True))
+        return sum(each, start=np.zeros(len(S)))
 
     def _isochoric(self, lx: Floats, ly: Floats, lz: Floats, g: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """`S = mu0 J^(-2/3) (I - I1/3 C^-1)`: xx, yy, zz and xz."""
@@ -185,7 +178,7 @@ class HomogeneousMaterial:
         return self.law.shear_modulus
 
     def _lateral(
-        self, groups: tuple[tuple[int, ...], ...], lateral: Floats, stretch: Floats, g: Floats, memory: Floats | None
+        self, groups: tuple[tuple[int, ...], ...], lateral: Floats, stretch: Floats, g: Floats, time: Floats | None
     ) -> tuple[Floats, Floats]:
         """Forces (n, k) on the lateral faces and about how they change with the stretches (n, k, k)."""
 
@@ -206,43 +199,30 @@ class HomogeneousMaterial:
         if k == 2:
             mixed = (at(h, h) - at(h, -h) - at(-h, h) + at(-h, -h)) / (4.0 * h**2)
             slope[:, 0, 1] = slope[:, 1, 0] = mixed
-        if memory is not None:
+        if time is not None and self.times:
             S = self._isochoric(lateral[:, 0], lateral[:, 1], stretch, g)
             for i, group in enumerate(groups):
                 for axis in group:
-                    residual[:, i] += lateral[:, axis] * (memory @ S[axis])
+                    residual[:, i] += lateral[:, axis] * self._held(S[axis], time)
                 slope[:, i, i] += _BRANCH_SLOPE * len(group) * self._mu * sum(self.moduli)
         return residual, slope
 
 
-def memory_of(time: Floats, tau: float) -> Floats:
-    """From values (n,), zero long before the first time, to what relaxes of them at each time (n, n)."""
-    return _memory(time.tobytes(), tau)
+def relaxing(values: Floats, time: Floats, tau: float) -> Floats:
+    """What relaxes of values (n,), zero long before the first time, at each time (n,).
 
-
-@lru_cache(maxsize=_REMEMBERED)
-def _memory(times: bytes, tau: float) -> Floats:
-    time = np.frombuffer(times)
+    `q_n = exp(-h_n/tau) q_(n-1) + (tau/h_n) (1 - exp(-h_n/tau)) (v_n - v_(n-1))`, all n at once: pairs of factor and
+    addend are composed over 1, 2, 4, ... rows (Blelloch 1990, Prefix sums and their applications).
+    """
     h = np.diff(time)
-    kept = np.concatenate([[1.0], -np.expm1(-h / tau) * tau / h])
-    since = time[:, None] - time[None, :]
-    rises = np.where(since >= 0.0, np.exp(-np.maximum(since, 0.0) / tau) * kept, 0.0)
-    # of differences, as a matrix on values
-    found = rises.copy()
-    found[:, :-1] -= rises[:, 1:]
-    return found
-
-
-def _fibre_energy(fibres: Fibres, lx: Floats, ly: Floats, lz: Floats, g: Floats) -> Floats:
-    """`k1/(2 k2) (exp(k2 E^2) - 1)`, see `warpbrain.physics.mechanisms.fibres`."""
-    if fibres.direction is None:
-        raise InputError("fibres: a homogeneous state has one direction of them")
-    a, b, c = np.asarray(fibres.direction) / np.linalg.norm(fibres.direction)
-    I1 = lx**2 + ly**2 + lz**2 + g**2
-    I4 = (a * lx + c * g) ** 2 + (b * ly) ** 2 + (c * lz) ** 2
-    d = fibres.dispersion
-    E = np.maximum(d * (I1 - 3.0) + (1.0 - 3.0 * d) * (I4 - 1.0), 0.0)
-    return fibres.stiffness / (2.0 * fibres.exponent) * np.expm1(fibres.exponent * E**2)
+    decay = np.concatenate([[0.0], np.exp(-h / tau)])
+    q = np.diff(values, prepend=0.0) * np.concatenate([[1.0], -np.expm1(-h / tau) * tau / h])
+    step = 1
+    while step < len(q):
+        q[step:] = q[step:] + decay[step:] * q[:-step]
+        decay[step:] = decay[step:] * decay[:-step]
+        step *= 2
+    return q
 
 
 def _slope(energy: Callable[[float], Floats]) -> Floats:

@@ -9,9 +9,8 @@ from testing_machine import case_of, recorded
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
-from warpbrain.diagnosis.options import DiagnosisOptions
-from warpbrain.diagnosis.specimen.diagnose import DiagnosingSpecimen
-from warpbrain.diagnosis.specimen.result import SpecimenDiagnosis
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
+from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 from warpbrain.errors import InputError
 from warpbrain.recordings.recording import TestRecording
 
@@ -74,7 +73,7 @@ def static(law, rng: np.random.Generator) -> list[TestRecording]:
 
 def diagnosed(recordings: list[TestRecording], kinds=KINDS, **options) -> SpecimenDiagnosis:
     case = replace(case_of(ROD), recordings=tuple(recordings))
-    return DiagnosingSpecimen(case, DiagnosisOptions(candidates=kinds, **options), "cpu").run()
+    return DiagnosingSpecimen(case, SpecimenOptions(candidates=kinds, **options), "cpu").run()
 
 
 def test_false_alarms_on_neo_hookean_rods_are_as_rare_as_was_asked():
@@ -88,7 +87,7 @@ def test_false_alarms_on_neo_hookean_rods_are_as_rare_as_was_asked():
 
 def test_an_ogden_rod_resists_compression_more():
     found = diagnosed(static(lambda l: ogden(l, -15.0), np.random.default_rng(1)))
-    assert found.verdict == "named" and [one.kind for one in found.named] == ["asymmetry"]
+    assert found.verdict == "named" and [one.name for one in found.named] == ["asymmetry"]
     [exponent] = found.named[0].values
     assert abs(exponent.value + 15.0) < 3.0 * exponent.sd + 3.0
     assert found.rejected["viscoelasticity"].startswith("not testable with these data")
@@ -103,7 +102,7 @@ def test_a_viscous_rod_is_told_by_its_cycles():
         time, stretch = cycle(duration)
         tests.append(rod_test(name, stretch, noisy(viscous(time, stretch, 1.5, 12.0), rng), time))
     found = diagnosed(tests)
-    assert found.verdict == "named" and [one.kind for one in found.named] == ["viscoelasticity"]
+    assert found.verdict == "named" and [one.name for one in found.named] == ["viscoelasticity"]
     values = {one.name: one for one in found.named[0].values}
     # what noise of 1 % of the peak, and of 2 % that neighbours share, leaves open: 10 % and 14 % off
     assert values["moduli"].value == pytest.approx(1.5, rel=0.15)
@@ -140,7 +139,7 @@ def test_bad_cases_are_refused():
         DiagnosingSpecimen(case_with(shear))
     diagnosing = DiagnosingSpecimen(
         case_with(rod_test("tension", np.linspace(1.0, 1.1, 30), neo_hookean(np.linspace(1.0, 1.1, 30)))),
-        DiagnosisOptions(candidates=("gravity",)),
+        SpecimenOptions(candidates=("gravity",)),
     )
     with pytest.raises(InputError, match="--candidates gravity"):
         diagnosing.run()
