@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpbrain.diagnosis.dictionary import candidates_at, dictionary_of, patch_of
-from warpbrain.diagnosis.effects import Effects
+from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of, patch_of
+from warpbrain.worlds.body.effects import Effects
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.diagnosis.stage import Stage, compared
 

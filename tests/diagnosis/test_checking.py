@@ -8,7 +8,7 @@ from sinking_block import NOISE, OPTIONS
 
 from warpbrain.diagnosis.checking import check_errors
 from warpbrain.diagnosis.diagnose import Diagnosing
-from warpbrain.diagnosis.realigned import realigned
+from warpbrain.worlds.body.realigned import realigned
 from warpbrain.diagnosis.result import EXPLAINED
 
 

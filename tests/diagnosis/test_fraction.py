@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from warpbrain.diagnosis.fraction import likely_fraction
-from warpbrain.diagnosis.nuisances import FRACTION, Family, Nuisances
+from warpbrain.worlds.body.fraction import likely_fraction
+from warpbrain.worlds.body.nuisances import FRACTION, Family, Nuisances
 
 ROWS = 300
 

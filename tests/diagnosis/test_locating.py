@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpbrain.diagnosis.flexible import force_patches
+from warpbrain.worlds.body.flexible import force_patches
 from warpbrain.diagnosis.locating import score_map
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.sensors import Sensors
+from warpbrain.worlds.body.evidence import Explanation
+from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.diagnosis.single_points import log_evidence_and_odds, log_odds
 
 POINTS = 12

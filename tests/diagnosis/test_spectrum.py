@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from warpbrain.diagnosis.effects import Effect
+from warpbrain.worlds.body.effects import Effect
 from warpbrain.diagnosis.spectrum import amount_in_all
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.physics.proposal import Proposal

@@ -8,7 +8,7 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import Outliers, with_gross_errors
+from warpbrain.inference.gross_errors import Outliers, columns_of_gross_errors, with_gross_errors
 
 PRIOR = Outliers(0.03, 15.0)
 POINTS = [np.arange(3 * k, 3 * k + 3) for k in range(6)]
@@ -60,3 +60,37 @@ def test_what_a_cause_explains_is_no_gross_error() -> None:
     assert (alone.log_odds > 0.0).sum() == 2
     assert not (together.log_odds > 0.0).any()
     assert together.log_density > alone.log_density
+
+
+def test_points_of_three_rows_and_of_one_against_covariances_written_out() -> None:
+    """Many flips, points of surfaces beside tracked ones: odds are differences of dense normal log densities."""
+    random = np.random.default_rng(5)
+    points = [np.arange(3 * k, 3 * k + 3) for k in range(12)] + [np.array([36 + k]) for k in range(14)]
+    noise = np.linalg.cholesky(
+        0.2 * np.exp(-0.2 * np.abs(np.subtract.outer(np.arange(50), np.arange(50)))) + np.eye(50)
+    )
+    one = GaussianModel(noise, random.normal(size=(50, 6)), 0.9)
+    residual = one.draws(1, random)[:, 0]
+    for point in random.choice(26, 9, replace=False).tolist():
+        residual[points[point]] += 12.0 * random.normal(size=len(points[point]))
+    found = with_gross_errors(one, residual, points, PRIOR)
+    gross = found.log_odds > 0.0
+    assert gross.sum() > 4
+
+    def log_density(which: np.ndarray) -> float:
+        covariance = one.covariance.copy()
+        for rows in (points[k] for k in np.flatnonzero(which)):
+            of_noise = one.scale**2 * (one.noise_factor @ one.noise_factor.T)[np.ix_(rows, rows)]
+            covariance[np.ix_(rows, rows)] += (PRIOR.inflation**2 - 1.0) * of_noise
+        prior = np.where(which, np.log(PRIOR.probability), np.log1p(-PRIOR.probability)).sum()
+        return float(stats.multivariate_normal(np.zeros(50), covariance).logpdf(residual) + prior)
+
+    here = log_density(gross)
+    for point in range(26):
+        other = gross.copy()
+        other[point] = ~gross[point]
+        odds = (here - log_density(other)) * (1.0 if gross[point] else -1.0)
+        assert found.log_odds[point] == pytest.approx(odds, abs=1e-8)
+    wider = one.with_columns(columns_of_gross_errors(one, points, gross, PRIOR))
+    prior = np.where(gross, np.log(PRIOR.probability), np.log1p(-PRIOR.probability)).sum()
+    assert float(wider.log_density(residual)) + prior == pytest.approx(here, abs=1e-8)

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.base import Base
+from warpbrain.worlds.body.base import Base
 from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.onset import Onset
-from warpbrain.diagnosis.refitting import Refit
+from warpbrain.worlds.body.refitting import Refit
 from warpbrain.diagnosis.traits import Traits
 
 Floats = NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.alternatives import SENTENCES
-from warpbrain.diagnosis.base import Base
+from warpbrain.worlds.body.not_physics import SENTENCES
+from warpbrain.worlds.body.base import Base
 from warpbrain.diagnosis.result import (
     CANNOT_SAY,
     GROUP,

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.flexible import SCALES, force_patches
-from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.worlds.body.evidence import Explanation
+from warpbrain.worlds.body.flexible import SCALES, force_patches
+from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.mesh import nodes_of
 
 Floats = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What is believed before anything is recorded, read from `priors.toml`: every number that decides stands there once."""
+"""What is believed before anything is recorded, read from `priors.toml`: each number stands there once."""
 
 from __future__ import annotations
 

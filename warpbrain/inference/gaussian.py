@@ -17,6 +17,26 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
+class _Noise:
+    """Covariance of the noise and its inverse, which models of one noise share and few ask for."""
+
+    def __init__(self, factor: Floats) -> None:
+        self._factor = factor
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """`L L^T` (n, n)."""
+        return self._factor @ self._factor.T
+
+    @cached_property
+    def precision(self) -> Floats:
+        """`(L L^T)^-1` (n, n)."""
+        from scipy.linalg.lapack import dpotri
+
+        lower, _ = dpotri(self._factor, lower=1)
+        return np.asarray(np.tril(lower) + np.tril(lower, -1).T)
+
+
 @dataclass(frozen=True, eq=False)
 class GaussianModel:
     """Rows with noise and normal coefficients.
@@ -41,13 +61,17 @@ class GaussianModel:
     def with_scale(self, scale: float) -> GaussianModel:
         """The same with another factor on the noise; nothing is factorised again."""
         other = GaussianModel(self.noise_factor, self.columns, scale)
+        other.__dict__["_noise"] = self._noise
         other.__dict__["_whitened_columns"] = self._whitened_columns
         other.__dict__["_spectrum"] = self._spectrum
         return other
 
     def with_columns(self, columns: Floats) -> GaussianModel:
         """The same with more columns (n, k) of normal coefficients."""
-        return GaussianModel(self.noise_factor, np.column_stack([self.columns, columns]), self.scale)
+        other = GaussianModel(self.noise_factor, np.column_stack([self.columns, columns]), self.scale)
+        other.__dict__["_noise"] = self._noise
+        other.__dict__["_whitened_columns"] = np.column_stack([self._whitened_columns, self._by_noise(columns)])
+        return other
 
     def rows(self, rows: NDArray[np.bool_]) -> GaussianModel:
         """The marginal distribution of some rows, (n,) bool."""
@@ -58,7 +82,40 @@ class GaussianModel:
     @cached_property
     def covariance(self) -> Floats:
         """`S` (n, n)."""
-        return self.scale**2 * self.noise_factor @ self.noise_factor.T + self.columns @ self.columns.T
+        return self.scale**2 * self._noise.covariance + self.columns @ self.columns.T
+
+    @cached_property
+    def _noise(self) -> _Noise:
+        return _Noise(self.noise_factor)
+
+    @cached_property
+    def _seen(self) -> tuple[Floats, Floats]:
+        """`B` (n, q) and weights (q,) with which `S^-1 = ((L L^T)^-1 - B diag(weights) B^T) / kappa^2`."""
+        from scipy.linalg import solve_triangular
+
+        values, directions = self._spectrum
+        B = solve_triangular(self.noise_factor, directions, lower=True, trans="T", check_finite=False)
+        return np.asarray(B), 1.0 / (self.scale**2 + values)
+
+    def noise_blocks(self, rows: NDArray[np.int64]) -> Floats:
+        """Covariance (g, d, d) of the noise of points with the rows (g, d)."""
+        return np.asarray(self.scale**2 * self._noise.covariance[rows[:, :, None], rows[:, None, :]])
+
+    def precision_columns(self, rows: NDArray[np.int64]) -> Floats:
+        """Columns (n, d) of `S^-1` by their numbers (d,)."""
+        B, weights = self._seen
+        return np.asarray((self._noise.precision[:, rows] - B @ (weights * B[rows]).T) / self.scale**2)
+
+    def precision_blocks(self, rows: NDArray[np.int64]) -> Floats:
+        """Diagonal blocks (g, d, d) of `S^-1` of points with the rows (g, d)."""
+        B, weights = self._seen
+        of_noise = self._noise.precision[rows[:, :, None], rows[:, None, :]]
+        return np.asarray((of_noise - (B[rows] * weights) @ np.swapaxes(B[rows], 1, 2)) / self.scale**2)
+
+    def precision_times(self, rows: Floats) -> Floats:
+        """`S^-1` times rows (n,) or (n, b)."""
+        B, weights = self._seen
+        return np.asarray((self._noise.precision @ rows - B @ (weights * (B.T @ rows).T).T) / self.scale**2)
 
     @cached_property
     def _whitened_columns(self) -> Floats:
@@ -76,6 +133,10 @@ class GaussianModel:
         from scipy.linalg import solve_triangular
 
         return np.asarray(solve_triangular(self.noise_factor, rows, lower=True, check_finite=False))
+
+    def whitened(self, rows: Floats) -> Floats:
+        """Rows (n,) or (n, k) in coordinates in which the noise alone is `N(0, I)`: `L^-1 r / kappa`."""
+        return self._by_noise(rows) / self.scale
 
     def standardised(self, rows: Floats) -> Floats:
         """Rows (n,) or (n, b) in coordinates in which the model is `N(0, I)`.
@@ -136,3 +197,16 @@ class GaussianModel:
         """Rows (n, count) drawn from the model."""
         noise = self.noise_factor @ random.normal(size=(len(self), count))
         return np.asarray(self.scale * noise + self.columns @ random.normal(size=(self.columns.shape[1], count)))
+
+    def log_marginal(self, rows: Floats, scales: Floats, log_prior: Floats) -> float:
+        """Log density of rows (n,), summed over factors on the noise (k,) with the log of their prior probability."""
+        return float(np.logaddexp.reduce(self._of_scales(rows, scales) + log_prior))
+
+    def likely_scale(self, rows: Floats, scales: Floats, log_prior: Floats) -> float:
+        """Mean of the factor on the noise after rows (n,); arguments as of `log_marginal`."""
+        from scipy.special import softmax
+
+        return float(softmax(self._of_scales(rows, scales) + log_prior) @ scales)
+
+    def _of_scales(self, rows: Floats, scales: Floats) -> Floats:
+        return np.array([float(self.with_scale(scale).log_density(rows)) for scale in scales.tolist()])

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.atomic import whole_file
-from warpbrain.diagnosis.noise import noise_factor
 from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.inference.noise import noise_factor
 from warpbrain.report.files import MILLIMETRES
 
 
@@ -22,7 +22,8 @@ def write_covariance(path: Path, found: Diagnosis) -> None:
     """
     base = found.base
     sensors = base.at.sensors
-    noise = base.explanation.best_kappa(base.whitened) * noise_factor(sensors, base.noise)
+    kappa = base.explanation.best_kappa(base.whitened)
+    noise = kappa * noise_factor(sensors.positions, sensors.directions, sensors.times, base.noise)
     factors = np.where(sensors.is_displacement, MILLIMETRES, 1.0)[:, None]
     parts = factors * np.column_stack([noise, base.nuisances.columns])
     # half the digits: variances are a million times the least of them, not more

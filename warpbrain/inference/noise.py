@@ -1,0 +1,74 @@
+"""The noise of recorded rows: independent, partly shared by neighbours, of an uncertain scale, with gross errors.
+
+    e ~ N(0, kappa^2 R),   R_ij = sigma_i sigma_j (delta_ij + s^2 exp(-|x_i - x_j|^2 / (2 l^2)) d_i . d_j)
+
+for rows i, j that were recorded at one time, at the places `x` in the directions `d`; rows without a direction, such as
+forces, are independent. `s` and `l` are `noise.shared` and `noise.reach` of `priors.toml`. The logarithm of `kappa`
+is a Student t. Of a few points the noise is many times larger, see `gross_errors`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.inference.beliefs import belief, beliefs
+from warpbrain.inference.gross_errors import Outliers
+
+Floats = NDArray[np.float64]
+
+
+def noise_covariance(positions: Floats, directions: Floats, times: Floats, sigma: Floats) -> Floats:
+    """Covariance `R` (n, n) of the noise of rows at a scale of 1.
+
+    Parameters
+    ----------
+    positions : (n, 3) array
+        Where [m]; not read of rows without a direction.
+    directions : (n, 3) array
+        Unit vectors along which a displacement was recorded; zero of all else.
+    times : (n,) array
+        When [s]; infinite of the end.
+    sigma : (n,) array
+        Standard deviation of the independent part, in the unit of the row.
+    """
+    from scipy.spatial.distance import cdist
+
+    covariance = np.diag(np.asarray(sigma, dtype=np.float64) ** 2)
+    rows = np.flatnonzero(directions.any(axis=1))
+    where, along = positions[rows], directions[rows]
+    shared = np.exp(-0.5 * (cdist(where, where) / belief("noise.reach")) ** 2) * (along @ along.T)
+    # what was recorded at another time has another noise
+    shared *= times[rows][:, None] == times[rows][None]
+    covariance[np.ix_(rows, rows)] += belief("noise.shared") ** 2 * np.outer(sigma[rows], sigma[rows]) * shared
+    return covariance
+
+
+def noise_factor(positions: Floats, directions: Floats, times: Floats, sigma: Floats) -> Floats:
+    """Lower triangular factor (n, n) of `noise_covariance`, with its parameters."""
+    covariance = noise_covariance(positions, directions, times, sigma)
+    # metres beside newtons: one size for all
+    return np.asarray(sigma[:, None] * np.linalg.cholesky(covariance / np.outer(sigma, sigma)))
+
+
+def outliers() -> Outliers:
+    """What is believed of gross errors."""
+    return Outliers(belief("noise.gross_share"), belief("noise.gross_times"))
+
+
+def log_scale_density(scales: Floats) -> Floats:
+    """Log density (...) of `ln kappa` at factors `kappa` (...) on the noise."""
+    from scipy.stats import t
+
+    found = t.logpdf(np.log(scales), belief("noise.scale_tail"), scale=belief("noise.scale_width"))
+    return np.asarray(found, dtype=np.float64)
+
+
+def scales() -> tuple[Floats, Floats]:
+    """Factors on the noise that are summed over, and the log of the prior probability of each, (k,) and (k,)."""
+    from scipy.special import log_softmax
+
+    values = beliefs("noise.scales")
+    # each stands for the part of the logarithm that is nearest to it
+    widths = np.gradient(np.log(values))
+    return values, np.asarray(log_softmax(log_scale_density(values) + np.log(widths)))
