@@ -120,7 +120,7 @@ def test_a_drifting_zero_is_no_physics():
         tests.append(rod_test(name, stretch, drifted, first + time))
         first += 101.0
     found = diagnosed(tests)
-    assert found.verdict == "not physics" and found.ranking[0].kind == "drift of the zero"
+    assert found.verdict == "not physics" and found.ranking[0].name == "drift of the zero"
     assert not found.named and found.explained is None
 
 

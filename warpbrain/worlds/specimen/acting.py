@@ -72,6 +72,8 @@ class Way:
         Coefficients whose effects, less what nothing does, are the columns of a place: one array a place.
     values : callable
         From coefficients to the numbers that users know.
+    one_sign : bool
+        Whether only sizes of the sign of the trials do anything.
     region : str
         In which way it acts, in words.
     """
@@ -82,16 +84,18 @@ class Way:
     nothing: Floats
     trials: tuple[Floats, ...]
     values: Callable[[Floats], tuple[float, ...]]
+    one_sign: bool = False
     region: str = ""
 
     @classmethod
     def of_one(
-        cls, act: Callable[[float, Declared], Acting], sd: float, signs: tuple[float, ...], region: str = ""
+        cls, act: Callable[[float, Declared], Acting], sd: float, one_sign: bool, region: str = ""
     ) -> Way:
-        """A way with one coefficient that does nothing at 0 and is its own value; tried with these signs."""
+        """A way with one coefficient that does nothing at 0 and is its own value."""
         return cls(
             lambda c, rows: act(float(c[0]), rows), np.zeros(1), np.array([sd]), np.zeros(1),
-            tuple(np.array([[sign * sd]]) for sign in signs), lambda c: (float(c[0]),), region,
+            tuple(np.array([[sign * sd]]) for sign in ((1.0,) if one_sign else (1.0, -1.0))),
+            lambda c: (float(c[0]),), one_sign, region,
         )  # fmt: skip
 
     @classmethod

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.causes import Cause, Place
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.worlds.specimen.fit import Fit, scales
+from warpbrain.inference.noise import scales
+from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.linear import Linear
 from warpbrain.worlds.specimen.protocol import Protocol
 

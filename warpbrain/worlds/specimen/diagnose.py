@@ -131,7 +131,7 @@ class DiagnosingSpecimen:
             forward = Forward(self.case, few, GluedEnds(self.case, everything, self.device), glued)
             fitting = Fitting(noise_factor(few), few.mask(few.to_fit))
             effects, rejected = effects_of(self.case, few, options.candidates)
-            base = fitting.fit(forward, (), np.zeros((len(few), 0)), [np.zeros(forward.size(()))], 1.0)
+            base = fitting.fit(forward, (), np.zeros((len(few), 0)), np.zeros(forward.size(())), 1.0)
         if base is None:
             raise InputError(f"{self.case.path}: the declared law finds no state in the tests")
         with self._timed("sets of causes"):

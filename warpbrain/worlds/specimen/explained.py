@@ -18,7 +18,7 @@ def explained_case(fitting: Fitting, fit: Fit) -> Case | None:
     assumed = tuple(fit.assumed[k] for k in runs)
     forward = fit.forward.of(shape_of_law=False)
     begin = np.concatenate([np.zeros(len(forward.nuisances)), *(fit.z[fit.part(k)] for k in runs)])
-    found = fitting.fit(forward, assumed, np.zeros((len(fit.stress), 0)), [begin], fit.scale)
+    found = fitting.fit(forward, assumed, np.zeros((len(fit.stress), 0)), begin, fit.scale)
     if found is None:
         return None
     case = forward.case

@@ -6,16 +6,15 @@ them the rows are a `GaussianModel`, whose log density is the evidence; the scal
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.noise import scales
 from warpbrain.worlds.specimen.forward import Assumed, Forward
 from warpbrain.worlds.specimen.material import NoStateError
 
@@ -29,16 +28,6 @@ _STEPS, _DONE, _SETTLING = 30, 1e-4, 3
 CANNOT_BE = (InputError, NoStateError, OverflowError, np.linalg.LinAlgError, ValueError)
 #: Relative change of the factor of glued ends that is none.
 _SAME = 0.01
-
-
-@cache
-def scales() -> tuple[Floats, Floats]:
-    """Factors on the noise, and the log probability of each: Student's t of three degrees of freedom in the logarithm."""
-    from scipy.stats import t
-
-    values = beliefs("noise.scales")
-    logs = t.logpdf(np.log(values) / belief("noise.scale_width"), 3)
-    return values, logs - np.logaddexp.reduce(logs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,27 +116,20 @@ class Fitting:
         self.noise, self.rows = noise, rows
 
     def fit(
-        self, forward: Forward, assumed: tuple[Assumed, ...], rest: Floats, starts: Sequence[Floats], scale: float
+        self, forward: Forward, assumed: tuple[Assumed, ...], rest: Floats, z: Floats, scale: float
     ) -> Fit | None:
-        """The most probable of the fits that begin at some points; None if none of them stands.
+        """A fit whose noise and glued ends are those that it was made with; None if none stands.
 
         Parameters
         ----------
         forward : Forward
         assumed : tuple of Assumed
         rest : (n, q) array
-        starts : sequence of (k,) arrays
+        z : (k,) array
+            Where it begins.
         scale : float
             Of the noise to begin with.
         """
-        found = [self._settled(forward, assumed, rest, z, scale) for z in starts]
-        stand = [one for one in found if one is not None]
-        return max(stand, key=lambda one: one.log_density) if stand else None
-
-    def _settled(
-        self, forward: Forward, assumed: tuple[Assumed, ...], rest: Floats, z: Floats, scale: float
-    ) -> Fit | None:
-        """A fit whose noise and glued ends are those that it was made with."""
         found = None
         for _ in range(_SETTLING):
             try:

@@ -52,7 +52,12 @@ class Assumed:
 
     def coefficients(self, z: Floats) -> Floats:
         """Coefficients (k,) from standard deviations (k,)."""
-        return np.asarray(self.way.mean + self.sd * z)
+        c = np.asarray(self.way.mean + self.sd * z)
+        if not self.way.one_sign:
+            return c
+        # half of a normal distribution, folded: where it does nothing it has a slope
+        move = self.trial[0] - self.way.nothing
+        return np.where(move != 0.0, self.way.nothing + np.sign(move) * np.abs(c - self.way.nothing), c)
 
 
 class Forward:

@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.causes import Cause, Kind, Place
 from warpbrain.inference.decide import UNKNOWN
+from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import Configuration, Posterior, Search, posterior
 from warpbrain.worlds.specimen.acting import Effect, Way
-from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit, scales
+from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
 from warpbrain.worlds.specimen.forward import Assumed
 from warpbrain.worlds.specimen.noise import smooth_patterns
 
 Floats = NDArray[np.float64]
 
-_PRIORS = {Kind.PHYSICS: "specimen.physics", Kind.NOT_PHYSICS: "specimen.not_physics", Kind.UNKNOWN: "specimen.unknown"}
+_PRIORS = {Kind.PHYSICS: "causes.mechanism", Kind.NOT_PHYSICS: "causes.not_physics", Kind.UNKNOWN: "causes.unknown"}
 
 
 def log_odds(kind: Kind) -> float:
     """That a cause of a kind acts, before anything was recorded."""
-    p = belief(_PRIORS[kind])
-    return float(np.log(p) - np.log1p(-p))
+    return float(np.log(belief(_PRIORS[kind])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Linear:
         residual = self.fit.residual[self.fit.rows]
         return posterior(self.fit.model.with_scale(1.0), residual, self.causes, Search(values, logs, beam=beam))
 
-    def start(self, best: Configuration) -> tuple[tuple[Assumed, ...], Floats, list[Floats]]:
+    def start(self, best: Configuration) -> tuple[tuple[Assumed, ...], Floats, Floats]:
         """Causes of the fit and of a configuration, smooth changes, and coefficients to begin at."""
         fit, sizes = self.fit, beliefs("specimen.sizes")
         assumed, rest, widths = list(fit.assumed), fit.rest, []
@@ -84,15 +84,7 @@ class Linear:
                 one = next(new)
                 c = one.way.nothing + one.size * move @ (one.trial - one.way.nothing)
                 parts.append((c - one.way.mean) / one.sd)
-        z = np.concatenate(parts)
-        # a size of the wrong sign may be one that does nothing: such fits begin at half a standard deviation too
-        half = z.copy()
-        at = len(mean[fit.rest.shape[1] : known])
-        for one in assumed[len(fit.assumed) :]:
-            c = one.way.nothing + 0.5 * one.size * (one.trial - one.way.nothing).sum(axis=0)
-            half[at : at + len(one)] = (c - one.way.mean) / one.sd
-            at += len(one)
-        return tuple(assumed), rest, [z, half] if len(assumed) > len(fit.assumed) else [z]
+        return tuple(assumed), rest, np.concatenate(parts)
 
 
 def linearise(fit: Fit, effects: Sequence[Effect]) -> Linear:

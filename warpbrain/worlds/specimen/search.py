@@ -120,8 +120,8 @@ class Sets:
     def _fit(self, found: Found) -> Found:
         hypothesis = found.hypothesis
         self.say(f"fit with {' and '.join(hypothesis.causes)}")
-        assumed, rest, starts = found.linear.start(hypothesis.best)
-        fit = self.fitting.fit(found.linear.fit.forward, assumed, rest, starts, hypothesis.best.scale)
+        assumed, rest, z = found.linear.start(hypothesis.best)
+        fit = self.fitting.fit(found.linear.fit.forward, assumed, rest, z, hypothesis.best.scale)
         if fit is None:
             del self.by_names[found.names]
             return found

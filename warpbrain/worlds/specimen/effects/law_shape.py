@@ -52,7 +52,7 @@ def stiffening(case: Case, protocol: Protocol) -> Effect:
     def act(k: float, rows: Declared) -> Acting:
         return Acting(factor=np.exp(np.clip(k * invariant_rows(rows.protocol), -_MOST, _MOST)))
 
-    way = Way.of_one(act, belief("specimen.largest_stiffening") / largest, (1.0, -1.0))
+    way = Way.of_one(act, belief("specimen.largest_stiffening") / largest, False)
     sentence = "Tissue stiffens with strain, in all directions alike."
     return Effect(STIFFENING, Kind.PHYSICS, sentence, ("k",), ("",), (way,))
 
@@ -65,6 +65,6 @@ def second_invariant(case: Case, protocol: Protocol) -> Effect:
     def act(share: float, rows: Declared) -> Acting:
         return Acting(scaled=share * excess_rows(rows))
 
-    way = Way.of_one(act, belief("specimen.largest_second_invariant"), (1.0,))
+    way = Way.of_one(act, belief("specimen.largest_second_invariant"), False)
     sentence = "The law of the tissue depends on the second invariant."
     return Effect(SECOND_INVARIANT, Kind.PHYSICS, sentence, ("share",), ("",), (way,))

@@ -31,7 +31,7 @@ def friction(case: Case, protocol: Protocol) -> Effect:
         whole = rows.glued if glued else np.ones(len(rows.protocol))
         return Acting(factor=np.where(axial, (1.0 + sticks * (rows.sticking() - 1.0)) / whole, 1.0))
 
-    way = Way.of_one(act, belief("specimen.largest_slip"), (1.0,))
+    way = Way.of_one(act, belief("specimen.largest_slip"), True)
     sentence = "The ends of the specimen slip." if glued else "The ends of the specimen stick to the platens."
     return Effect(FRICTION, Kind.NOT_PHYSICS, sentence, ("share",), ("",), (way,))
 

@@ -102,7 +102,8 @@ def _way(proposal: Proposal, names: list[str]) -> Way:
     move[0] = proposal.sd[0]
     # a size of one sign is proposed with where it is one, or is known by being cut off
     both = proposal.make(nothing - move), proposal.make(nothing)
-    signs = (1.0,) if _same(*both) else (1.0, -1.0)
+    one_sign = _same(*both)
+    signs = (1.0,) if one_sign else (1.0, -1.0)
     return Way(
         act=lambda c, rows: Acting(mechanisms=(proposal.make(c),)),
         mean=proposal.mean,
@@ -110,6 +111,7 @@ def _way(proposal: Proposal, names: list[str]) -> Way:
         nothing=nothing,
         trials=tuple((nothing + sign * move)[None] for sign in signs),
         values=lambda c: tuple(_number(proposal.make(c), name) for name in names),
+        one_sign=one_sign,
         region="" if proposal.region == "all tissue" else proposal.region,
     )
 

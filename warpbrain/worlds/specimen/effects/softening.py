@@ -34,7 +34,7 @@ def softening(case: Case, protocol: Protocol) -> Effect:
         raise NotTestableError("needs a test that comes back or is repeated")
     size = belief("specimen.largest_softening")
     ways = tuple(
-        Way.of_one(_act(pattern), size, (1.0,), region)
+        Way.of_one(_act(pattern), size, True, region)
         for pattern, region in ((_below, "below the largest strain so far"), (_cycles, "with every cycle"))
     )
     return Effect(NAME, Kind.PHYSICS, "Tissue is softer where it was deformed before.", ("part",), ("",), ways)
