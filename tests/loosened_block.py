@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of, patch_of
-from warpbrain.worlds.body.effects import Effects
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.diagnosis.stage import Stage, compared
+from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of, patch_of
+from warpbrain.worlds.body.effects import Effects
 
 
 def loosened(diagnosis: Diagnosis, centre: np.ndarray, radius: float, state: str, seed: int = 2) -> Stage:

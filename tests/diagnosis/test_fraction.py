@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
-from warpbrain.worlds.body.fraction import likely_fraction
-from warpbrain.worlds.body.nuisances import FRACTION, Family, Nuisances
+from warpbrain.diagnosis.fraction import likely_fraction
+from warpbrain.inference.beliefs import beliefs
+from warpbrain.worlds.body.nuisances import Family, Nuisances
 
 ROWS = 300
+
+FRACTION = float(beliefs("mesh.unknown").max())
 
 
 @pytest.fixture

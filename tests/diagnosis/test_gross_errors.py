@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpbrain.worlds.body.evidence import Explanation
-from warpbrain.worlds.body.gross_errors import gross_errors
+from warpbrain.diagnosis.evidence import Explanation
+from warpbrain.diagnosis.gross_errors import gross_errors
 from warpbrain.worlds.body.sensors import Sensors, rows_of_points
 
 POINTS = 12

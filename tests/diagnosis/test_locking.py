@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from sinking_block import write_sinking
 
-from warpbrain.worlds.body.base import Base, BaseFinder
+from warpbrain.diagnosis.base import Base, BaseFinder
+from warpbrain.physics.mechanisms.compressibility import Compressibility
+from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.mesh_error import expected_answer, volume_of
 from warpbrain.worlds.body.nuisances import other_volume
-from warpbrain.diagnosis.options import Listener
 from warpbrain.worlds.body.states import States
-from warpbrain.physics.mechanisms.compressibility import Compressibility
-from warpbrain.physics.mechanisms.gravity import Gravity
+from warpbrain.worlds.listener import Listener
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from warpbrain.worlds.body.evidence import Explanation, log_mean
-from warpbrain.worlds.body.pairs import SIZES, PairEvidence, Pairs, pairs_at
+from warpbrain.diagnosis.evidence import Explanation, log_mean
+from warpbrain.diagnosis.pairs import SIZES, PairEvidence, Pairs, pairs_at
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.diagnosis.screening import log_unknown
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from warpbrain.worlds.body.evidence import Explanation
-from warpbrain.worlds.body.sensors import Sensors
+from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.single_points import log_evidence_and_odds, log_odds
+from warpbrain.worlds.body.sensors import Sensors
 
 POINTS = 12
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from warpbrain.worlds.body.evidence import Explanation
-from warpbrain.worlds.body.flexible import flexible_columns, force_patches
+from warpbrain.diagnosis.evidence import Explanation
+from warpbrain.diagnosis.flexible import flexible_columns, force_patches
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.diagnosis.sentences import traits_in_words
 from warpbrain.diagnosis.traits import Traits, traits_of

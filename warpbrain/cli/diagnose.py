@@ -45,7 +45,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from warpbrain.diagnosis.options import DiagnosisOptions, Listener
+    from warpbrain.diagnosis.options import DiagnosisOptions
+    from warpbrain.worlds.listener import Listener
 
     kinds = None if options.candidates == "all" else tuple(options.candidates.split(","))
     asked = DiagnosisOptions(

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.mesh_error import MeshErrors, expected
-from warpbrain.worlds.body.realigned import realigned
-from warpbrain.worlds.body.refitting import Refit
-from warpbrain.worlds.body.sensors import sensors_at
+from warpbrain.diagnosis.base import Base
+from warpbrain.diagnosis.refitting import Refit
 from warpbrain.errors import SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
+from warpbrain.worlds.body.mesh_error import MeshErrors, expected
+from warpbrain.worlds.body.realigned import realigned
+from warpbrain.worlds.body.sensors import sensors_at
 
 Floats = NDArray[np.float64]
 

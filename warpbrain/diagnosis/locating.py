@@ -14,9 +14,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.evidence import Explanation
-from warpbrain.worlds.body.flexible import force_patches
+from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.unknown import force_patches
 
 Floats = NDArray[np.float64]
 

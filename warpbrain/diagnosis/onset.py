@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.dictionary import Candidates
-from warpbrain.worlds.body.effects import Effect
-from warpbrain.worlds.body.evidence import log_mean
+from warpbrain.diagnosis.base import Base
+from warpbrain.diagnosis.evidence import log_mean
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, log_unknown
 from warpbrain.diagnosis.stack_evidence import StackEvidence
+from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.time_courses import TimeCourse, time_courses
 
 Floats = NDArray[np.float64]

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.worlds.body.evidence import Explanation
-from warpbrain.worlds.body.flexible import SCALES, force_patches
-from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.diagnosis.evidence import Explanation
+from warpbrain.diagnosis.flexible import SCALES
 from warpbrain.mesh import nodes_of
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.unknown import force_patches
 
 Floats = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ import pytest
 from slow_block import CAUSES, write_slow
 
 from warpbrain.cases.case import Case
-from warpbrain.worlds.body.dictionary import dictionary_of
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.worlds.body.dictionary import dictionary_of
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array, random_array
 
-from warpbrain.worlds.body.factors import Factors
 from warpbrain.errors import SolveError
+from warpbrain.worlds.body.factors import Factors
 
 
 def _matrix(n: int = 60):

@@ -5,8 +5,8 @@ import copy
 import numpy as np
 import pytest
 
-from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.mesh import vertex_normals
+from warpbrain.worlds.body.linearisation import Linearisation
 
 
 @pytest.fixture(scope="module")

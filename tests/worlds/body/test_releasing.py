@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
+from warpbrain.errors import SolveError
 from warpbrain.worlds.body.factors import Factors
 from warpbrain.worlds.body.releasing import HeldSurface
-from warpbrain.errors import SolveError
 
 
 @pytest.fixture

@@ -18,8 +18,8 @@ from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situat
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.refitting import Refit
 from warpbrain.worlds.body.sensors import spread_points
+from warpbrain.worlds.body.states import SolvedState
 from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, with_free_surfaces
 
 Floats = NDArray[np.float64]
@@ -225,17 +225,16 @@ def _tried(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | Inp
     return [by_proposal[id(proposal)] for proposal in proposals]
 
 
-def candidates_beside(fit: Refit, candidates: Candidates) -> Candidates:
-    """The effects of a dictionary at the state of a refit.
+def candidates_beside(state: SolvedState, acting: Sequence[Effect], candidates: Candidates) -> Candidates:
+    """The effects of a dictionary at another state, in which some act.
 
     What is solved as a whole or over time keeps the columns that it has at the base, as has what is no physics. A kind
-    of which a case has only one is left out where the refit has it.
+    of which a case has only one is left out where it acts already.
     """
-    state = fit.state
     known = None if candidates.makes is None else candidates.makes.mesh_errors
     effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=known)
-    acting = [effect.proposed.make(effect.proposed.mean) for effect in fit.effects]
-    there = {mechanism.kind for mechanism in acting if not mechanism.several}
+    made = [effect.proposed.make(effect.proposed.mean) for effect in acting]
+    there = {mechanism.kind for mechanism in made if not mechanism.several}
     found: list[Effect] = []
     of_kind: dict[str, NDArray[np.int64]] = {}
     for kind, numbers in candidates.of_kind.items():

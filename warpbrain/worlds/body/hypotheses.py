@@ -23,8 +23,8 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses, causes_of
 from warpbrain.worlds.body.dictionary import Candidates, candidates_beside
 from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.fitting import Refit, Refitting
 from warpbrain.worlds.body.placing import placed
-from warpbrain.worlds.body.refitting import Refit, Refitting
 from warpbrain.worlds.listener import Listener
 
 Floats = NDArray[np.float64]
@@ -168,7 +168,7 @@ class HypothesisSearch:
         if one.refit is not None:
             return one.names in self._spread or len(one.names) > 2 or not one.mechanisms
         best = one is self.weighed[0]
-        return not one.mechanisms or (not best and any(one.names > names for names in self._spread))
+        return not best and any(one.names > names for names in self._spread)
 
     def _probable(self) -> list[Weighed]:
         chances = zip(self.weighed, self.probabilities.tolist(), strict=True)
@@ -250,9 +250,16 @@ class HypothesisSearch:
             self._weighed[names] = replace(one, why=str(error))
             return
         gain = refit.log_evidence - one.marginal.log_evidence
+        if not names:
+            # what the fit without any cause gains is of tissue and registration, which all others gain by, too; and a
+            # search that ended too early must not make everything else look better
+            gain = max(gain, 0.0)
+            for other in list(self._weighed.values()):
+                if other.refit is None:
+                    self._weighed[other.names] = other.with_evidence(other.hypothesis.log_evidence + gain)
+            one = replace(one, hypothesis=self._weighed[names].hypothesis)
+            gain = 0.0
         fitted = replace(one, residual=refit.linear, columns=refit.columns, marginal=refit.marginal, refit=refit)
-        # a search that ended too early must not make everything else look better
-        gain = max(gain, 0.0) if not names else gain
         self._weighed[names] = fitted.with_evidence(one.hypothesis.log_evidence + gain)
 
     def _placed(self, one: Weighed) -> Weighed:
@@ -266,11 +273,9 @@ class HypothesisSearch:
                 continue
             others = np.delete(one.marginal.model.columns, np.r_[own], axis=1)
             without = GaussianModel(one.marginal.model.noise_factor, others, one.marginal.scale)
-            size = float(
-                np.max(
-                    effect.proposed.sd / effect.proposed.elsewhere(effect.proposed.centre, effect.proposed.radius).sd
-                )
-            )
+            assert effect.proposed.centre is not None and effect.proposed.radius is not None
+            usual = effect.proposed.elsewhere(effect.proposed.centre, effect.proposed.radius)
+            size = float(np.max(effect.proposed.sd / usual.sd))
             found = placed(
                 self.base, self.base.effects, effect, size, self._spacing, without, one.residual + effect.mean
             )
@@ -292,7 +297,7 @@ class HypothesisSearch:
         assert one.refit is not None
         self._spread.add(names)
         self._listener.stage(f"what acts beside {' and '.join(sorted(names))}")
-        candidates = candidates_beside(one.refit, self.candidates)
+        candidates = candidates_beside(one.refit.state, one.effects, self.candidates)
         causes = causes_of(self.base, candidates)
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in names))
         louder = GaussianModel(one.marginal.noise.noise_factor / one.marginal.scale, one.columns)

@@ -1,7 +1,7 @@
 """A mechanism between the places of its scan: a cell about the best place, looked through more finely.
 
-The scan stands for the cell about each of its places. So of the finer places in the cell of the best one the mean counts
-for the evidence, and the best of them is where a fit begins.
+The scan stands for the cell about each of its places. So of the finer places in the cell of the best one the mean
+counts for the evidence, and the best of them is where a fit begins.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.inference import GaussianModel
+from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import scaled
 from warpbrain.worlds.body.effects import Effect, Effects
@@ -64,7 +65,7 @@ def placed(
     return Placed(middle, gain)
 
 
-def _around(base: Base, effect: Effect, step: float) -> list:
+def _around(base: Base, effect: Effect, step: float) -> list[Proposal]:
     """Proposals a step from an effect along each axis, and with other radii."""
     proposed = effect.proposed
     assert proposed.elsewhere is not None and proposed.centre is not None and proposed.radius is not None
@@ -81,7 +82,8 @@ def _around(base: Base, effect: Effect, step: float) -> list:
 
 def _on_surface(base: Base, centre: Floats) -> Floats:
     """The nearest middle of a face that is free."""
-    mesh, held = base.at.system.model.mesh, base.at.system.model.constrained.reshape(-1, 3).all(axis=1)
+    mesh = base.at.system.model.mesh
+    held = np.asarray(base.at.system.model.constrained.reshape(-1, 3).all(axis=1))
     faces = mesh.boundary[~held[mesh.boundary].any(axis=1)]
     middles = mesh.points[faces].mean(axis=1)
     return np.asarray(middles[np.argmin(np.sum((middles - centre) ** 2, axis=1))])

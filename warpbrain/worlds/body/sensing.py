@@ -38,7 +38,8 @@ def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Float
         rows = sensors.recordings == number
         rows = rows & ordinary if (rows & ordinary).any() else rows
         scale = max(float(np.sqrt(np.mean(residual[rows] ** 2))), 1e-12)
-        tried = scale * np.geomspace(*beliefs("noise.undeclared"), 25)
+        low, high = beliefs("noise.undeclared").tolist()
+        tried = scale * np.geomspace(low, high, 25)
         scores = [_log_density(residual[rows], explained[rows], sigma) for sigma in tried.tolist()]
         sigma[sensors.recordings == number] = tried[int(np.argmax(scores))]
     return sigma

@@ -1,4 +1,4 @@
-"""What acts and has no name: smooth random fields of body force, of eigenstress and of traction, as columns over sensors.
+"""What acts and has no name: smooth random fields of body force, eigenstress and traction, as columns over sensors.
 
 Each field is a sum of Gaussian patches with independent coefficients, a Gaussian process of that length. An eigenstress
 `s` acts within the body: its nodal forces `-V s grad N` have no net force and no moment. Columns are of 1 m root mean

@@ -7,6 +7,7 @@ of the linear model about the best point, summed over the scale of the noise and
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -247,8 +248,8 @@ class _Search:
         for part in (self._tissue, self._field):
             base[part] = known[part]
         far = self.z
-        for part in (0.5, 0.0):
-            between = base + part * (far - base)
+        for share in (0.5, 0.0):
+            between = base + share * (far - base)
             if not self._take_if_better(between, *self._try(between, self.state)):
                 return
 
@@ -418,7 +419,7 @@ class _Search:
 def _slices(effects: Sequence[Effect], first: int) -> list[slice]:
     """Where the coordinates of each effect are."""
     ends = np.cumsum([first, *(effect.columns.shape[1] for effect in effects)]).tolist()
-    return [slice(low, high) for low, high in zip(ends, ends[1:], strict=False)]
+    return [slice(low, high) for low, high in itertools.pairwise(ends)]
 
 
 def _about(proposal: Proposal, here: Floats) -> Proposal:
