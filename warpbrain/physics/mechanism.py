@@ -308,7 +308,18 @@ class Mechanism(Ramped, abc.ABC):
         """Raise `NotTestableError` if tests on a specimen, whatever their number and noise, cannot show it."""
 
     def turned(self, rotation: NDArray[np.float64]) -> Self:
-        """The same in a body that is turned: every direction `a` becomes `R a`, (3, 3)."""
+        """The same in a body that is turned: every direction `a` becomes `R a`, (3, 3).
+
+        Raises
+        ------
+        ParameterError
+            If it acts in a part of the body, or has directions of its own in each element: these would turn too.
+        """
+        if np.allclose(rotation, np.eye(3)):
+            return self
+        for name, says in self.parameters().items():
+            if says.kind in ("directions", "element set", "position") and getattr(self, name):
+                raise ParameterError(name, f"{self.kind}: tests along other axes of the tissue are of what is alike in all of it")
         vectors = {
             name: tuple((rotation @ np.array(value)).tolist())
             for name, says in self.parameters().items()

@@ -8,6 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.errors import InputError
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
@@ -149,13 +151,27 @@ class TestRecording(Recording):
 
     @property
     def turn(self) -> Floats:
-        """Rotation (3, 3) from directions of the tissue to those of the machine: `R axis = z`.
+        """Rotation (3, 3) from directions of the tissue to those of the machine; raises as `turn_of`."""
+        return turn_of(self.axis, self.sheared)
 
-        Without `sheared` the machine's x is the tissue's, or its y where that is along the axis, less what of it is
-        along the axis.
-        """
-        z = np.array(self.axis) / np.linalg.norm(self.axis)
-        x = np.eye(3)[int(abs(z[0]) > 1.0 - 1e-9)] if self.sheared is None else np.array(self.sheared)
-        x = x - (x @ z) * z
-        x = x / np.linalg.norm(x)
-        return np.stack([x, np.cross(z, x), z])
+
+def turn_of(axis: tuple[float, float, float], sheared: tuple[float, float, float] | None) -> Floats:
+    """Rotation `R` (3, 3) of a tissue in a machine: `R axis` is along z, and `R sheared` between x and z.
+
+    Without `sheared` the machine's x is what of the tissue's is across the axis, or of its y where that is little.
+
+    Raises
+    ------
+    InputError
+        If one of them is zero, or they are one direction.
+    """
+    z = np.array(axis, dtype=np.float64)
+    if not np.linalg.norm(z) > 0.0:
+        raise InputError("expected 3 numbers that are not all zero")
+    z = z / np.linalg.norm(z)
+    x = np.eye(3)[int(abs(z[0]) > 0.9)] if sheared is None else np.array(sheared, dtype=np.float64)
+    across = x - (x @ z) * z
+    if not np.linalg.norm(across) > 1e-6 * np.linalg.norm(x):
+        raise InputError("expected a direction that is not along the axis")
+    across = across / np.linalg.norm(across)
+    return np.stack([across, np.cross(z, across), z])

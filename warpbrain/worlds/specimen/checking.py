@@ -108,6 +108,9 @@ def after_checks(decision: Decision, checked: Checked, alpha: float) -> tuple[De
     """
     doubts = []
     if "explained" in checked.scores:
+        held = [checked.scores[name].heldout or 0.0 for name in ("refitted", "explained")]
+        if held[1] > held[0]:
+            doubts.append(f"The error of held-out tests grows with it: from {held[0]:.3g} Pa to {held[1]:.3g} Pa.")
         before, after = (checked.scores[name].check for name in ("refitted", "explained"))
         doubts += [
             f"'{name}', which was not fitted, is predicted worse with it: {before[name]:.3g} Pa without, "

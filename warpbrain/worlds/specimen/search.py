@@ -95,7 +95,14 @@ class Sets:
         return self._about[names]
 
     def fitted(self, names: frozenset[str]) -> Fit | None:
-        """The fit of a set, made if it was not; None if none stands or it was never proposed."""
+        """The fit of a set, made if it was not; None if none stands."""
+        if names not in self.by_names:
+            # proposed about the same set with one cause less
+            for name in sorted(names):
+                fit = self.fitted(names - {name})
+                if fit is not None:
+                    self._propose(fit, self.by_names[names - {name}].spread)
+                    break
         found = self.by_names.get(names)
         if found is None:
             return None
