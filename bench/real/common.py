@@ -95,7 +95,10 @@ def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosi
     options = SpecimenOptions(ends=ends)
     start = time.perf_counter()
     found = DiagnosingSpecimen(
-        read_case(folder), options, "cpu", lambda text: print(f"{time.perf_counter() - start:7.1f} s  {text}", flush=True)
+        read_case(folder),
+        options,
+        "cpu",
+        lambda text: print(f"{time.perf_counter() - start:7.1f} s  {text}", flush=True),
     ).run()
     said = describe_specimen_diagnosis(found, options, "cpu")
     beside = out / f"{case.name}-diagnosis{'' if ends else '-homogeneous'}"
@@ -110,7 +113,19 @@ def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosi
 
 def row(found: SpecimenDiagnosis, said: dict[str, Any]) -> dict[str, Any]:
     """What the docs say of a case: no curve, no row of the data."""
-    keys = ("verdict", "sentence", "p_value", "mechanism", "named", "combinations", "group", "doubts", "where", "when", "fit")
+    keys = (
+        "verdict",
+        "sentence",
+        "p_value",
+        "mechanism",
+        "named",
+        "combinations",
+        "group",
+        "doubts",
+        "where",
+        "when",
+        "fit",
+    )
     by_test: dict[str, Any] = {}
     for each, rows in zip(found.protocol.tests, found.protocol.rows, strict=True):
         errors = {

@@ -319,7 +319,9 @@ class Mechanism(Ramped, abc.ABC):
             return self
         for name, says in self.parameters().items():
             if says.kind in ("directions", "element set", "position") and getattr(self, name):
-                raise ParameterError(name, f"{self.kind}: tests along other axes of the tissue are of what is alike in all of it")
+                raise ParameterError(
+                    name, f"{self.kind}: tests along other axes of the tissue are of what is alike in all of it"
+                )
         vectors = {
             name: tuple((rotation @ np.array(value)).tolist())
             for name, says in self.parameters().items()

@@ -223,9 +223,7 @@ class Rig:
             self._turned[key] = rig
         return self._turned[key]
 
-    def _simulate(
-        self, recording: TestRecording, steps: int, on_state: Callable[[float], None] | None
-    ) -> TestResult:
+    def _simulate(self, recording: TestRecording, steps: int, on_state: Callable[[float], None] | None) -> TestResult:
         """A test that is possible."""
         rest = 1.0 if recording.quantities[0] == "stretch" else 0.0
         if self.follows_time(recording):

@@ -8,12 +8,12 @@ from scipy.integrate import quad
 from testing_machine import EXACT, case_of, recorded
 
 from warpbrain.cases.specimen import Specimen
-from warpbrain.worlds.specimen.material import HomogeneousMaterial, relaxing
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
 from warpbrain.physics.mechanisms.fibres import Fibres
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.specimen import simulate_test
+from warpbrain.worlds.specimen.material import HomogeneousMaterial, relaxing
 
 PLATE = Specimen("block", (5e-3, 4e-3, 3e-3), "lubricated")
 STRETCH = np.array([0.8, 0.9, 1.0, 1.1, 1.25])

@@ -84,18 +84,22 @@ def _test(context: Context, table: Reading, sets: NodeSets | None, boundaries: s
     common = _common(context, table, 1.0)
     if common is None or not table.has("mode"):
         return None
-    directions = {
-        name: tuple(context.frame.directions(table.get(name)).tolist())
-        for name in ("axis", "sheared")
-        if table.has(name)
-    }
+    axis, sheared = _direction(context, table, "axis"), _direction(context, table, "sheared")
+    axis = axis or (0.0, 0.0, 1.0)
     try:
-        turn_of(directions.get("axis", (0.0, 0.0, 1.0)), directions.get("sheared"))
+        turn_of(axis, sheared)
     except InputError as error:
-        table.problem("sheared" if "sheared" in directions else "axis", str(error))
+        table.problem("axis" if sheared is None else "sheared", str(error))
         return None
     found = read_test(**common, mode=table.get("mode"), specimen=table.get("specimen", ""))
-    return None if found is None else replace(found, **directions)
+    return None if found is None else replace(found, axis=axis, sheared=sheared)
+
+
+def _direction(context: Context, table: Reading, key: str) -> tuple[float, float, float] | None:
+    if not table.has(key):
+        return None
+    x, y, z = context.frame.directions(table.get(key)).tolist()
+    return x, y, z
 
 
 _READERS = {"points": _points, "surface": _surface, "force": _force, "test": _test}

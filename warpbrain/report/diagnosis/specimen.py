@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 from warpbrain.inference.causes import Kind
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
 from warpbrain.worlds.specimen.diagnose import SpecimenOptions
-from warpbrain.worlds.specimen.result import Combination, Ranked, SpecimenDiagnosis, Value
+from warpbrain.worlds.specimen.result import Ranked, SpecimenDiagnosis, Value
 from warpbrain.worlds.specimen.sentences import chance, sentence_of
 
 _WIDTH = 110
@@ -37,12 +38,12 @@ def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptio
         "when": None if where is None or where.time is None else {"seconds": list(where.time)},
         "ranking": [_ranked(one) for one in found.ranking]
         + [_rejected(name, why) for name, why in found.rejected.items()],
-        "combinations": [_combination(one) for one in found.combinations],
+        "combinations": [asdict(one) for one in found.combinations],
         "stages": _stages(found),
         "group": list(found.group),
         "doubts": list(found.doubts),
         "before_checks": {"verdict": found.by_posterior.verdict, "causes": list(found.by_posterior.causes)},
-        "next_measurement": [{"what": m.what, "expected_nats": m.expected_nats} for m in found.next_measurement],
+        "next_measurement": [asdict(one) for one in found.next_measurement],
         "smallest_detectable": {
             name: {"size": one.size, "unit": one.unit, "parameter": one.name} for name, one in found.smallest.items()
         },
@@ -56,13 +57,7 @@ def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptio
         "remarks": list(found.remarks),
         "case": {"name": found.case.name, "title": found.case.title, "origin": found.case.origin},
         "inputs_sha256": fingerprints(found.case),
-        "options": {
-            "candidates": "all" if options.candidates is None else list(options.candidates),
-            "alpha": options.alpha,
-            "seed": options.seed,
-            "draws": options.draws,
-            "ends": options.ends,
-        },
+        "options": asdict(options) | {"candidates": "all" if options.candidates is None else list(options.candidates)},
         "seconds": dict(found.seconds),
         "device": device,
         "versions": machine(),
@@ -74,47 +69,27 @@ def _values(values: Sequence[Value]) -> dict[str, Any]:
 
 
 def _ranked(one: Ranked) -> dict[str, Any]:
-    return {
-        "mechanism": one.name,
+    stands = math.isfinite(one.log_evidence)
+    return _rejected(one.name, "" if stands else "no fit with it stands") | {
         "physics": one.kind is Kind.PHYSICS,
-        "log_evidence": one.log_evidence if math.isfinite(one.log_evidence) else None,
+        "log_evidence": one.log_evidence if stands else None,
         "probability": one.probability,
         "heldout_rmse_change_pa": one.change,
         "detectability": one.detectability,
         "estimate": _values(one.values),
         "region": one.region,
-        "rejected_because": "" if math.isfinite(one.log_evidence) else "no fit with it stands",
     }
 
 
 def _rejected(name: str, why: str) -> dict[str, Any]:
-    return {
-        "mechanism": name,
-        "physics": True,
-        "log_evidence": None,
-        "probability": 0.0,
-        "heldout_rmse_change_pa": None,
-        "detectability": None,
-        "estimate": {},
-        "region": "",
-        "rejected_because": why,
-    }
-
-
-def _combination(one: Combination) -> dict[str, Any]:
-    return {
-        "causes": list(one.causes),
-        "log_evidence": one.log_evidence,
-        "probability": one.probability,
-        "fitted": one.fitted,
-    }
+    nothing = dict.fromkeys(("log_evidence", "heldout_rmse_change_pa", "detectability"))
+    return {"mechanism": name, "physics": True, "probability": 0.0, **nothing, "estimate": {}, "region": "",
+            "rejected_because": why}  # fmt: skip
 
 
 def _stages(found: SpecimenDiagnosis) -> list[dict[str, Any]]:
     """What is left of the base, with the sets of causes that would explain it, and of the fit with what was added."""
-    candidates = [
-        {"mechanism": " and ".join(one.causes) or "nothing", **_combination(one)} for one in found.combinations
-    ]
+    candidates = [{"mechanism": " and ".join(one.causes) or "nothing", **asdict(one)} for one in found.combinations]
     added = " and ".join(found.assumed) or None
     stages = [
         {"with": [], "p_value": found.p_value, "noise_scale": found.scale, "candidates": candidates, "added": added,
@@ -132,7 +107,7 @@ def _fit(found: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
     return {
         "rmse_pa": {name: one.fitted if one else None for name, one in scores.items()},
         "heldout_rmse_pa": {name: one.heldout if one else None for name, one in scores.items()},
-        "check_rmse_pa": {name: dict(one.check) if one else None for name, one in scores.items()},
+        "check_rmse_pa": {name: one.check if one else None for name, one in scores.items()},
         "rows": "all that were recorded",
         "held_out": "each test in turn" if found.by_test else "each quarter of the only test in turn",
         "improvement": None if gain is None else {"part": gain[0], "interval_95": list(gain[1:])},
@@ -162,7 +137,9 @@ def specimen_diagnosis_lines(found: SpecimenDiagnosis) -> list[str]:
     lines += ["", f"  p = {found.p_value:.2g} that nothing is missing; the most probable sets of causes:"]
     for combination in found.combinations[:6]:
         causes = " and ".join(combination.causes) or "nothing"
-        lines.append(f"    {causes:<60} {chance(combination.probability):>10}   log evidence {combination.log_evidence:+8.1f}")
+        lines.append(
+            f"    {causes:<60} {chance(combination.probability):>10}   log evidence {combination.log_evidence:+8.1f}"
+        )
     if found.p_left is not None:
         lines.append(f"  with {' and '.join(found.assumed)}: p = {found.p_left:.2g} that nothing is left")
     for one in found.confirmations:

@@ -88,9 +88,7 @@ class Way:
     region: str = ""
 
     @classmethod
-    def of_one(
-        cls, act: Callable[[float, Declared], Acting], sd: float, one_sign: bool, region: str = ""
-    ) -> Way:
+    def of_one(cls, act: Callable[[float, Declared], Acting], sd: float, one_sign: bool, region: str = "") -> Way:
         """A way with one coefficient that does nothing at 0 and is its own value."""
         return cls(
             lambda c, rows: act(float(c[0]), rows), np.zeros(1), np.array([sd]), np.zeros(1),

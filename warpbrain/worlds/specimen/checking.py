@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,8 @@ from numpy.typing import NDArray
 
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decision
-from warpbrain.worlds.specimen.checks import blocks_of, folds_of, held_out, improvement, p_of_nothing_left, placebo_p
+from warpbrain.inference.predict import Prediction
+from warpbrain.worlds.specimen.checks import blocks_of, folds_of, held_out, p_of_nothing_left, placebo_p
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.measures import rms, score
 from warpbrain.worlds.specimen.protocol import Protocol
@@ -25,8 +25,8 @@ class Checked:
     """A fit beside the base; see `SpecimenDiagnosis` for what these are."""
 
     p_left: float | None
-    scores: Mapping[str, Score]
-    stresses: Mapping[str, Floats]
+    scores: dict[str, Score]
+    stresses: dict[str, Floats]
     improvement: tuple[float, float, float] | None
     confirmations: tuple[Confirmation, ...]
 
@@ -47,6 +47,7 @@ class Checking:
     def __init__(self, sets: Sets, protocol: Protocol, draws: int, random: np.random.Generator) -> None:
         self.sets, self.protocol, self.draws, self.random = sets, protocol, draws, random
         self.folds = folds_of(sets.base.forward.protocol)
+        self._blocks = blocks_of(protocol)
         self._predicted: dict[int, tuple[Fit, Floats, Floats, float]] = {}
 
     def p_left(self, fit: Fit) -> float:
@@ -77,17 +78,20 @@ class Checking:
         """Stress of a fit and held-out stress at all recorded rows [Pa], and held-out log density."""
         if id(fit) not in self._predicted:
             whole = fit.forward.of(self.protocol, law=fit.forward.law).stress(fit.assumed, fit.z)
-            predicted = held_out(fit, self.folds)
+            predicted, log_density = held_out(fit, self.folds)
             # of a few rows it is known by how much it differs from the fit: smoothly
-            held = whole + self.protocol.spread(predicted.stress - fit.stress, fit.forward.protocol)
-            self._predicted[id(fit)] = fit, whole, held, predicted.log_density
+            held = whole + self.protocol.spread(predicted - fit.stress, fit.forward.protocol)
+            self._predicted[id(fit)] = fit, whole, held, log_density
         return self._predicted[id(fit)][1:]
 
     def _improvement(self, before: Fit, after: Fit) -> tuple[float, float, float]:
-        rows = self.protocol.mask(self.protocol.to_fit)
+        """Of held-out errors relative to the largest stress of each test."""
         peaks = np.concatenate([np.full(len(test.strain), test.peak) for test in self.protocol.tests])
-        each = [((self.protocol.observed - self._predictions(fit)[1]) / peaks)[rows] for fit in (before, after)]
-        return improvement(blocks_of(self.protocol)[rows], *each, self.random)
+        first, second = (
+            Prediction((self.protocol.observed - self._predictions(fit)[1]) / peaks, self._blocks, np.zeros(0))
+            for fit in (before, after)
+        )
+        return second.improvement(first, self.protocol.mask(self.protocol.to_fit), self.random)
 
     def _confirm(self, fit: Fit, name: str) -> Confirmation | None:
         """Of one cause where all others of the fit act; None if no fit stands without it."""

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.causes import Cause, Place
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.noise import scales
+from warpbrain.inference.predict import predictive_p
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.linear import Linear
 from warpbrain.worlds.specimen.protocol import Protocol
@@ -22,8 +23,8 @@ from warpbrain.worlds.specimen.protocol import Protocol
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-#: Parts of a test that are held out where it is the only one, and blocks of its rows for intervals; draws of these.
-_BLOCKS, _DRAWS = 4, 2000
+#: Parts of a test that are held out where it is the only one, and blocks of its rows for intervals.
+_BLOCKS = 4
 #: Patterns that mean nothing, waves of each, and their length in widths of what they are functions of.
 _PLACEBOS, _WAVES, _LENGTH = 100, 40, 0.6
 
@@ -61,24 +62,16 @@ def blocks_of(protocol: Protocol) -> NDArray[np.int64]:
     return np.concatenate(each)
 
 
-@dataclass(frozen=True, eq=False)
-class HeldOut:
-    """What a fit says of each fold's rows, given the others.
+def held_out(fit: Fit, folds: Folds) -> tuple[Floats, float]:
+    """What a fit says of each fold's rows given the others: its causes fitted to these, and linear about that.
 
-    Attributes
-    ----------
+    Returns
+    -------
     stress : (n,) array
         Predicted [Pa]; NaN where nothing was held out.
     log_density : float
         Of all folds.
     """
-
-    stress: Floats
-    log_density: float
-
-
-def held_out(fit: Fit, folds: Folds) -> HeldOut:
-    """By conditioning the fit's own model on the other rows: its causes fitted to them, and linear about that."""
     rows = fit.rows
     predicted, total = np.full(len(rows), np.nan), 0.0
     for held in folds.held:
@@ -89,19 +82,7 @@ def held_out(fit: Fit, folds: Folds) -> HeldOut:
         mean, _ = model.conditional(again.residual[rows], observed)
         predicted[held] = (again.stress - again.columns @ again.z)[held] + mean
         total += model.log_density_of_hidden(again.residual[rows], observed)
-    return HeldOut(predicted, total)
-
-
-def improvement(
-    blocks: NDArray[np.int64], before: Floats, after: Floats, rng: np.random.Generator, sure: float = 0.95
-) -> tuple[float, float, float]:
-    """Part of a root mean square of errors (n,) that is gone, and its interval: bootstrap over blocks."""
-    names = np.unique(blocks)
-    first, second = (np.array([np.sum(errors[blocks == b] ** 2) for b in names]) for errors in (before, after))
-    chosen = rng.integers(len(names), size=(_DRAWS, len(names)))
-    parts = 1.0 - np.sqrt(second[chosen].sum(axis=1) / first[chosen].sum(axis=1))
-    low, high = np.quantile(parts, [0.5 - 0.5 * sure, 0.5 + 0.5 * sure])
-    return float(1.0 - np.sqrt(second.sum() / first.sum())), float(low), float(high)
+    return predicted, total
 
 
 def placebo_p(about: Linear, name: str, folds: Folds, rng: np.random.Generator) -> float:
@@ -173,30 +154,7 @@ def _coordinates(protocol: Protocol) -> Floats:
 def p_of_nothing_left(about: Linear, draws: int, rng: np.random.Generator) -> float:
     """Posterior predictive probability of rows that other causes explain as well, if a fit has all that acts.
 
-    The statistic is the Bayes factor of any single cause, summed over places, sizes and the scale of the noise; rows
-    are drawn from the fit's own model, so that having looked for many things in many ways is paid for.
+    Rows are drawn from the fit's own model, so that having looked for many things in many ways is paid for.
     """
-    fit = about.fit
-    rows = np.column_stack([fit.residual[fit.rows], fit.model.draws(draws, rng)])
-    none, some = [], []
-    for scale, log_prior in zip(*scales(), strict=True):
-        model = fit.model.with_scale(float(scale))
-        none.append(log_prior + model.log_density(rows))
-        white = model.standardised(rows)
-        each = [_log_factors(model, white, cause) + cause.log_prior for cause in about.causes]
-        some.append(none[-1] + np.logaddexp.reduce(each, axis=0))
-    factors = np.logaddexp.reduce(some, axis=0) - np.logaddexp.reduce(none, axis=0)
-    return float((1 + np.sum(factors[1:] >= factors[0])) / (1 + draws))
-
-
-def _log_factors(model: GaussianModel, white: Floats, cause: Cause) -> Floats:
-    """Log Bayes factors (b,) of a cause for standardised rows (n, b)."""
-    logs = []
-    for place, weights in zip(cause.places, cause.log_weights, strict=True):
-        Z = model.standardised(place.columns)
-        values, vectors = np.linalg.eigh(Z.T @ Z)
-        values, along = np.maximum(values, 0.0), (vectors.T @ (Z.T @ white)) ** 2
-        for size, weight in zip((cause.sizes**2).tolist(), weights.tolist(), strict=True):
-            gain = (size / (1.0 + size * values)) @ along - np.log1p(size * values).sum()
-            logs.append(weight + 0.5 * gain)
-    return np.asarray(np.logaddexp.reduce(logs, axis=0))
+    fit, fields = about.fit, [place.columns for cause in about.causes for place in cause.places]
+    return predictive_p(fit.model, fields, beliefs("specimen.sizes"), fit.residual[fit.rows], draws, rng)

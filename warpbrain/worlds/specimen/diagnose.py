@@ -1,4 +1,4 @@
-"""What was left out of a specimen: the most probable sets of causes, a verdict of least expected loss, and checks of it."""
+"""What was left out of a specimen: sets of causes with probabilities, a verdict of least expected loss, its checks."""
 
 from __future__ import annotations
 

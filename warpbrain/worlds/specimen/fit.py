@@ -115,9 +115,7 @@ class Fitting:
     def __init__(self, noise: Floats, rows: Bools) -> None:
         self.noise, self.rows = noise, rows
 
-    def fit(
-        self, forward: Forward, assumed: tuple[Assumed, ...], rest: Floats, z: Floats, scale: float
-    ) -> Fit | None:
+    def fit(self, forward: Forward, assumed: tuple[Assumed, ...], rest: Floats, z: Floats, scale: float) -> Fit | None:
         """A fit whose noise and glued ends are those that it was made with; None if none stands.
 
         Parameters
@@ -185,7 +183,7 @@ def _model(noise: Floats, rows: Bools, rest: Floats, columns: Floats, scale: flo
 
 
 def _beyond(model: GaussianModel, residual: Floats, z: Floats, first: int) -> float:
-    """What the linear model promises beyond `z`: at a limit of a parameter it has a better point than there is [nats]."""
+    """What the linear model promises beyond `z` [nats]: at a limit of a parameter there is no such better point."""
     mean, covariance = model.coefficients(residual)
     away = z - mean[first:]
     precision = np.linalg.inv(covariance[first:, first:])

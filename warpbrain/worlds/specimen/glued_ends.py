@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
-from warpbrain.worlds.specimen.material import HomogeneousMaterial, NoStateError
-from warpbrain.worlds.specimen.protocol import Protocol, radius_of, strain_of, stress_unit
 from warpbrain.errors import SolveError
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.specimen import Rig
+from warpbrain.worlds.specimen.material import HomogeneousMaterial, NoStateError
+from warpbrain.worlds.specimen.protocol import Protocol, radius_of, strain_of, stress_unit
 
 Floats = NDArray[np.float64]
 

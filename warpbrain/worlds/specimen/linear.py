@@ -89,7 +89,9 @@ class Linear:
 
 def linearise(fit: Fit, effects: Sequence[Effect]) -> Linear:
     """Of all causes that the fit does not have; places where there is no state are left out."""
-    causes, kept, trials = [], [], []
+    causes: list[Cause] = []
+    kept: list[Effect | None] = []
+    trials: list[tuple[tuple[Way, Floats], ...]] = []
     rows, sizes = fit.rows, beliefs("specimen.sizes")
     for effect in effects:
         if effect.name in fit.names:
@@ -102,13 +104,14 @@ def linearise(fit: Fit, effects: Sequence[Effect]) -> Linear:
             trials.append(tuple(place for place, _ in places))
     few = fit.forward.protocol
     smooth = tuple(
-        belief("specimen.largest_unknown") * smooth_patterns(few, reach) for reach in beliefs("specimen.unknown_reaches")
+        belief("specimen.largest_unknown") * smooth_patterns(few, reach)
+        for reach in beliefs("specimen.unknown_reaches")
     )
     # what acts in tests that were not fitted shows in no row
     smooth = tuple(own[:, np.any(own[rows] != 0.0, axis=0)] for own in smooth)
     if not fit.rest.shape[1]:
-        places = tuple(Place(own[rows]) for own in smooth)
-        causes.append(Cause(UNKNOWN, places, log_odds(Kind.UNKNOWN), sizes, Kind.UNKNOWN))
+        anywhere = tuple(Place(own[rows]) for own in smooth)
+        causes.append(Cause(UNKNOWN, anywhere, log_odds(Kind.UNKNOWN), sizes, Kind.UNKNOWN))
         kept.append(None)
         trials.append(())
     return Linear(fit, tuple(causes), tuple(kept), tuple(trials), smooth)

@@ -63,9 +63,7 @@ class HomogeneousMaterial:
     times: tuple[float, ...] = ()
 
     @classmethod
-    def of_case(
-        cls, case: Case, mechanisms: Sequence[Mechanism], turn: Floats | None = None
-    ) -> HomogeneousMaterial:
+    def of_case(cls, case: Case, mechanisms: Sequence[Mechanism], turn: Floats | None = None) -> HomogeneousMaterial:
         """The tissue of a case with all that acts on it, its own mechanisms among that, turned in the machine.
 
         Raises

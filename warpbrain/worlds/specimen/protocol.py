@@ -1,4 +1,4 @@
-"""The tests of a specimen: stress over strain at the recorded rows, in chains of one memory, and few rows for inference.
+"""The tests of a specimen: stress over strain at the recorded rows, in chains of one memory; few rows for inference.
 
 Every response is turned into a nominal stress [Pa]: a force over the area of an end, a torque over `int r dA`. Every
 imposed value is turned into a strain: a stretch, a shear, or the shear at the rim of a twisted cylinder.

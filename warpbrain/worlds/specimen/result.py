@@ -119,21 +119,12 @@ class Segment:
 
 @dataclass(frozen=True)
 class Score:
-    """Root mean square errors over all recorded rows [Pa].
-
-    Attributes
-    ----------
-    fitted : float
-        Of tests that it was fitted to.
-    heldout : float or None
-        Of tests that were held out in turn; None where nothing was fitted at all.
-    check : dict of str to float
-        Of each test with role `check`.
-    """
+    """Root mean square errors over all recorded rows [Pa]: of tests that were fitted, of these held out in turn (None
+    where nothing was fitted at all), and of each test with role `check`."""
 
     fitted: float
     heldout: float | None
-    check: Mapping[str, float]
+    check: dict[str, float]
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ def sentence_of(found: SpecimenDiagnosis) -> str:
 
 
 def _held_out(found: SpecimenDiagnosis) -> str:
-    before, after = found.scores["refitted"].heldout, found.scores["explained"].heldout
+    before, after = (found.scores[name].heldout or 0.0 for name in ("refitted", "explained"))
     return "" if after > before else f" Tests that were held out: {before:.3g} Pa without, {after:.3g} Pa with it."
 
 
@@ -70,14 +70,14 @@ def assumptions_of(fit: Fit, protocol: Protocol, by_test: bool) -> tuple[str, ..
         found.append("Tests whose times go on are one history: tissue remembers the earlier ones.")
     found.append(
         f"The noise of a test is {100 * belief('specimen.reading'):g} % of its largest stress or its roughness, and "
-        f"{100 * belief('specimen.shared'):g} % that a stretch of the curve has in common, times {fit.scale:.2f}, which "
+        f"{100 * belief('specimen.shared'):g} % that a stretch of the curve has in common, times {fit.scale:.2f}, as "
         "was found."
     )
     if np.any(glued != 1.0):
         found.append(
-            f"Stress is that of the homogeneous state times {glued.min():.3g} to {glued.max():.3g}, the factor of glued "
-            f"ends: finite elements ({ELEMENTS}) of the law that was arrived at, elastic; memory is taken to have the "
-            "same factor."
+            f"Stress is that of the homogeneous state times {glued.min():.3g} to {glued.max():.3g}, the factor of "
+            f"glued ends: finite elements ({ELEMENTS}) of the law that was arrived at, elastic; memory is taken "
+            "to have the same factor."
         )
     elif case.specimen.grips == "glued":
         found.append("The state is taken for homogeneous, though the ends are glued.")

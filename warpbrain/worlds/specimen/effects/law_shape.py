@@ -3,8 +3,8 @@
     stress x exp(k (I1 - 3))                        (Demiray 1972)
     mu ((1 - c) neo-Hookean + c of `I2`)            (Mooney 1940)
 
-What stiffens is all of the stress, what the tissue remembers among it. Small ones are nuisances of every hypothesis, see
-`warpbrain.worlds.specimen.nuisances`; these are large.
+What stiffens is all of the stress, what the tissue remembers among it. Small ones are nuisances of every hypothesis
+(`warpbrain.worlds.specimen.nuisances`); these are large.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Tests that are far from what they say: ends that slip or stick, a zero that drifts, specimens of another stiffness."""
+"""Tests that are far from what they say: ends that slip or stick, a drifting zero, specimens of another stiffness."""
 
 from __future__ import annotations
 
