@@ -22,7 +22,7 @@ class Calibration:
     Attributes
     ----------
     temperature : float
-        By which log evidence is divided: it is sharper than it should be where noise, mesh and tissue are
+        By which log probabilities are divided: evidence is sharper than it should be where noise, mesh and tissue are
         only nearly what the model says.
     log_weights : mapping of str to float
         Added to the log prior of sets: of no cause (`nothing`), for each physical cause beyond the first (`another`),
@@ -39,8 +39,8 @@ class Calibration:
         """Of each hypothesis, (h,)."""
         from scipy.special import softmax
 
-        logs = [one.log_evidence / self.temperature + one.log_prior + self._weight(one) for one in hypotheses]
-        return np.asarray(softmax(logs))
+        logs = [one.log_evidence + one.log_prior + self._weight(one) for one in hypotheses]
+        return np.asarray(softmax(np.array(logs) / self.temperature))
 
     def _weight(self, hypothesis: Hypothesis) -> float:
         if not hypothesis.causes:

@@ -116,9 +116,7 @@ def loss(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> float
     if not truth.physical:
         return losses["name where nothing is"]
     if decision.verdict == UNKNOWN:
-        # beside what has no name a mechanism may act, which is left out
-        left = losses["name left out"] * len(truth.mechanisms)
-        return left if truth.unknown else losses["unknown for a mechanism"]
+        return losses["name left out" if truth.unknown else "unknown for a mechanism"] * bool(truth.mechanisms)
     if decision.verdict == GROUP:
         return _group(decision, truth, losses)
     return _named(decision, truth, losses)
@@ -145,7 +143,7 @@ def _named(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> flo
     left = len(truth.mechanisms.difference(decision.causes))
     cost = losses["false name"] * false
     if decision.verdict == NAMED_AND_REST:
-        # a rest that is said stands for one thing that is left: for what has no name, if there is such a thing
-        things = left + truth.unknown
-        return cost + losses["name left out"] * max(things - 1, 0) + losses["rest where nothing is"] * (things == 0)
+        # a rest that is said stands for what is left, without its name
+        cost += losses["rest for a name"] * left
+        return cost + losses["rest where nothing is"] * (left == 0 and not truth.unknown)
     return cost + losses["name left out"] * left + losses["rest left out"] * truth.unknown

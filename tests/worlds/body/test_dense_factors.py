@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 from scipy.sparse import csr_array, eye_array, random_array
 
-from warpbrain.diagnosis import dense_factors as module
+from warpbrain.worlds.body import dense_factors as module
 from warpbrain.worlds.body.dense_factors import DenseFactors, dense_factors
 from warpbrain.worlds.body.factors import Factors
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from warpbrain.worlds.body.not_physics import _FORCE, _OFF, _off_surfaces, _wrong_forces
+from warpbrain.inference.beliefs import belief
+from warpbrain.worlds.body.not_physics import _off_surfaces, _wrong_forces
 from warpbrain.worlds.body.sensors import Sensors
 
 POINTS, WALL = 4, 30
@@ -31,13 +32,13 @@ def test_a_surface_may_be_off_as_much_everywhere(sensors: Sensors) -> None:
     columns = _off_surfaces(sensors)
     wall = sensors.of_surfaces
     assert wall.sum() == WALL
-    np.testing.assert_allclose(np.sum(columns[wall] ** 2, axis=1), _OFF**2, rtol=1e-12)
+    np.testing.assert_allclose(np.sum(columns[wall] ** 2, axis=1), belief("mesh.surface_off") ** 2, rtol=1e-12)
     assert not columns[~wall].any()
 
 
 def test_a_surface_is_off_alike_where_it_is_near_and_turned_alike(sensors: Sensors) -> None:
     wall = np.flatnonzero(sensors.of_surfaces)
-    covariance = _off_surfaces(sensors) @ _off_surfaces(sensors).T / _OFF**2
+    covariance = _off_surfaces(sensors) @ _off_surfaces(sensors).T / belief("mesh.surface_off") ** 2
     apart = np.linalg.norm(sensors.positions[wall][:, None] - sensors.positions[wall][None], axis=2)
     turned = 0.5 + 0.5 * sensors.directions[wall] @ sensors.directions[wall].T
     near = apart < 0.005
@@ -47,5 +48,7 @@ def test_a_surface_is_off_alike_where_it_is_near_and_turned_alike(sensors: Senso
 def test_a_force_may_be_wrong_in_size_and_direction_by_a_part_of_it(sensors: Sensors) -> None:
     columns = _wrong_forces(sensors)
     forces = ~sensors.is_displacement
-    np.testing.assert_allclose(columns[forces] @ columns[forces].T, (5.0 * _FORCE) ** 2 * np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(
+        columns[forces] @ columns[forces].T, (5.0 * belief("loads.force")) ** 2 * np.eye(3), atol=1e-12
+    )
     assert not columns[~forces].any()

@@ -124,7 +124,7 @@ class Contact(Mechanism):
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
-        """What is held slides or lifts off instead; what is free slides along a wall, or meets one."""
+        """What is held slides or lifts off instead; what is free slides along a wall where it was, or meets it."""
         released = [cls._let_go(state, patch) for patch in situation.held for state in STATES[1:]]
         walls = [cls._kept(state, surface) for surface in situation.free for state in STATES[1:]]
         if not released and not walls:

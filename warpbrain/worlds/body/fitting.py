@@ -24,7 +24,7 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, Effects, parts_of
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected, expected_answer
-from warpbrain.worlds.body.nuisances import field_columns, mesh_by_tissue, tissue_columns
+from warpbrain.worlds.body.nuisances import field_columns, mesh_by_tissue, registration_sd, tissue_columns
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
 
 Floats = NDArray[np.float64]
@@ -199,6 +199,9 @@ class _Search:
         self._tissue, self._field = nuisances.part("tissue"), nuisances.part("stiffness field")
         self._linear = np.ones(self._U.shape[1], dtype=bool)
         self._linear[self._tissue] = self._linear[self._field] = False
+        # recordings are taken back by a motion already, which costs what it costs in coordinates
+        self._aligned = np.zeros(self._U.shape[1])
+        self._aligned[nuisances.part("registration")] = fits.base.states.motion / registration_sd()
         self._own = _slices(effects, self._U.shape[1])
         self._share: _Share | None = None
         # of the last state of this fit that was followed over time
@@ -303,7 +306,7 @@ class _Search:
             state = base.states.solve(hypothesis, None, error)
         self._course = state.course or self._course
         q = self._U.shape[1]
-        residual = state.sensors.residual - self._U[:, self._linear] @ z[:q][self._linear]
+        residual = state.sensors.residual - self._U[:, self._linear] @ (z[:q] - self._aligned)[self._linear]
         if self._share is not None:
             residual = residual - self._share.at(z[q:])
         for effect, own in zip(self._effects, self._own, strict=True):

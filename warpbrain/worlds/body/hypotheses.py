@@ -54,6 +54,8 @@ class Weighed:
     refit : Refit or None
     why : str
         What kept it from being fitted.
+    inherited : float
+        Part of its evidence that it has from the fit of nothing, until it is fitted itself.
     """
 
     hypothesis: Hypothesis
@@ -64,6 +66,7 @@ class Weighed:
     marginal: Marginal
     refit: Refit | None = None
     why: str = ""
+    inherited: float = 0.0
 
     @property
     def names(self) -> frozenset[str]:
@@ -255,12 +258,11 @@ class HypothesisSearch:
             # search that ended too early must not make everything else look better
             gain = max(gain, 0.0)
             for other in list(self._weighed.values()):
-                if other.refit is None:
-                    self._weighed[other.names] = other.with_evidence(other.hypothesis.log_evidence + gain)
-            one = replace(one, hypothesis=self._weighed[names].hypothesis)
-            gain = 0.0
+                if other.names:
+                    gained = other.with_evidence(other.hypothesis.log_evidence + gain)
+                    self._weighed[other.names] = replace(gained, inherited=gain)
         fitted = replace(one, residual=refit.linear, columns=refit.columns, marginal=refit.marginal, refit=refit)
-        self._weighed[names] = fitted.with_evidence(one.hypothesis.log_evidence + gain)
+        self._weighed[names] = fitted.with_evidence(one.hypothesis.log_evidence - one.inherited + gain)
 
     def _placed(self, one: Weighed) -> Weighed:
         """A set with its mechanisms at the best places of their cells."""
