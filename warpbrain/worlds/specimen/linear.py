@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.inference.beliefs import belief, beliefs
+from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Cause, Kind, Place
 from warpbrain.inference.decide import UNKNOWN
 from warpbrain.inference.noise import scales
@@ -25,7 +26,8 @@ _PRIORS = {Kind.PHYSICS: "causes.mechanism", Kind.NOT_PHYSICS: "causes.not_physi
 
 def log_odds(kind: Kind) -> float:
     """That a cause of a kind acts, before anything was recorded."""
-    return float(np.log(belief(_PRIORS[kind])))
+    # probabilities divide all logarithms by the temperature, but it is evidence alone that is too sharp
+    return calibration().temperature * float(np.log(belief(_PRIORS[kind])))
 
 
 @dataclass(frozen=True, eq=False)

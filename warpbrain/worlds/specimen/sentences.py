@@ -39,7 +39,7 @@ def sentence_of(found: SpecimenDiagnosis) -> str:
         return f"{' '.join(sentences[name] for name in found.decision.causes)} That explains the mismatch best.{doubts}"
     if found.verdict == GROUP:
         known = {one.name: one.probability for one in found.ranking}
-        names = ", ".join(f"{name} ({chance(known[name])})" for name in found.decision.causes if name in known)
+        names = ", ".join(f"{name} ({chance(known[name])})" for name in found.decision.causes if name != UNKNOWN)
         other = ", or what has no name" if UNKNOWN in found.decision.causes else ""
         return f"Something is missing ({p}): {names}{other}. These tests do not tell which.{doubts}"
     if found.verdict == UNKNOWN:

@@ -53,7 +53,7 @@ def stiffening(case: Case, protocol: Protocol) -> Effect:
         return Acting(factor=np.exp(np.clip(k * invariant_rows(rows.protocol), -_MOST, _MOST)))
 
     way = Way.of_one(act, belief("specimen.largest_stiffening") / largest, False)
-    sentence = "Tissue stiffens with strain, in all directions alike."
+    sentence = "Tissue stiffens with strain more than its law says (k > 0) or less (k < 0), in all directions alike."
     return Effect(STIFFENING, Kind.PHYSICS, sentence, ("k",), ("",), (way,))
 
 
