@@ -116,6 +116,9 @@ def test_a_check_that_fails_is_said():
     assert any("'hold', which was not fitted, is predicted worse" in one for one in doubts)
     assert any("b is not named: patterns that mean nothing predict as well" in one for one in doubts)
     assert after_checks(Decision(NAMED, ("b",)), checked, 0.05)[0] == Decision(CANNOT_SAY, ("b",))
+    worse = replace(checked, scores=scores | {"explained": Score(2.0, 10.0, {"hold": 0.5})})
+    decision, doubts = after_checks(Decision(NAMED, ("a",)), worse, 0.05)
+    assert decision == Decision(CANNOT_SAY, ("a",)) and "from 9 Pa to 10 Pa" in doubts[0]
 
 
 def test_folds_of_one_test_are_its_quarters():

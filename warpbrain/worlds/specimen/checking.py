@@ -107,28 +107,33 @@ class Checking:
 def after_checks(decision: Decision, checked: Checked, alpha: float) -> tuple[Decision, tuple[str, ...]]:
     """A verdict after its checks, and what failed in words.
 
-    Names that fail are not spoken; without any other name nothing can be said. Where anything is left, or a test that
-    was not fitted is predicted worse, a rest is said.
+    Names that fail are not spoken; without any other name, or where the error of held-out tests grows, nothing can be
+    said. Where anything is left, or a test that was not fitted is predicted worse, a rest is said.
     """
-    doubts = []
-    if "explained" in checked.scores:
-        held = [checked.scores[name].heldout or 0.0 for name in ("refitted", "explained")]
-        if held[1] > held[0]:
-            doubts.append(f"The error of held-out tests grows with it: from {held[0]:.3g} Pa to {held[1]:.3g} Pa.")
-        before, after = (checked.scores[name].check for name in ("refitted", "explained"))
-        doubts += [
-            f"'{name}', which was not fitted, is predicted worse with it: {before[name]:.3g} Pa without, "
-            f"{after[name]:.3g} Pa with it."
-            for name in before
-            if after[name] > before[name]
-        ]
+    grown, doubts = _what_grows(checked)
     if decision.verdict not in (NAMED, NAMED_AND_REST):
-        return decision, tuple(doubts)
+        return decision, (*grown, *doubts)
     if checked.p_left is not None and checked.p_left <= alpha:
         doubts.append(f"Other causes would explain what is left (p = {checked.p_left:.2g} that nothing is).")
     failed = {one.name: one.why_not(alpha) for one in checked.confirmations if one.why_not(alpha)}
     doubts += [f"{name} is not named: {why}." for name, why in failed.items() if name in decision.causes]
     kept = tuple(name for name in decision.causes if name not in failed)
-    if not kept:
-        return Decision(CANNOT_SAY, decision.causes), tuple(doubts)
+    if grown or not kept:
+        return Decision(CANNOT_SAY, decision.causes), (*grown, *doubts)
     return (Decision(NAMED_AND_REST, kept) if doubts else decision), tuple(doubts)
+
+
+def _what_grows(checked: Checked) -> tuple[list[str], list[str]]:
+    """Errors that are larger with what was added than without, in words: of held-out tests, of tests never fitted."""
+    if "explained" not in checked.scores:
+        return [], []
+    before, after = (checked.scores[name] for name in ("refitted", "explained"))
+    first, second = before.heldout or 0.0, after.heldout or 0.0
+    grown = [f"The error of held-out tests grows with it: from {first:.3g} Pa to {second:.3g} Pa."]
+    checks = [
+        f"'{name}', which was not fitted, is predicted worse with it: {before.check[name]:.3g} Pa without, "
+        f"{after.check[name]:.3g} Pa with it."
+        for name in before.check
+        if after.check[name] > before.check[name]
+    ]
+    return grown if second > first else [], checks

@@ -50,7 +50,7 @@ def sentence_of(found: SpecimenDiagnosis) -> str:
 
 def _held_out(found: SpecimenDiagnosis) -> str:
     before, after = (found.scores[name].heldout or 0.0 for name in ("refitted", "explained"))
-    return "" if after > before else f" Tests that were held out: {before:.3g} Pa without, {after:.3g} Pa with it."
+    return f" Tests that were held out: {before:.3g} Pa without, {after:.3g} Pa with it."
 
 
 def _values(one: Ranked) -> str:
