@@ -144,7 +144,7 @@ def _known(
         for k, own in enumerate(true)
     ]
     for row, effect in zip(true, effects, strict=True):
-        own = draws_of(row[None], np.array([np.inf]), False, bool(label["kind"] != "two"))
+        own = draws_of(row[None], np.array([np.inf]), fixed=False, both=True)
         if effect.kind in named:
             named[effect.kind] = named[effect.kind].and_also(own)
         elif effect.kind in OUTSIDE:

@@ -76,22 +76,29 @@ def fit(ballots: Sequence[Ballot]) -> Scale:
     from scipy.optimize import minimize
     from scipy.special import softmax
 
-    rows = [(np.array([h.log_density for h in b.hypotheses]), traits(b.hypotheses), b.right) for b in ballots]
-    # what is common to all of a case does not matter
-    rows = [(log - log.max(), has, right) for log, has, right in rows]
+    most = max(len(b.hypotheses) for b in ballots)
+    log = np.full((len(ballots), most), -np.inf)
+    has, right = np.zeros((*log.shape, len(TRAITS))), np.zeros(log.shape, dtype=bool)
+    for k, ballot in enumerate(ballots):
+        own = np.array([h.log_density for h in ballot.hypotheses])
+        # what is common to all of a case does not matter
+        log[k, : len(own)], has[k, : len(own)] = own - own.max(), traits(ballot.hypotheses)
+        right[k, : len(own)] = ballot.right
+    tried = np.isfinite(log)
 
     def cost(x: Floats) -> tuple[float, Floats]:
         temperature = np.exp(x[0])
-        value, slope = 0.0, np.zeros_like(x)
-        for log, has, right in rows:
-            exponent = (log + has @ x[1:]) / temperature
-            p = softmax(exponent)
-            true = max(float(p[right].sum()), 1e-300)
-            value -= np.log(true)
-            by_exponent = p - p * right / true
-            slope[0] -= by_exponent @ exponent
-            slope[1:] += by_exponent @ has / temperature
-        return value + 0.5 * float(((x / _SPREADS) ** 2).sum()), slope + x / _SPREADS**2
+        exponent = (log + has @ x[1:]) / temperature
+        p = softmax(exponent, axis=1)
+        true = np.maximum((p * right).sum(axis=1, keepdims=True), 1e-300)
+        by_exponent = p - p * right / true
+        slope = np.array(
+            [
+                -(by_exponent * np.where(tried, exponent, 0.0)).sum(),
+                *np.einsum("ck,ckt->t", by_exponent, has) / temperature,
+            ]
+        )
+        return float(-np.log(true).sum() + 0.5 * ((x / _SPREADS) ** 2).sum()), slope + x / _SPREADS**2
 
     bounds = [(-3.0, 5.0), *[(-30.0, 30.0)] * len(TRAITS)]
     found = minimize(cost, np.zeros(len(_SPREADS)), jac=True, method="L-BFGS-B", bounds=bounds)

@@ -120,7 +120,7 @@ def test_what_is_given_is_the_part_that_is_not_along_the_other():
 PLANS = [
     Planned("none", (), "phantom"),
     Planned("effect", ("pressure",), "phantom"),
-    Planned("two", ("pressure", "swelling"), "phantom"),
+    Planned("two", ("pressure", "traction"), "phantom"),
     Planned("outside", ("swirl",), "phantom"),
     Planned("trap", ("registration",), "phantom"),
 ]

@@ -144,6 +144,6 @@ def _named(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> flo
     cost = losses["false name"] * false
     if decision.verdict == NAMED_AND_REST:
         # a rest that is said stands for what is left, without its name
-        cost += losses["rest for a name"] * left
+        cost += losses["name left out"] * left
         return cost + losses["rest where nothing is"] * (left == 0 and not truth.unknown)
     return cost + losses["name left out"] * left + losses["rest left out"] * truth.unknown
