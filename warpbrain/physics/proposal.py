@@ -104,6 +104,27 @@ class Situation:
             raise NotTestableError("the case assumes it already")
 
 
+@dataclass(frozen=True)
+class Tests:
+    """What a mechanism may know of the tests on a specimen that may be fitted.
+
+    Attributes
+    ----------
+    modes : frozenset of str
+    loads : int
+        How many different ones: other modes, or other directions of the tissue.
+    tension, compression : bool
+        Whether an axial test pulls, and whether one presses.
+    """
+
+    # not a test of pytest's
+    __test__ = False
+    modes: frozenset[str]
+    loads: int
+    tension: bool
+    compression: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Proposal:
     """Mechanisms of one kind at one place.
