@@ -4,9 +4,9 @@ import copy
 from dataclasses import replace
 
 import numpy as np
+from warpbrain.diagnosis.stage import Stage, compared
 
 from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.diagnosis.stage import Stage, compared
 from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of, patch_of
 from warpbrain.worlds.body.effects import Effects
 

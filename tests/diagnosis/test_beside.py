@@ -8,7 +8,8 @@ from sinking_block import OPTIONS, write_sinking
 
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.diagnose import Diagnosing
-from warpbrain.diagnosis.result import NAMED, NAMED_AND_REST, Diagnosis
+from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.inference.decide import NAMED, NAMED_AND_REST
 from warpbrain.physics.mechanisms.pressure import Pressure
 
 

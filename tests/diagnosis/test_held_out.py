@@ -1,4 +1,4 @@
-"""What is predicted of points that nothing was fitted to, beside the normal distribution that it should be."""
+"""What is predicted of points that nothing was given of, beside the normal distribution that it should be."""
 
 from types import SimpleNamespace
 
@@ -6,57 +6,75 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from warpbrain.diagnosis.held_out import HeldOut, placebo
+from warpbrain.diagnosis.held_out import HeldOut, blocks_of, distance, share_of_patterns
+from warpbrain.inference import GaussianModel
+from warpbrain.inference.predict import predict, predict_with
 
-N, KAPPA = 30, 1.4
-
-
-@pytest.fixture
-def held_out() -> HeldOut:
-    sensors = SimpleNamespace(is_displacement=np.ones(N, dtype=bool))
-    sigma = np.random.default_rng(0).uniform(0.5, 1.5, N)
-    return HeldOut(sensors, sigma, np.ones(N, dtype=bool), np.arange(N) // 6)
+N = 30
 
 
-def test_a_block_is_as_probable_as_a_normal_distribution_says(held_out: HeldOut) -> None:
+class Points(SimpleNamespace):
+    """Rows of tracked points."""
+
+    def __len__(self) -> int:
+        return N
+
+
+def sensors() -> Points:
+    """Ten of them."""
+    rng = np.random.default_rng(5)
+    return Points(
+        is_displacement=np.ones(N, dtype=bool),
+        groups=np.repeat(np.arange(10), 3),
+        positions=np.repeat(rng.normal(size=(10, 3)), 3, axis=0),
+    )
+
+
+def model(columns: np.ndarray) -> GaussianModel:
+    return GaussianModel(np.diag(np.random.default_rng(0).uniform(0.5, 1.5, N)), columns, 1.4)
+
+
+@pytest.mark.parametrize("local", [False, True])
+def test_a_point_lies_in_one_block(local: bool) -> None:
+    blocks = blocks_of(sensors(), local)
+    assert all(len(set(blocks[3 * k : 3 * k + 3].tolist())) == 1 for k in range(10))
+
+
+def test_a_block_is_as_probable_as_a_normal_distribution_says() -> None:
     rng = np.random.default_rng(1)
-    columns, residual = rng.normal(size=(N, 4)), rng.normal(size=N)
-    found = held_out.predict(residual, columns, KAPPA)
-    S = KAPPA**2 * np.diag(held_out.sigma**2) + columns @ columns.T
-    for number in range(5):
-        own, rest = held_out.blocks == number, held_out.blocks != number
+    given, residual = model(rng.normal(size=(N, 4))), rng.normal(size=N)
+    blocks = blocks_of(sensors(), False)
+    found = HeldOut(sensors(), False).predict(given, residual)
+    S = given.covariance
+    for number, block in enumerate(np.unique(blocks)):
+        own, rest = blocks == block, blocks != block
         toward = S[np.ix_(own, rest)] @ np.linalg.inv(S[np.ix_(rest, rest)])
         mean, spread = toward @ residual[rest], S[np.ix_(own, own)] - toward @ S[np.ix_(rest, own)]
         assert found.log_densities[number] == pytest.approx(multivariate_normal(mean, spread).logpdf(residual[own]))
         np.testing.assert_allclose(found.errors[own], residual[own] - mean)
 
 
-def test_what_moves_a_few_points_far_is_a_gain_and_noise_is_none(held_out: HeldOut) -> None:
+def test_columns_beside_a_model_are_columns_of_it() -> None:
     rng = np.random.default_rng(2)
-    few = np.zeros((N, 1))
-    few[::7, 0] = 1.0
-    noise = held_out.sigma * rng.normal(size=N)
-    moved = noise + 6.0 * few[:, 0]
-    wide, nothing = 5.0 * few, np.zeros((N, 0))
-    gain, sure = held_out.predict(moved, wide).gain(held_out.predict(moved, nothing))
-    assert gain > sure > 10.0
-    gain, sure = held_out.predict(noise, wide).gain(held_out.predict(noise, nothing))
-    assert sure <= gain < 1.0
+    given, more, residual = model(rng.normal(size=(N, 4))), rng.normal(size=(N, 3)), rng.normal(size=N)
+    blocks = blocks_of(sensors(), True)
+    [found] = predict_with(given, residual, blocks, [more])
+    expected = predict(given.with_columns(more), residual, blocks)
+    np.testing.assert_allclose(found.errors, expected.errors, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.log_densities, expected.log_densities, rtol=1e-9)
 
 
-def test_what_one_block_gains_is_not_sure(held_out: HeldOut) -> None:
-    noise = held_out.sigma * np.random.default_rng(4).normal(size=N)
-    one = np.where(held_out.blocks == 2, 6.0, 0.0)[:, None]
-    moved = noise + one[:, 0]
-    gain, sure = held_out.predict(moved, one).gain(held_out.predict(moved, np.zeros((N, 0))))
-    assert gain > 10.0
-    assert sure < 0.1
-
-
-def test_patterns_that_mean_nothing_do_not_predict(held_out: HeldOut) -> None:
+def test_patterns_that_mean_nothing_do_not_predict() -> None:
     rng = np.random.default_rng(3)
-    truth = rng.normal(size=(N, 1))
-    residual = 5.0 * truth[:, 0] + held_out.sigma * rng.normal(size=N)
-    patterns = placebo(held_out, residual, np.zeros((N, 0)), rng.normal(size=(N, 8)), 1, 2, 1.0, rng, count=40)
-    true = held_out.predict(residual, 5.0 * truth)
-    assert all(pattern.rmse > true.rmse and pattern.log_density < true.log_density for pattern in patterns)
+    truth, given = rng.normal(size=(N, 1)), model(np.zeros((N, 0)))
+    residual = 5.0 * truth[:, 0] + given.noise_factor @ rng.normal(size=N)
+    way = HeldOut(sensors(), True)
+    own = way.predict(given.with_columns(5.0 * truth), residual)
+    patterns = way.with_patterns(given, residual, rng.normal(size=(N, 8)), 1, 2, rng)
+    assert share_of_patterns(own, patterns) < 0.02
+    assert min(way.error(pattern) for pattern in patterns) > way.error(own)
+
+
+def test_an_error_is_a_distance() -> None:
+    errors = np.tile([3.0, 0.0, 4.0], 10)
+    assert distance(sensors(), errors) == pytest.approx(5.0)

@@ -27,12 +27,11 @@ def test_sensors_answer_a_force_as_equilibria_do(small_diagnosis: Diagnosis) -> 
 def test_a_single_source_is_found_where_it_is(number: int, small_diagnosis: Diagnosis) -> None:
     base = small_diagnosis.base
     sites, answers = force_patches(base.at, LENGTH, SPACING)
-    seen = np.linalg.norm(base.explanation.precision_times(base.explanation.whitened(answers[:, number])))
-    if not seen > 1e-6:
+    if not np.linalg.norm(base.model.standardised(answers[:, number])) > 1e-6:
         pytest.skip("all of it is held")
     direction = np.random.default_rng(number).normal(size=3)
-    whitened = base.explanation.whitened(1e-2 * answers[:, number] @ direction)
-    draws = base.explanation.draws(50, 1.0, np.random.default_rng(1))
-    found = score_map(base.at, base.explanation, whitened, draws, 1.0, LENGTH, SPACING)
+    residual = 1e-2 * answers[:, number] @ direction
+    draws = base.model.draws(50, np.random.default_rng(1))
+    found = score_map(base.at, base.model, residual, draws, LENGTH, SPACING)
     np.testing.assert_array_equal(found.sites[found.best], sites[number])
     assert np.all(found.scores <= found.scores[number] * (1.0 + 1e-9))

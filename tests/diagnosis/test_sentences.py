@@ -2,15 +2,16 @@
 
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from warpbrain.diagnosis.result import VERDICTS, Fit, Ranked
+from warpbrain.diagnosis.result import Fit, Ranked
 from warpbrain.diagnosis.sentences import effect_sentence, sentence_of
-from warpbrain.diagnosis.verdict import Conclusion, Verdict
+from warpbrain.inference.decide import VERDICTS, Decision
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.worlds.body.not_physics import SENTENCES
 from warpbrain.worlds.body.values import Smallest, Value
@@ -25,16 +26,6 @@ SAID = {
     "not physics": "It is not physics that is missing",
     "cannot say": "cannot say what",
 }
-
-#: What the last stage may say of what names leave.
-LEFT = [
-    Verdict("group", ("gravity", "swelling")),
-    Verdict("group", ("gravity", "unknown")),
-    Verdict("unknown", ()),
-    Verdict("unknown", ("gravity",)),
-    Verdict("not physics", ("registration",)),
-    Verdict("cannot say", ("gravity",)),
-]
 
 sizes = st.floats(-1e6, 1e6, allow_subnormal=False)
 spreads = st.one_of(st.floats(1e-9, 1e6), st.just(0.0))
@@ -98,12 +89,23 @@ def test_every_verdict_is_said(verdict, data):
     seen = dict(data.draw(st.lists(smallest(), max_size=5)))
     axis = data.draw(st.sampled_from([None, (0.0, 0.0, -1.0), (0.0, -2.0, 0.0)]))
     several = data.draw(st.integers(1, 3)) if verdict.startswith("named") else 0
-    left = data.draw(st.sampled_from([None, *LEFT])) if verdict == "named + rest" else None
-    found = Conclusion(verdict, kinds, left, "its size would be implausible")
-    text = sentence_of(found, ranking[:several], ranking, 0.02, seen, fit, axis)
+    found = SimpleNamespace(
+        verdict=verdict,
+        decision=Decision(verdict, kinds),
+        doubts=data.draw(st.sampled_from([(), ("gravity is not named: patterns that mean nothing predict as well.",)])),
+        named=ranking[:several],
+        group=() if several else kinds,
+        ranking=ranking,
+        p_value=0.02,
+        smallest=seen,
+        fit=fit,
+        unknown=None,
+        case=SimpleNamespace(gravity_axis=axis),
+    )
+    text = sentence_of(found)
     check(text)
     assert SAID[verdict] in text
-    for kind in kinds[:1]:
+    for kind in kinds[: 0 if verdict == "cannot say" else 1]:
         said = mechanisms()[kind].sentence if kind in mechanisms() else SENTENCES[kind]
         # within another sentence it begins with a small letter
         assert said[1:].rstrip(".") in text

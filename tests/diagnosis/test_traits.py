@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.flexible import flexible_columns, force_patches
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.diagnosis.sentences import traits_in_words
 from warpbrain.diagnosis.traits import Traits, traits_of
+from warpbrain.inference import GaussianModel
+from warpbrain.worlds.body.unknown import body_forces, force_patches
 
 LENGTH = 0.012
 
@@ -23,9 +23,9 @@ def traits(found: Diagnosis, force: np.ndarray, number: int, within: bool) -> tu
         near = high[np.argsort(np.linalg.norm(sites[high] - sites[own], axis=1))[1]]
         effect -= answers[:, near] @ force
     noise = found.base.typical_noise
-    bare = Explanation(noise * np.eye(len(effect)), np.zeros((len(effect), 0)))
+    bare = GaussianModel(noise * np.eye(len(effect)), np.zeros((len(effect), 0)))
     effect = effect + noise * np.random.default_rng(3).normal(size=len(effect))
-    return traits_of(at, bare, effect, 1.0, noise, LENGTH, sites[own]), sites[own]
+    return traits_of(at, bare, effect, noise, LENGTH, sites[own]), sites[own]
 
 
 @pytest.mark.parametrize("number", [0, 7, 13])
@@ -47,7 +47,7 @@ def test_forces_within_have_no_net_force(number: int, small_diagnosis: Diagnosis
 
 def test_forces_that_were_recorded_do_not_hide_displacements(small_diagnosis: Diagnosis) -> None:
     at = small_diagnosis.base.at
-    [alone] = flexible_columns(at, [LENGTH])
+    [alone] = body_forces(at, [LENGTH])
     from dataclasses import replace
 
     rows = np.r_[np.arange(len(at.sensors)), 0]
@@ -57,5 +57,5 @@ def test_forces_that_were_recorded_do_not_hide_displacements(small_diagnosis: Di
     beside.sensors = sensors
     # a reaction [N] is a thousand times larger as a number than what moves
     beside._rows = np.concatenate([at.compliance, 1e4 * at.compliance[:1]]), np.arange(len(rows))
-    [found] = flexible_columns(beside, [LENGTH])
+    [found] = body_forces(beside, [LENGTH])
     np.testing.assert_allclose(np.abs(found[:-1]), np.abs(alone), atol=1e-6)

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.refitting import Refit
+from warpbrain.diagnosis.held_out import distance
 from warpbrain.errors import SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
+from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.fitting import Refit
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
+from warpbrain.worlds.body.nuisances import registration_sd
 from warpbrain.worlds.body.realigned import realigned
 from warpbrain.worlds.body.sensors import sensors_at
 
@@ -22,7 +24,7 @@ Floats = NDArray[np.float64]
 
 
 def check_errors(case: Case, base: Base, fits: Sequence[Refit]) -> tuple[float, ...] | None:
-    """RMSE of displacements [m]: of the case as declared, then of each fit; None if there is nothing to check.
+    """Root mean square distances [m]: of the case as declared, then of each fit; None if there is nothing to check.
 
     What a fit says there is its state with the expected error of the mesh, and what it has found of all that is no
     physics: recordings of one registration are as wrong where they are fitted as where they are not.
@@ -34,21 +36,23 @@ def check_errors(case: Case, base: Base, fits: Sequence[Refit]) -> tuple[float, 
     sensors = sensors_at([(math.inf, checks, declared.u, declared.reactions)], centre)
     # what was fitted was realigned before, see `realigned`
     again = Observations.to_check(realigned(case, base.states.motion, centre))
-    return _size(sensors.residual[sensors.is_displacement]), *(_error(again, base, fit) for fit in fits)
+    return distance(sensors, sensors.residual), *(_error(again, base, fit) for fit in fits)
 
 
 def _error(checks: Observations, base: Base, fit: Refit) -> float:
-    """RMSE [m] of a fit."""
+    """Root mean square distance [m] of a fit."""
     u, reactions = fit.state.u, fit.state.reactions
     if base.mesh_errors is not None:
         error = _mesh_error(base, base.mesh_errors, fit)
         u, reactions = u + error.u, reactions + error.reactions
     sensors = sensors_at([(math.inf, checks, u, reactions)], base.states.centre)
     nuisances, _ = base.seen_by(sensors)
-    # but for tissue and field, which the state has
-    linear = fit.nuisances - nuisances.coordinates(base.prior, fit.state.hypothesis)
+    # but for tissue and field, which the state has, and the motion by which recordings were taken back
+    known = nuisances.coordinates(base.prior, fit.state.hypothesis)
+    known[nuisances.part("registration")] = base.states.motion / registration_sd()
+    linear = fit.nuisances[: len(known)] - known
     left = sensors.residual - nuisances.columns @ linear
-    return _size(left[sensors.is_displacement])
+    return distance(sensors, left)
 
 
 def _mesh_error(base: Base, known: MeshErrors, fit: Refit) -> Difference:
@@ -60,7 +64,3 @@ def _mesh_error(base: Base, known: MeshErrors, fit: Refit) -> Difference:
         except SolveError:
             pass
     return expected(known.of(hypothesis, base.prior))
-
-
-def _size(errors: Floats) -> float:
-    return float(np.sqrt(np.mean(errors**2)))

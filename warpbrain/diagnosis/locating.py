@@ -14,16 +14,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.evidence import Explanation
+from warpbrain.inference import GaussianModel
+from warpbrain.inference.beliefs import belief
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.unknown import force_patches
 
 Floats = NDArray[np.float64]
-
-#: A force is detectable if it is found with this probability at the level of the map.
-POWER = 0.9
-#: The data are blind where a force must be so many times larger than where they see best.
-BLIND = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +65,7 @@ class ScoreMap:
     @property
     def blind_above(self) -> float:
         """Force [N]: where no smaller one would be found, the data cannot see."""
-        return BLIND * float(self.detectable.min())
+        return belief("checks.blind") * float(self.detectable.min())
 
     @property
     def centre(self) -> Floats:
@@ -97,26 +93,23 @@ def ball_of(sites: Floats, weights: Floats) -> tuple[Floats, float]:
 
 def score_map(
     at: Linearisation,
-    explanation: Explanation,
-    whitened: Floats,
+    model: GaussianModel,
+    residual: Floats,
     draws: Floats,
-    kappa: float,
     length: float,
     spacing: float,
     alpha: float = 0.05,
 ) -> ScoreMap:
-    """The map of whitened residuals (n,).
+    """The map of residuals (n,).
 
     Parameters
     ----------
     at : Linearisation
-    explanation : Explanation
-        Noise and nuisances.
-    whitened : (n,) array
+    model : GaussianModel
+        Of noise and nuisances.
+    residual : (n,) array
     draws : (n, b) array
-        Whitened residuals of which nothing is missing.
-    kappa : float
-        Factor on the noise.
+        Of rows in which nothing is missing.
     length, spacing : float
         Of patches and between them [m].
     alpha : float
@@ -124,18 +117,17 @@ def score_map(
     from scipy.special import chdtrc, chdtri
 
     sites, answers = force_patches(at, length, spacing)
-    columns = explanation.whitened(answers.reshape(len(answers), -1))
-    left = explanation.precision_times(columns, kappa).reshape(answers.shape)
-    information = np.einsum("nsi,nsj->sij", columns.reshape(answers.shape), left, optimize=True)
+    columns = model.standardised(answers.reshape(len(answers), -1)).reshape(answers.shape)
+    information = np.einsum("nsi,nsj->sij", columns, columns, optimize=True)
     # what is held, or hidden behind what the nuisances explain, has no information: it has no score either
     size = np.trace(information, axis1=1, axis2=2)
     information += 1e-9 * max(float(size.max()), 1e-300) * np.eye(3)
 
-    def scores(residuals: Floats) -> Floats:
-        s = np.einsum("nsi,nb->sib", left, residuals, optimize=True)
+    def scores(rows: Floats) -> Floats:
+        s = np.einsum("nsi,nb->sib", columns, model.standardised(rows), optimize=True)
         return np.asarray(np.einsum("sib,sib->sb", s, np.linalg.solve(information, s)))
 
-    own = scores(whitened[:, None])[:, 0]
+    own = scores(residual[:, None])[:, 0]
     largest = scores(draws).max(axis=0)
     threshold = float(np.quantile(largest, 1.0 - alpha))
     # the noncentrality at which a single place passes the threshold of all
@@ -157,4 +149,6 @@ def _noncentrality(threshold: float) -> float:
     from scipy.optimize import brentq
     from scipy.special import chndtr
 
-    return float(brentq(lambda c: 1.0 - chndtr(threshold, 3, c) - POWER, 1e-6, 10.0 * threshold + 100.0))
+    return float(
+        brentq(lambda c: 1.0 - chndtr(threshold, 3, c) - belief("checks.power"), 1e-6, 10.0 * threshold + 100.0)
+    )

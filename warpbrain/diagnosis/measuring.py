@@ -8,67 +8,59 @@ that the other can make, its size free:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.result import Measurement
-from warpbrain.diagnosis.screening import Screen
-from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.inference import GaussianModel
+from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.hypotheses import Weighed
 from warpbrain.worlds.body.sensors import spread_points
 
 Floats = NDArray[np.float64]
 
 #: Points of a further recording.
 _POINTS = 25
-#: Error of direct readings: a pressure [Pa].
-_READING = {"pressure": (20.0, "a reading of the pressure, to 20 Pa")}
 
 
-def next_measurements(
-    base: Base,
-    candidates: Candidates,
-    screen: Screen,
-    kinds: Sequence[str],
-    fits: dict[str, Refit],
-    kappa: float,
-) -> tuple[Measurement, ...]:
-    """Measurements in the order of what they tell about two kinds, the first of which is taken to be the cause."""
-    if len(kinds) < 2:
-        return ()
-    first, second = (candidates.effects[screen.best_effect(candidates, kind)] for kind in kinds[:2])
-    width = first.columns.shape[1]
-    # of what was refined between places the amount alone: it is compared in its place of the scan
-    z = fits[kinds[0]].coefficients[0][:width] if kinds[0] in fits else np.ones(width)
-    noise = base.typical_noise
-    columns = base.nuisances.columns
-    found = [Measurement("nothing more", _apart(base, first, second, z, columns, kappa, None, noise))]
-    found.append(
-        Measurement(
-            "the same points with half the noise", _apart(base, first, second, z, columns, 0.5 * kappa, None, noise)
-        )
-    )
+def next_measurements(base: Base, first: Weighed, second: Weighed, names: tuple[str, str]) -> tuple[Measurement, ...]:
+    """Measurements in the order of what they tell about two mechanisms, the first of which is taken to be the cause.
+
+    Parameters
+    ----------
+    base : Base
+    first, second : Weighed
+        Sets with one and with the other.
+    names : (str, str)
+    """
+    effects = tuple(one.effects[one.mechanisms.index(name)] for one, name in zip((first, second), names, strict=True))
+    z = first.coefficients[first.mechanisms.index(names[0])][0]
+    asked = _Apart(base, effects[0], effects[1], z, first.marginal.scale)
+    found = [
+        Measurement("nothing more", asked.now()),
+        Measurement("the same points with half the noise", asked.now(0.5)),
+    ]
     places = _places(base)
-    further = _further(base, first, second, z, np.concatenate(list(places.values())))
+    further = _further(base, effects[0], effects[1], z, np.concatenate(list(places.values())))
     at = 0
     for name, where in places.items():
         rows = further[3 * at : 3 * (at + len(where))]
         at += len(where)
-        what = f"{len(where)} more tracked points {name}"
-        found.append(Measurement(what, _apart(base, first, second, z, columns, kappa, rows, noise)))
-    for kind in kinds[:2]:
-        if kind in _READING:
-            error, what = _READING[kind]
-            size = abs(z[0]) * first.proposed.sd[0] if kind == kinds[0] else second.proposed.sd[0]
-            found.append(Measurement(what, found[0].expected_nats + 0.5 * (float(size) / error) ** 2))
-    if "gravity" in kinds[:2]:
-        # only gravity turns with the head: a second pose is a second experiment
-        found.append(Measurement("the same points with the head turned by 30 degrees", 1.5 * found[0].expected_nats))
+        found.append(Measurement(f"{len(where)} more tracked points {name}", asked.with_rows(rows)))
+    known = mechanisms()
+    for name, effect in zip(names, effects, strict=True):
+        reading = known[name].reading
+        if reading is not None:
+            size = abs(z[0]) * effect.proposed.sd[0] if name == names[0] else effect.proposed.sd[0]
+            told = found[0].expected_nats + 0.5 * (float(size) / reading.error) ** 2
+            found.append(Measurement(reading.words, told))
+        if known[name].stays_in_room:
+            # only what turns with the head: a second pose is a second experiment
+            found.append(
+                Measurement("the same points with the head turned by 30 degrees", 1.5 * found[0].expected_nats)
+            )
     return tuple(sorted(found, key=lambda one: -one.expected_nats))
 
 
@@ -83,41 +75,45 @@ def _places(base: Base) -> dict[str, Floats]:
     return found
 
 
-def _apart(
-    base: Base,
-    first: Effect,
-    second: Effect,
-    z: Floats,
-    nuisances: Floats,
-    kappa: float,
-    further: Floats | None,
-    noise: float,
-) -> float:
-    """Expected log Bayes factor of one effect over the best imitation by another, with more points or without."""
-    scale = kappa * base.sigma
-    effect = first.mean + first.columns @ z
-    imitation = np.column_stack([second.mean, second.columns]) if second.mean.any() else second.columns
-    rows: list[Any] = [np.column_stack([effect, imitation, nuisances]) / scale[:, None]]
-    if further is not None:
-        rows.append(further / noise)
-    whole = np.concatenate(rows)
-    count = imitation.shape[1]
-    g, G, U = whole[:, 0], whole[:, 1 : 1 + count], whole[:, 1 + count :]
-    inner = np.linalg.inv(np.eye(U.shape[1]) + U.T @ U)
+class _Apart:
+    """Expected log Bayes factor of one effect over the best imitation by another, in noise and nuisances."""
 
-    def left(X: Floats) -> Floats:
-        return np.asarray(X - U @ (inner @ (U.T @ X)))
+    def __init__(self, base: Base, first: Effect, second: Effect, z: Floats, scale: float) -> None:
+        self._base, self._scale = base, scale
+        self._rows = np.column_stack([first.mean + first.columns @ z, _imitation(second), base.nuisances.columns])
+        self._alike = _imitation(second).shape[1]
 
-    Lg = left(g)
-    M = G.T @ left(G)
-    M += 1e-10 * max(float(np.trace(M)), 1e-300) * np.eye(count)
-    b = G.T @ Lg
-    return 0.5 * max(float(g @ Lg - b @ np.linalg.solve(M, b)), 0.0)
+    def now(self, noise: float = 1.0) -> float:
+        """With what was recorded, its noise so many times as large."""
+        factor = noise * self._base.model.noise_factor
+        return self._told(GaussianModel(factor, self._rows[:, 1 + self._alike :], self._scale), self._rows)
+
+    def with_rows(self, further: Floats) -> float:
+        """With further rows (m, 1 + k + q)."""
+        n, m = len(self._rows), len(further)
+        factor = np.zeros((n + m, n + m))
+        factor[:n, :n] = self._base.model.noise_factor
+        factor[n:, n:] = self._base.typical_noise * np.eye(m)
+        whole = np.concatenate([self._rows, further])
+        return self._told(GaussianModel(factor, whole[:, 1 + self._alike :], self._scale), whole)
+
+    def _told(self, model: GaussianModel, rows: Floats) -> float:
+        white = model.standardised(rows[:, : 1 + self._alike])
+        g, G = white[:, 0], white[:, 1:]
+        M = G.T @ G
+        M += 1e-10 * max(float(np.trace(M)), 1e-300) * np.eye(len(M))
+        b = G.T @ g
+        return 0.5 * max(float(g @ g - b @ np.linalg.solve(M, b)), 0.0)
+
+
+def _imitation(effect: Effect) -> Floats:
+    return np.column_stack([effect.mean, effect.columns]) if effect.mean.any() else effect.columns
 
 
 def _further(base: Base, first: Effect, second: Effect, z: Floats, where: Floats) -> Floats:
     """Rows of tracked points at other places (k, 3) [m]: the effect, its imitation, nuisances."""
     nuisances, effects = base.elsewhere(where)
     there, imitation = effects.of([first.proposed, second.proposed])
-    columns = np.column_stack([imitation.mean, imitation.columns]) if second.mean.any() else imitation.columns
-    return np.column_stack([there.mean + there.columns @ z, columns, nuisances.columns])
+    # as many columns there as here
+    alike = np.column_stack([imitation.mean, imitation.columns]) if second.mean.any() else imitation.columns
+    return np.column_stack([there.mean + there.columns @ z, alike, nuisances.columns])

@@ -2,38 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.onset import Onset
-from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.traits import Traits
+from warpbrain.inference import Kind
+from warpbrain.inference.confirm import Confirmation
+from warpbrain.inference.decide import Decision
+from warpbrain.inference.predict import Prediction
+from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
 from warpbrain.worlds.body.values import Smallest, Value
 
 Floats = NDArray[np.float64]
 
-#: The seven verdicts.
-NOTHING, NAMED, GROUP, NAMED_AND_REST, UNKNOWN, NOT_PHYSICS, CANNOT_SAY = VERDICTS = (
-    "nothing missing",
-    "named",
-    "group",
-    "named + rest",
-    "unknown",
-    "not physics",
-    "cannot say",
-)
-#: Of a virtual case: a group that holds the cause, and one that does not.
-WITH_IT, WITHOUT_IT = "group with it", "group without it"
-
-#: Among fits, and among what held-out points are predicted to be: with all that is named.
-EXPLAINED = "explained"
+#: Of sets of causes: none, and all that is named.
+REFITTED, EXPLAINED = "refitted", "explained"
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,43 +82,46 @@ class Measurement:
 
 @dataclass(frozen=True, eq=False)
 class Confusion:
-    """What would be said of virtual cases of the linear model.
+    """What could be taken for each mechanism.
 
     Attributes
     ----------
-    cases : int
-        Of each cause.
     rows : dict of str to dict of str to float
-        By cause, the share of its cases of which each thing is said.
-    sizes : tuple of float
-        Detectabilities `d`.
-    alarm, named : dict of str to tuple of (float or None)
-        By mechanism, the share with an alarm, and named rightly, at each of these; None where a mechanism would have
-        to be implausibly large.
+        By mechanism, the part of its visible effect that the best place of each other cause imitates.
     """
 
-    cases: int
     rows: dict[str, dict[str, float]]
-    sizes: tuple[float, ...]
-    alarm: dict[str, tuple[float | None, ...]]
-    named: dict[str, tuple[float | None, ...]]
 
-    def needed(self, shares: Mapping[str, Sequence[float | None]], kind: str, part: float) -> float:
-        """Detectability from which on a share, `alarm` or `named`, of a mechanism is so large; infinite if never."""
-        known = [(d, share) for d, share in zip(self.sizes, shares[kind], strict=True) if share is not None]
-        sizes, found = np.array([0.0, *(d for d, _ in known)]), np.array([0.0, *(share for _, share in known)])
-        # a larger one is not less visible: what falls with size is the chance of few draws
-        below = np.maximum.accumulate(found)
-        if below[-1] < part:
-            return float("inf")
-        above = int(np.argmax(below >= part))
-        between = (part - below[above - 1]) / (below[above] - below[above - 1])
-        return float(sizes[above - 1] + between * (sizes[above] - sizes[above - 1]))
+
+@dataclass(frozen=True)
+class Combination:
+    """A set of causes.
+
+    Attributes
+    ----------
+    causes : tuple of str
+    kinds : tuple of Kind
+        Of each.
+    log_evidence, log_prior : float
+    probability : float
+    fitted : bool
+        Whether it was fitted without linearising.
+    gross_errors : int
+        Points that are rather gross errors than not beside it.
+    """
+
+    causes: tuple[str, ...]
+    kinds: tuple[Kind, ...]
+    log_evidence: float
+    log_prior: float
+    probability: float
+    fitted: bool
+    gross_errors: int
 
 
 @dataclass(frozen=True)
 class Fit:
-    """How well hypotheses agree with the displacements that were recorded [m].
+    """How well hypotheses agree with recorded displacements: root mean squares of 3-D distances [m], all points.
 
     Attributes
     ----------
@@ -162,32 +156,38 @@ class Diagnosis:
     Attributes
     ----------
     case : Case
-    verdict : str
-        One of `VERDICTS`.
-    sentence : str
+    decision : Decision
+        After the checks; `by_posterior` before them.
+    doubts : tuple of str
+        Checks that failed, in words.
     p_value : float
         Of nothing missing.
+    p_left : float or None
+        Of nothing being left beside what is named; None where nothing is.
     named : tuple of Ranked
-        What is named, in the order in which it was found: as it is in the fit with all of it.
-    group : tuple of str
-        Kinds that cannot be told apart.
+        What is named, the most probable first: as it is in the fit with all of it.
     ranking : tuple of Ranked
     rejected : dict of str to str
         Kinds that were not tried, and why.
+    combinations : tuple of Combination
+        Sets of causes, the most probable first.
     map : ScoreMap
     when : Onset or None
         When what explains the mismatch best set in; None with one time, or where nothing physical is missing.
-    base : Base
-    fits : dict of str to Refit
-        By kind; ``"none"`` without any, ``"explained"`` with all that is named.
-    held_out : dict of str to Predicted
-        What each of these predicts of points that it was not fitted to.
+    search : HypothesisSearch
+        Of the sets of causes, with its base.
+    weighed : dict of str to Weighed
+        ``"refitted"`` without any cause, ``"explained"`` with all that is named.
+    held_out : dict of str to Prediction
+        What each of these predicts of points that it was not given.
     explained : Case or None
         The case with what was named, ready to run.
     smallest : dict of str to Smallest
-    confusion : Confusion or None
+    confusion : Confusion
     next_measurement : tuple of Measurement
     fit : Fit
+    confirmations : tuple of Confirmation
+        Of each mechanism of the best set.
     assumptions, remarks : tuple of str
     seconds : dict of str to float
     unknown : Traits or None
@@ -195,24 +195,62 @@ class Diagnosis:
     """
 
     case: Case
-    verdict: str
-    sentence: str
+    decision: Decision
+    by_posterior: Decision
+    doubts: tuple[str, ...]
     p_value: float
+    p_left: float | None
     named: tuple[Ranked, ...]
-    group: tuple[str, ...]
     ranking: tuple[Ranked, ...]
-    rejected: dict[str, str]
+    rejected: Mapping[str, str]
+    combinations: tuple[Combination, ...]
     map: ScoreMap
     when: Onset | None
-    base: Base
-    fits: dict[str, Refit]
-    held_out: dict[str, Predicted]
+    search: HypothesisSearch
+    weighed: Mapping[str, Weighed]
+    held_out: Mapping[str, Prediction]
     explained: Case | None
-    smallest: dict[str, Smallest]
-    confusion: Confusion | None
+    smallest: Mapping[str, Smallest]
+    confusion: Confusion
     next_measurement: tuple[Measurement, ...]
     fit: Fit
+    confirmations: tuple[Confirmation, ...]
     assumptions: tuple[str, ...]
     remarks: tuple[str, ...]
-    seconds: dict[str, float] = field(default_factory=dict)
+    seconds: Mapping[str, float] = field(default_factory=dict)
     unknown: Traits | None = None
+
+    @property
+    def verdict(self) -> str:
+        """One of `warpbrain.inference.decide.VERDICTS`."""
+        return self.decision.verdict
+
+    @property
+    def group(self) -> tuple[str, ...]:
+        """Causes that are not told apart; perhaps, where nothing can be said."""
+        return () if self.named else self.decision.causes
+
+    @property
+    def base(self) -> Base:
+        """The state that all is linear about."""
+        return self.search.base
+
+    @property
+    def best(self) -> Weighed:
+        """The set that is spoken of."""
+        return self.weighed.get(EXPLAINED, self.weighed[REFITTED])
+
+    @property
+    def gross(self) -> NDArray[np.bool_]:
+        """Rows (n,) of points that are gross errors beside that set."""
+        rows = np.zeros(len(self.base.residual), dtype=bool)
+        for number in np.flatnonzero(self.best.marginal.gross).tolist():
+            rows[self.base.points[number]] = True
+        return rows
+
+    @cached_property
+    def sentence(self) -> str:
+        """The verdict for people: whole sentences, in millimetres, pascals, percent and degrees."""
+        from warpbrain.diagnosis.sentences import sentence_of
+
+        return sentence_of(self)

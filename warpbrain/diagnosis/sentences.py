@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
+
+import numpy as np
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.result import (
+from warpbrain.diagnosis.result import Confusion, Diagnosis, Fit, Ranked
+from warpbrain.diagnosis.traits import Traits
+from warpbrain.diagnosis.words import measured, size_in_words, smallest_in_words
+from warpbrain.inference.beliefs import belief
+from warpbrain.inference.calibration import calibration
+from warpbrain.inference.decide import (
     CANNOT_SAY,
     GROUP,
     NAMED,
@@ -14,69 +20,71 @@ from warpbrain.diagnosis.result import (
     NOT_PHYSICS,
     NOTHING,
     UNKNOWN,
-    Confusion,
-    Fit,
-    Ranked,
 )
-from warpbrain.diagnosis.traits import Traits
-from warpbrain.diagnosis.verdict import Conclusion, Verdict
-from warpbrain.diagnosis.words import measured, size_in_words, smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.hypotheses import Weighed
 from warpbrain.worlds.body.not_physics import SENTENCES
-from warpbrain.worlds.body.values import Smallest
-
-#: A share of virtual cases below the first is hardly ever, below the second as good as none.
-_SELDOM, _RARELY = 0.05, 0.01
-#: Log Bayes factor from which surface and depth are told apart.
-_TELLING = 3.0
 
 
-def sentence_of(
-    verdict: Conclusion,
-    named: Sequence[Ranked],
-    ranking: Sequence[Ranked],
-    p_value: float,
-    smallest: Mapping[str, Smallest],
-    fit: Fit,
-    gravity_axis: tuple[float, float, float] | None = None,
-    unknown: Traits | None = None,
-) -> str:
+def sentence_of(found: Diagnosis) -> str:
     """The verdict for people: whole sentences, in millimetres, pascals, percent and degrees."""
-    if verdict.verdict == NOTHING:
-        seen = "; ".join(f"{kind} {smallest_in_words(kind, one)}" for kind, one in smallest.items())
-        return (
-            f"No missing physics is detected ({_chance(p_value)}). What these data would have shown: "
-            f"{seen or 'nothing was looked for'}."
-        )
-    if verdict.verdict in (NAMED, NAMED_AND_REST):
-        each = [effect_sentence(one, gravity_axis) for one in named]
-        also = [f"Beside it: {text[0].lower()}{text[1:]}" for text in each[1:]]
-        rest = f" {_rest(verdict.rest)}{traits_in_words(unknown)}" if verdict.verdict == NAMED_AND_REST else ""
-        return f"{' '.join([each[0], *also])} {_grounds(named, fit)}{rest}"
-    if verdict.verdict == GROUP:
-        members = [ranked for ranked in ranking if ranked.kind in verdict.kinds]
-        said = "; or ".join(f"{_clause(one.kind)} ({_percent(one.probability)})" for one in members)
-        return f"Something is missing ({_chance(p_value)}), and these data do not tell which of these it is: {said}."
-    if verdict.verdict == UNKNOWN and verdict.kinds:
-        nearest = next(_clause(one.kind) for one in ranking if one.kind in verdict.kinds)
-        return (
-            f"Something is missing ({_chance(p_value)}) that none of the known mechanisms explains alone: a force "
-            f"without a name acts, in the place of what comes nearest or beside it. Nearest: {nearest}."
-            f"{traits_in_words(unknown)}"
-        )
-    if verdict.verdict == UNKNOWN:
-        return (
-            f"Something is missing ({_chance(p_value)}) that none of the known mechanisms explains: a force without a "
-            f"name fits better than all of them.{traits_in_words(unknown)}"
-        )
-    if verdict.verdict == NOT_PHYSICS:
-        said = SENTENCES[verdict.kinds[0]]
-        return f"It is not physics that is missing ({_chance(p_value)}). {said} That explains the mismatch better."
-    assert verdict.verdict == CANNOT_SAY
-    why = f": {verdict.why}" if verdict.why else ""
-    perhaps = [_clause(one.kind) for one in ranking if one.kind in verdict.kinds and one.physics][:2]
-    guess = f" Perhaps: {'; or '.join(perhaps)}." if perhaps else ""
-    return f"Something is missing ({_chance(p_value)}), but these data cannot say what{why}.{guess}"
+    doubts = f" {' '.join(found.doubts)}" if found.doubts else ""
+    return f"{_SENTENCES[found.verdict](found)}{doubts}"
+
+
+def _nothing(found: Diagnosis) -> str:
+    seen = "; ".join(f"{kind} {smallest_in_words(kind, one)}" for kind, one in found.smallest.items())
+    return (
+        f"No missing physics is detected ({_chance(found)}). What these data would have shown: "
+        f"{seen or 'nothing was looked for'}."
+    )
+
+
+def _named(found: Diagnosis) -> str:
+    each = [effect_sentence(one, found.case.gravity_axis) for one in found.named]
+    also = [f"Beside it: {text[0].lower()}{text[1:]}" for text in each[1:]]
+    said = f"{' '.join([each[0], *also])} {_grounds(found.named, found.fit)}"
+    if found.verdict == NAMED:
+        return said
+    return f"{said} Something else is left, which this does not explain.{traits_in_words(found.unknown)}"
+
+
+def _group(found: Diagnosis) -> str:
+    chances = {one.kind: one.probability for one in found.ranking}
+    members = [kind for kind in found.group if kind != UNKNOWN]
+    said = "; or ".join(f"{_clause(kind)} ({percent(chances.get(kind, 0.0))})" for kind in members)
+    other = "; or something without a name" if UNKNOWN in found.group else ""
+    return f"Something is missing ({_chance(found)}), and these data do not tell which of these it is: {said}{other}."
+
+
+def _unknown(found: Diagnosis) -> str:
+    return (
+        f"Something is missing ({_chance(found)}) that none of the known mechanisms explains: a force without a "
+        f"name fits better than all of them.{traits_in_words(found.unknown)}"
+    )
+
+
+def _not_physics(found: Diagnosis) -> str:
+    said = SENTENCES[found.decision.causes[0]]
+    return f"It is not physics that is missing ({_chance(found)}). {said} That explains the mismatch better."
+
+
+def _cannot_say(found: Diagnosis) -> str:
+    likely = [one for one in found.ranking if one.physics and one.probability > belief("checks.perhaps")][:2]
+    perhaps = f" Perhaps: {'; or '.join(_clause(one.kind) for one in likely)}." if likely else ""
+    return f"Something is missing ({_chance(found)}), but these data cannot say what.{perhaps}"
+
+
+_SENTENCES: dict[str, Callable[[Diagnosis], str]] = {
+    NOTHING: _nothing,
+    NAMED: _named,
+    NAMED_AND_REST: _named,
+    GROUP: _group,
+    UNKNOWN: _unknown,
+    NOT_PHYSICS: _not_physics,
+    CANNOT_SAY: _cannot_say,
+}
 
 
 def effect_sentence(ranked: Ranked, gravity_axis: tuple[float, float, float] | None = None) -> str:
@@ -88,23 +96,14 @@ def effect_sentence(ranked: Ranked, gravity_axis: tuple[float, float, float] | N
     return f"{''.join(found)}.{_where(ranked)}"
 
 
-def confusion_sentences(confusion: Confusion) -> tuple[str, str]:
-    """What virtual cases say: how often each mechanism would be named, and what it would be taken for."""
-    rows = confusion.rows
-    named = sorted(((rows[kind].get(kind, 0.0), kind) for kind in confusion.named), key=lambda one: (-one[0], one[1]))
-    often = [f"{kind} {_percent(share)}" for share, kind in named if share >= _SELDOM]
-    seldom = [kind for share, kind in named if share < _SELDOM]
-    said = f"With these recordings, of usual size would be named: {', '.join(often) or 'nothing'}"
-    if seldom:
-        said += f"; hardly ever: {', '.join(seldom)}"
-    wrong = [(share, cause, kind) for cause, row in rows.items() for kind, share in row.items() if kind != cause]
-    share, cause, kind = max((one for one in wrong if one[2] in confusion.named), default=(0.0, "", ""))
-    most = "none is called by a wrong name"
-    if share >= _RARELY:
-        most = f"at most {_percent(share)} are called by a wrong name ({cause}: {kind})"
+def confusion_sentences(confusion: Confusion) -> tuple[str, ...]:
+    """What could be taken for what."""
+    pairs = [(part, kind, other) for kind, row in confusion.rows.items() for other, part in row.items()]
+    alike = [f"{kind} for {other} ({percent(part)})" for part, kind, other in sorted(pairs, reverse=True)[:4]]
+    said = f"With these recordings most easily taken for another: {', '.join(alike)}." if alike else ""
     return (
-        f"{said}.",
-        f"Of {confusion.cases} virtual cases of each, {most}; the linear model's own word, and optimistic.",
+        *([said] if said else []),
+        "In percent of what is visible of it, at its middling place and the best place of the other.",
     )
 
 
@@ -131,7 +130,7 @@ def _where(ranked: Ranked) -> str:
 
 def _grounds(named: Sequence[Ranked], fit: Fit) -> str:
     before = 1e3 * fit.refitted[1]
-    chances = " and ".join(_percent(one.probability) for one in named)
+    chances = " and ".join(percent(one.probability) for one in named)
     probable = f"Its probability is {chances}" if len(named) == 1 else f"Their probabilities are {chances}"
     if fit.explained is None:
         return f"{probable}."
@@ -143,25 +142,15 @@ def _grounds(named: Sequence[Ranked], fit: Fit) -> str:
     )
 
 
-def _rest(rest: Verdict | None) -> str:
-    """What is said of what names leave."""
-    if rest is not None and rest.verdict == GROUP:
-        either = "; or ".join(_clause(kind) for kind in rest.kinds)
-        return f"Something else is left, and these data do not tell which of these it is: {either}."
-    if rest is not None and rest.verdict == NOT_PHYSICS:
-        return f"Something else is left, which is no physics: {SENTENCES[rest.kinds[0]]}"
-    if rest is not None and rest.verdict == UNKNOWN:
-        return "Something else is left, which no known mechanism explains."
-    return "Something else is left, which this does not explain."
+def _chance(found: Diagnosis) -> str:
+    return f"p = {found.p_value:.2g}"
 
 
-def _chance(p_value: float) -> str:
-    return f"p = {p_value:.2g}"
-
-
-def _percent(probability: float) -> str:
-    if probability > 0.995:
-        return "above 99 %"
+def percent(probability: float) -> str:
+    """A probability for people."""
+    most = calibration().most_said
+    if probability > most:
+        return f"above {100.0 * most:.0f} %"
     return "below 1 %" if probability < 0.005 else f"{100.0 * probability:.0f} %"
 
 
@@ -177,22 +166,26 @@ def traits_in_words(unknown: Traits | None) -> str:
     else:
         said = f"It is strongest {where}, and no net force of it is seen ({measured(size, sd, 'N')}): it may act within"
     depth = abs(unknown.surface_nats)
-    if depth > _TELLING:
+    if depth > belief("checks.surface_told"):
         said += ", and on the surface" if unknown.surface_nats > 0.0 else ", and below the surface"
     return f" {said}."
 
 
-def assumptions_of(case: Case, base: Base, kappa: float) -> tuple[str, ...]:
+def assumptions_of(case: Case, base: Base, best: Weighed) -> tuple[str, ...]:
     """What was taken for granted."""
     sensors = base.at.sensors
-    aside = sorted({int(group) for group in sensors.groups[base.aside]})
     found = [*case.assumptions]
     found.append(
-        f"{len(sensors)} numbers were recorded; their noise is {kappa:.2f} times what was declared or found, of which "
-        "neighbours have a part in common."
+        f"{len(sensors)} numbers were recorded; their noise is {best.marginal.scale:.2f} times what was declared or "
+        "found, of which neighbours have a part in common."
     )
-    if aside:
-        found.append(f"{len(aside)} points contradict all that surrounds them and were set aside: {aside}.")
+    gross = [int(sensors.groups[base.points[k][0]]) for k in np.flatnonzero(best.marginal.gross).tolist()]
+    if gross:
+        beside = " and ".join(best.mechanisms)
+        found.append(
+            f"{len(gross)} points contradict all that surrounds them{f', with {beside},' if beside else ''} and are "
+            f"taken for gross errors: {sorted(gross)}."
+        )
     families = ", ".join(family.name for family in base.nuisances.families)
     found.append(f"Allowed to explain residuals first: {families}.")
     return tuple(found)

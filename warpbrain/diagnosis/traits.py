@@ -15,16 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.flexible import SCALES
+from warpbrain.inference import GaussianModel
+from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.mesh import nodes_of
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.unknown import force_patches
 
 Floats = NDArray[np.float64]
-
-#: Probability above which a net force or moment is taken to be there.
-_SURE = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,24 +62,16 @@ class Traits:
 
 
 def traits_of(
-    at: Linearisation,
-    explanation: Explanation,
-    residual: Floats,
-    kappa: float,
-    noise: float,
-    length: float,
-    centre: Floats,
+    at: Linearisation, model: GaussianModel, residual: Floats, noise: float, length: float, centre: Floats
 ) -> Traits:
     """Traits of what residuals (n,) show beside noise and nuisances.
 
     Parameters
     ----------
     at : Linearisation
-    explanation : Explanation
-        Noise and nuisances.
+    model : GaussianModel
+        Of noise and nuisances.
     residual : (n,) array
-    kappa : float
-        Factor on the noise.
     noise : float
         Typical noise of displacements [m].
     length : float
@@ -99,20 +88,19 @@ def traits_of(
     A = answers.reshape(len(answers), -1)
     rows = at.sensors.is_displacement
     each = 1.0 / np.sqrt(np.mean(np.sum(A[rows] ** 2, axis=1)))
-    U = explanation.nuisances
-    S = kappa**2 * explanation.factor @ explanation.factor.T + U @ U.T
+    tried = noise * each * beliefs("unknown.sizes")
     # the size that suits best
-    s = each * noise * SCALES[int(np.argmax([_log_density(S, scale * noise * each * A, residual) for scale in SCALES]))]
-    columns = s * A
-    asked = np.concatenate([_summed(sites), _turned(sites - centre)])
-    weights = np.linalg.solve(S + columns @ columns.T, np.column_stack([residual, columns]))
-    mean = s * asked @ (columns.T @ weights[:, 0])
-    covariance = s**2 * (asked @ asked.T - asked @ (columns.T @ weights[:, 1:]) @ asked.T)
+    s = float(tried[int(np.argmax([model.with_columns(one * A).log_density(residual) for one in tried.tolist()]))])
+    asked = s * np.concatenate([_summed(sites), _turned(sites - centre)])
+    coefficients, spread = model.with_columns(s * A).coefficients(residual)
+    own = slice(len(coefficients) - A.shape[1], None)
+    mean = asked @ coefficients[own]
+    covariance = asked @ spread[own, own] @ asked.T
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
-    def there(own: slice) -> bool:
-        square = float(mean[own] @ np.linalg.solve(covariance[own, own], mean[own]))
-        return square > float(chdtri(3, 1.0 - _SURE))
+    def there(part: slice) -> bool:
+        square = float(mean[part] @ np.linalg.solve(covariance[part, part], mean[part]))
+        return square > float(chdtri(3, 1.0 - belief("checks.sure")))
 
     return Traits(
         mean[:3],
@@ -121,7 +109,7 @@ def traits_of(
         sd[3:],
         there(slice(0, 3)),
         there(slice(3, 6)),
-        _surface_nats(at, sites, answers, S, s, residual, length),
+        _surface_nats(at, sites, answers, model, s, residual, length),
         centre,
     )
 
@@ -139,14 +127,8 @@ def _turned(arms: Floats) -> Floats:
     return np.asarray(rows.transpose(0, 2, 1).reshape(3, -1))
 
 
-def _log_density(S: Floats, columns: Floats, residual: Floats) -> float:
-    L = np.linalg.cholesky(S + columns @ columns.T)
-    left = np.linalg.solve(L, residual)
-    return -0.5 * float(left @ left) - float(np.log(np.diag(L)).sum())
-
-
 def _surface_nats(
-    at: Linearisation, sites: Floats, answers: Floats, S: Floats, s: float, residual: Floats, length: float
+    at: Linearisation, sites: Floats, answers: Floats, model: GaussianModel, s: float, residual: Floats, length: float
 ) -> float:
     """Of a force of the same mean displacement near the surface alone, over one that is deeper."""
     from scipy.spatial import cKDTree
@@ -160,5 +142,6 @@ def _surface_nats(
     found = []
     for own in (near, ~near):
         part = answers[:, own].reshape(len(answers), -1)
-        found.append(_log_density(S, s * (whole / float(np.sum(part**2))) ** 0.5 * part, residual))
+        as_large = s * (whole / float(np.sum(part**2))) ** 0.5
+        found.append(float(model.with_columns(as_large * part).log_density(residual)))
     return found[0] - found[1]

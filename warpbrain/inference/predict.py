@@ -47,6 +47,11 @@ class Prediction:
         low, high = np.quantile(parts, [0.025, 0.975])
         return float(1.0 - np.sqrt(own.sum() / max(other.sum(), 1e-300))), float(low), float(high)
 
+    @property
+    def log_density(self) -> float:
+        """Of all blocks, each given the others."""
+        return float(self.log_densities.sum())
+
     def gain(self, over: Prediction) -> float:
         """By how much [nats] the blocks are more probable than under another."""
         return float(np.sum(self.log_densities - over.log_densities))
@@ -61,18 +66,45 @@ def predict(model: GaussianModel, residual: Floats, blocks: Ints) -> Prediction:
     residual : (n,) array
     blocks : (n,) int array
     """
+    return predict_with(model, residual, blocks, [np.zeros((len(model), 0))])[0]
+
+
+def predict_with(
+    model: GaussianModel, residual: Floats, blocks: Ints, each: Sequence[Floats]
+) -> tuple[Prediction, ...]:
+    """Predict every block of rows, with each of some sets of columns beside those of the model.
+
+    With columns `G` the inverse covariance is `P - u (I + G^T u)^-1 u^T`, `u = P G` (Woodbury).
+
+    Parameters
+    ----------
+    model : GaussianModel
+    residual : (n,) array
+    blocks : (n,) int array
+    each : sequence of (n, k) arrays
+    """
     weighted = model.precision_times(residual)
-    errors, densities = np.zeros(len(residual)), []
-    for block in np.unique(blocks):
-        rows = np.flatnonzero(blocks == block)
-        L = np.linalg.cholesky(model.precision_columns(rows)[rows])
-        white = np.linalg.solve(L, weighted[rows])
-        errors[rows] = np.linalg.solve(L.T, white)
-        densities.append(np.log(np.diag(L)).sum() - 0.5 * float(white @ white) - 0.5 * len(rows) * np.log(2.0 * np.pi))
-    return Prediction(errors, blocks, np.array(densities))
+    rows_of = [np.flatnonzero(blocks == block) for block in np.unique(blocks)]
+    inverses = [model.precision_columns(rows)[rows] for rows in rows_of]
+    found = []
+    for columns in each:
+        u = model.precision_times(columns)
+        inner: Floats = np.asarray(np.linalg.inv(np.eye(columns.shape[1]) + columns.T @ u), dtype=np.float64)
+        left = weighted - u @ (inner @ (columns.T @ weighted))
+        errors, densities = np.zeros(len(residual)), []
+        for rows, inverse in zip(rows_of, inverses, strict=True):
+            L = np.linalg.cholesky(inverse - u[rows] @ inner @ u[rows].T)
+            white = np.linalg.solve(L, left[rows])
+            errors[rows] = np.linalg.solve(L.T, white)
+            volume = np.log(np.diag(L)).sum() - 0.5 * len(rows) * np.log(2.0 * np.pi)
+            densities.append(volume - 0.5 * float(white @ white))
+        found.append(Prediction(errors, blocks, np.array(densities)))
+    return tuple(found)
 
 
-def log_factors_of_fields(model: GaussianModel, fields: Sequence[Floats], sizes: Floats, residuals: Floats) -> Floats:
+def log_factors_of_fields(
+    model: GaussianModel, fields: Sequence[Floats], sizes: Floats, residuals: Floats, weights: Floats | None = None
+) -> Floats:
     """Log Bayes factor (d,) of any of some fields, of any size, against none.
 
     Parameters
@@ -82,18 +114,21 @@ def log_factors_of_fields(model: GaussianModel, fields: Sequence[Floats], sizes:
     sizes : (s,) array
         Factors on the columns of a field, all alike probable.
     residuals : (n, d) array
+    weights : (f,) array, optional
+        Log probability of each field; all alike if not given.
     """
     white = model.standardised(residuals)
+    weights = np.full(len(fields), -np.log(len(fields))) if weights is None else weights
     logs = []
-    for field in fields:
+    for field, weight in zip(fields, weights.tolist(), strict=True):
         Z = model.standardised(field)
         values, vectors = np.linalg.eigh(Z.T @ Z)
         values = np.maximum(values, 0.0)
         squares = ((Z @ vectors).T @ white) ** 2
         for size in sizes.tolist():
             ratio = size**2 / (1.0 + size**2 * values)
-            logs.append(0.5 * (ratio @ squares) - 0.5 * float(np.log1p(size**2 * values).sum()))
-    return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(logs)))
+            logs.append(weight + 0.5 * (ratio @ squares) - 0.5 * float(np.log1p(size**2 * values).sum()))
+    return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(sizes)))
 
 
 def predictive_p(
@@ -103,8 +138,9 @@ def predictive_p(
     residual: Floats,
     draws: int,
     random: np.random.Generator,
+    weights: Floats | None = None,
 ) -> float:
-    """Probability that a field without a name would seem as probable in rows drawn from the model; see above."""
+    """Probability that a field would seem as probable in rows drawn from the model; see above."""
     drawn = np.column_stack([residual, model.draws(draws, random)])
-    statistic = log_factors_of_fields(model, fields, sizes, drawn)
+    statistic = log_factors_of_fields(model, fields, sizes, drawn, weights)
     return float((1 + np.sum(statistic[1:] >= statistic[0])) / (1 + draws))

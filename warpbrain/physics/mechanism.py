@@ -176,6 +176,8 @@ class Mechanism(Ramped, abc.ABC):
     """
 
     #: Its name in `case.toml`, on the command line and in a diagnosis.
+    reading: ClassVar[Any] = None
+    stays_in_room: ClassVar[bool] = False
     kind: ClassVar[str]
     #: What it is, in one sentence that a surgeon understands.
     sentence: ClassVar[str]

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
+from warpbrain.diagnosis.result import REFITTED
 from warpbrain.report.diagnosis.saved import read_saved
 
 
 def test_an_effect_stands_out_as_much_as_the_tool_finds(diagnosed, small_diagnosis):
     base = small_diagnosis.base
-    assert not base.aside.any()
     covariance = np.load(diagnosed / "covariance.npz")["covariance"]
     assert len(read_saved(diagnosed).rows["observed"]) == len(covariance)
     np.testing.assert_array_equal(covariance, covariance.T)
-    kappa = base.explanation.best_kappa(base.whitened)
+    model = base.model.with_scale(small_diagnosis.weighed[REFITTED].marginal.scale)
     for change in np.random.default_rng(1).normal(size=(5, len(covariance))):
         mine = np.sqrt(change @ np.linalg.solve(covariance.astype(float), change))
-        own = base.explanation.detectability(base.explanation.whitened(1e-3 * change), kappa)
+        own = np.linalg.norm(model.standardised(1e-3 * change))
         assert mine == pytest.approx(own, rel=1e-3)

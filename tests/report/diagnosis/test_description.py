@@ -7,19 +7,19 @@ from pathlib import Path
 import pytest
 from sinking_block import OPTIONS
 
-from warpbrain.diagnosis.result import VERDICTS
+from warpbrain.inference.decide import VERDICTS, Decision
 from warpbrain.report.diagnosis.description import describe_diagnosis
 from warpbrain.report.files import write_summary
 
 KEYS = {
     *("verdict", "sentence", "p_value", "mechanism", "probability", "parameters", "where", "when", "ranking", "group"),
-    *("mechanisms", "unknown"),
+    *("mechanisms", "unknown", "hypotheses", "by_posterior", "doubts", "p_left"),
     *("next_measurement", "smallest_detectable", "confusion", "fit", "map", "assumptions", "remarks", "case"),
     *("inputs_sha256", "options", "seconds", "equilibria", "device", "versions"),
 }
 FIT = {
     *("rmse_m", "heldout_rmse_m", "check_rmse_m", "ceiling_heldout_rmse_m", "noise_m", "improvement", "placebo_p"),
-    "placebo_heldout_rmse_m",
+    *("placebo_heldout_rmse_m", "confirmations"),
 }
 RANKED = {
     *("mechanism", "says", "physics", "log_evidence", "probability", "heldout_rmse_change", "detectability"),
@@ -30,10 +30,10 @@ RANKED = {
 def verdict_of(found, verdict):
     """The diagnosis as if another verdict had been given."""
     if verdict.startswith("named"):
-        return replace(found, verdict=verdict)
+        return replace(found, decision=Decision(verdict, ("gravity",)))
     fit = replace(found.fit, explained=None, improvement=None, placebo_p=None)
-    group = ("gravity", "swelling") if verdict == "group" else ()
-    return replace(found, verdict=verdict, named=(), group=group, explained=None, fit=fit)
+    causes = {"group": ("gravity", "swelling"), "not physics": ("registration",)}.get(verdict, ())
+    return replace(found, decision=Decision(verdict, causes), named=(), explained=None, fit=fit)
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)

@@ -7,8 +7,9 @@ import pytest
 from rods import ROD, cycle, noisy, rod_test, viscous
 from testing_machine import case_of
 
+from warpbrain.inference.confirm import Confirmation, after_checks
 from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decision
-from warpbrain.worlds.specimen.checking import Checked, after_checks
+from warpbrain.worlds.specimen.checking import Checked, what_grows
 from warpbrain.worlds.specimen.checks import Folds, folds_of, held_out
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
 from warpbrain.worlds.specimen.effects import effects_of
@@ -19,7 +20,7 @@ from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.linear import linearise
 from warpbrain.worlds.specimen.noise import noise_factor
 from warpbrain.worlds.specimen.protocol import protocol_of
-from warpbrain.worlds.specimen.result import Confirmation, Score
+from warpbrain.worlds.specimen.result import Score
 
 
 def cycles(*durations, seed=2, roles=None):
@@ -111,13 +112,17 @@ def test_a_check_that_fails_is_said():
     good, bad = (Confirmation(name, 9.0, 5.0, (0.5, 0.4, 0.6), p) for name, p in (("a", 0.01), ("b", 0.4)))
     scores = {"refitted": Score(9.0, 9.0, {"hold": 1.0}), "explained": Score(2.0, 3.0, {"hold": 2.0})}
     checked = Checked(0.5, scores, {}, None, (good, bad))
-    decision, doubts = after_checks(Decision(NAMED, ("a", "b")), checked, 0.05)
+
+    def said(names: tuple[str, ...], checked: Checked) -> tuple[Decision, tuple[str, ...]]:
+        return after_checks(Decision(NAMED, names), (good, bad), checked.p_left, 0.05, *what_grows(checked))
+
+    decision, doubts = said(("a", "b"), checked)
     assert decision == Decision(NAMED_AND_REST, ("a",))
     assert any("'hold', which was not fitted, is predicted worse" in one for one in doubts)
     assert any("b is not named: patterns that mean nothing predict as well" in one for one in doubts)
-    assert after_checks(Decision(NAMED, ("b",)), checked, 0.05)[0] == Decision(CANNOT_SAY, ("b",))
+    assert said(("b",), checked)[0] == Decision(CANNOT_SAY, ("b",))
     worse = replace(checked, scores=scores | {"explained": Score(2.0, 10.0, {"hold": 0.5})})
-    decision, doubts = after_checks(Decision(NAMED, ("a",)), worse, 0.05)
+    decision, doubts = said(("a",), worse)
     assert decision == Decision(CANNOT_SAY, ("a",)) and "from 9 Pa to 10 Pa" in doubts[0]
 
 

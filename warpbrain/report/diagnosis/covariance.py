@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.atomic import whole_file
-from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.inference.noise import noise_factor
+from warpbrain.diagnosis.result import REFITTED, Diagnosis
 from warpbrain.report.files import MILLIMETRES
 
 
@@ -17,13 +16,12 @@ def write_covariance(path: Path, found: Diagnosis) -> None:
 
     With `change` (n,) what an effect changes there, of displacements along `direction` (n, 3), the effect stands out by
     `sqrt(change @ solve(covariance, change))`. Walls have other normals than in the case as declared, which
-    `points.csv` tells. Points that were set aside are in it with the noise that was declared, and all noise is as many
+    `points.csv` tells. Gross errors are in it with the noise that was declared, and all noise is as many
     times larger as was found.
     """
     base = found.base
     sensors = base.at.sensors
-    kappa = base.explanation.best_kappa(base.whitened)
-    noise = kappa * noise_factor(sensors.positions, sensors.directions, sensors.times, base.noise)
+    noise = found.weighed[REFITTED].marginal.scale * base.model.noise_factor
     factors = np.where(sensors.is_displacement, MILLIMETRES, 1.0)[:, None]
     parts = factors * np.column_stack([noise, base.nuisances.columns])
     # half the digits: variances are a million times the least of them, not more

@@ -6,7 +6,7 @@ from typing import Any
 
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.options import DiagnosisOptions
-from warpbrain.diagnosis.result import Confusion, Diagnosis, Ranked
+from warpbrain.diagnosis.result import Combination, Diagnosis, Ranked
 from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence
 from warpbrain.diagnosis.traits import Traits
 from warpbrain.diagnosis.words import smallest_in_words
@@ -25,6 +25,10 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
         "p_value": found.p_value,
         "mechanism": best.kind if best else None,
         "probability": best.probability if best else found.ranking[0].probability,
+        "hypotheses": [_combination(one) for one in found.combinations],
+        "by_posterior": {"verdict": found.by_posterior.verdict, "causes": list(found.by_posterior.causes)},
+        "doubts": list(found.doubts),
+        "p_left": found.p_left,
         "parameters": _values(best.values) if best else {},
         "where": _where(found, best),
         "mechanisms": [_named(one, found.case.gravity_axis) for one in found.named],
@@ -44,7 +48,7 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
             }
             for kind, one in found.smallest.items()
         },
-        "confusion": _confusion(found.confusion),
+        "confusion": {"says": list(confusion_sentences(found.confusion)), "rows": found.confusion.rows},
         "fit": _fit(found),
         "map": {
             "threshold": found.map.threshold,
@@ -73,16 +77,15 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
     }
 
 
-def _confusion(confusion: Confusion | None) -> dict[str, Any]:
-    if confusion is None:
-        return {}
+def _combination(one: Combination) -> dict[str, Any]:
     return {
-        "says": list(confusion_sentences(confusion)),
-        "cases": confusion.cases,
-        "rows": confusion.rows,
-        "detectability": list(confusion.sizes),
-        "alarm": confusion.alarm,
-        "named": confusion.named,
+        "causes": list(one.causes),
+        "kinds": [kind.value for kind in one.kinds],
+        "log_evidence": one.log_evidence,
+        "log_prior": one.log_prior,
+        "probability": one.probability,
+        "fitted": one.fitted,
+        "gross_errors": one.gross_errors,
     }
 
 
@@ -197,4 +200,14 @@ def _fit(found: Diagnosis) -> dict[str, Any]:
         else {"part": improvement[0], "interval_95": [improvement[1], improvement[2]]},
         "placebo_p": fit.placebo_p,
         "placebo_heldout_rmse_m": None if fit.placebo is None else list(fit.placebo),
+        "confirmations": [
+            {
+                "mechanism": one.name,
+                "log_evidence": one.log_evidence,
+                "heldout_log_density": one.heldout_log_density,
+                "gain": list(one.gain),
+                "placebo_p": one.placebo_p,
+            }
+            for one in found.confirmations
+        ],
     }

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from warpbrain.atomic import whole_file
-from warpbrain.diagnosis.result import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
+from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
 from warpbrain.report.diagnosis.figures.agreement import agreement_figure
 from warpbrain.report.diagnosis.figures.candidates import candidates_figure
-from warpbrain.report.diagnosis.figures.confusion import confusion_figure, visibility_figure
+from warpbrain.report.diagnosis.figures.confusion import confusion_figure
 from warpbrain.report.diagnosis.figures.curves import curves_figure
 from warpbrain.report.diagnosis.figures.held_out import held_out_figure
 from warpbrain.report.diagnosis.figures.map import map_figure
@@ -201,7 +201,7 @@ def _confusion(said: dict[str, Any]) -> str:
     if not confusion:
         return ""
     sentences = "".join(f"<p>{text(one)}</p>" for one in confusion["says"])
-    return f"<h3>Virtual cases</h3>{sentences}{confusion_figure(confusion)}{visibility_figure(confusion)}"
+    return f"<h3>What could be taken for what</h3>{sentences}{confusion_figure(confusion)}"
 
 
 def _next(said: dict[str, Any]) -> str:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.atomic import whole_file
-from warpbrain.diagnosis.result import EXPLAINED, Diagnosis
+from warpbrain.diagnosis.diagnose import left_of
+from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Diagnosis
 from warpbrain.report.files import MILLIMETRES
 
 Floats = NDArray[np.float64]
@@ -32,9 +33,9 @@ def write_points(path: Path, found: Diagnosis) -> None:
     sensors = found.base.declared.sensors
     observed = sensors.computed + sensors.residual
     nothing = np.full(len(sensors), np.nan)
-    # with the tissue refitted nothing else is missing from the base, should its own refit have failed
-    refitted = found.fits["none"].residual if "none" in found.fits else found.base.residual
-    explained = found.fits[EXPLAINED].residual if EXPLAINED in found.fits else nothing
+    refitted = left_of(found.weighed[REFITTED])
+    explained = left_of(found.weighed[EXPLAINED]) if EXPLAINED in found.weighed else nothing
+    gross = found.gross
     factors = np.where(sensors.is_displacement, MILLIMETRES, 1.0)
     numbers = [
         factors * values
@@ -43,7 +44,7 @@ def write_points(path: Path, found: Diagnosis) -> None:
             sensors.computed,
             observed - refitted,
             observed - explained,
-            _held_out(found, "none"),
+            _held_out(found, REFITTED),
             _held_out(found, EXPLAINED),
         )
     ]
@@ -61,18 +62,16 @@ def write_points(path: Path, found: Diagnosis) -> None:
                     *(_number(MILLIMETRES * value) for value in sensors.positions[k]),
                     *(_number(value) for value in sensors.directions[k]),
                     *(_number(values[k]) for values in numbers),
-                    int(found.base.aside[k]),
+                    int(gross[k]),
                 ]
             )
 
 
-def _held_out(found: Diagnosis, kind: str) -> Floats:
-    """Errors (n,) of a hypothesis, NaN where there are none."""
-    errors = np.full(len(found.base.at.sensors), np.nan)
-    if kind in found.held_out:
-        predicted = found.held_out[kind]
-        errors[predicted.rows] = predicted.errors
-    return errors
+def _held_out(found: Diagnosis, which: str) -> Floats:
+    """Errors (n,) of displacements with a set of causes, NaN of all else."""
+    if which not in found.held_out:
+        return np.full(len(found.base.residual), np.nan)
+    return np.where(found.base.at.sensors.is_displacement, found.held_out[which].errors, np.nan)
 
 
 def _number(value: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,6 +35,10 @@ class BodyCauses:
 
     causes: tuple[Cause, ...]
     effects: Mapping[str, tuple[Effect, ...]]
+
+    def named(self, name: str) -> Cause:
+        """A cause by its name."""
+        return next(cause for cause in self.causes if cause.name == name)
 
     def effect(self, member: Member) -> Effect | None:
         """The effect of a mechanism at a place with a size; None of what is none."""
@@ -79,14 +83,14 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
         known = any(place.mean is not None for place in places)
         causes.append(Cause(kind, places, math.log(belief("causes.mechanism")), as_it_is if known else sizes))
         effects[kind] = own
-    causes.append(_unknown(base))
+    # from every recorded time on
+    courses = main_courses(base.states.times)
+    causes.append(unknown_cause(base, [course.factor(base.at.sensors.times) for course in courses]))
     return BodyCauses(tuple(causes), effects)
 
 
-def _unknown(base: Base) -> Cause:
-    """Fields of every kind and length, from every recorded time on."""
-    times = base.at.sensors.times
-    factors = [course.factor(times)[:, None] for course in main_courses(base.states.times)]
+def unknown_cause(base: Base, factors: Sequence[Floats]) -> Cause:
+    """Fields of every kind and length, each with every one of some factors (n,) on the rows."""
     noise = base.typical_noise
-    places = tuple(Place(noise * factor * columns) for columns in base.unknown.values() for factor in factors)
+    places = tuple(Place(noise * factor[:, None] * columns) for columns in base.unknown.values() for factor in factors)
     return Cause(UNKNOWN, places, math.log(belief("causes.unknown")), beliefs("unknown.sizes"), Kind.UNKNOWN)

@@ -57,16 +57,12 @@ class Effect:
         Of one standard deviation of each.
     about : callable, or None
         Of a course: from its coefficients (k,) to the columns (n, k) there.
-    lasting : (n, 1) array, or None
-        Of what changes in time: the same as it is at first, if it were for ever. That is fluid that has nowhere to go,
-        or tissue that is stiffer: as much as this explains says nothing for a change in time.
     """
 
     proposal: Proposal | None
     mean: Floats
     columns: Floats
     about: Callable[[Floats], Floats] | None = None
-    lasting: Floats | None = None
 
     @property
     def proposed(self) -> Proposal:
@@ -160,7 +156,7 @@ class Effects:
 
         axes = _STEP * np.diag(proposal.sd)
         columns = [(left(proposal.mean + axis) - left(proposal.mean - axis)) / (2.0 * _STEP) for axis in axes]
-        return Effect(proposal, left(proposal.mean), np.column_stack(columns), lasting=at_once[:, None])
+        return Effect(proposal, left(proposal.mean), np.column_stack(columns))
 
     @staticmethod
     def _points(proposal: Proposal) -> list[Mechanism]:
@@ -317,7 +313,7 @@ def _effect_of_course(proposal: Proposal, course: Course) -> Effect:
         ends = [(course.at(pace(c + step)) - course.at(pace(c - step))) / (2.0 * _STEP_OF_COURSE) for step in steps]
         return np.column_stack(ends)
 
-    return Effect(proposal, course.at(pace(proposal.mean)), about(proposal.mean), about, course.at(0.0)[:, None])
+    return Effect(proposal, course.at(pace(proposal.mean)), about(proposal.mean), about)
 
 
 def _lifts(mechanism: Mechanism) -> bool:

@@ -29,7 +29,9 @@ from warpbrain.worlds.body.states import Hypothesis, SolvedState
 
 Floats = NDArray[np.float64]
 
-_ITERATIONS, _HALVINGS = 6, 4
+_ITERATIONS, _HALVINGS = 20, 6
+#: How often at most a fit goes on with gross errors and noise as it has found them itself.
+_ROUNDS = 3
 #: How far [standard deviations] coordinates go until columns are made anew.
 _ANEW = 0.3
 #: Change of the mesh's error [standard deviations of the noise, all sensors together] with which a fit goes on.
@@ -168,7 +170,13 @@ class Refitting:
             elif search.take_share() or not search.converged:
                 search.begin([search.z], search.state)
                 search.descend(anew=False)
-        return search.result()
+        fit = search.result()
+        for _ in range(_ROUNDS):
+            if not search.take_noise(fit.marginal):
+                break
+            search.descend(anew=True)
+            fit = search.result()
+        return fit
 
     def _settle(self, state: SolvedState, before: MeshErrors, within: Marginal) -> bool:
         """Take the error of the mesh from a fit of nothing, for all fits to come; whether that matters.
@@ -193,7 +201,7 @@ class _Search:
 
     def __init__(self, fits: Refitting, effects: tuple[Effect, ...], extra: Floats, within: Marginal) -> None:
         self._fits, self._base, self._effects = fits, fits.base, effects
-        self._noise, self._scale = within.noise, within.scale
+        self._within, self._noise, self._scale = within, within.noise, within.scale
         nuisances = fits.base.nuisances
         self._U = np.column_stack([nuisances.columns, extra])
         self._tissue, self._field = nuisances.part("tissue"), nuisances.part("stiffness field")
@@ -314,6 +322,15 @@ class _Search:
                 # it is there or not: its share only says how exactly it is simulated
                 residual = residual - effect.columns @ z[own]
         return state, residual
+
+    def take_noise(self, found: Marginal) -> bool:
+        """Go on with the noise and the gross errors of a fit where these are others than it was made with."""
+        same = found.scale == self._within.scale and np.array_equal(found.gross, self._within.gross)
+        self._within, self._noise, self._scale = found, found.noise, found.scale
+        if not same:
+            self._best = np.inf
+            self._take_if_better(self.z, self.state, self.residual)
+        return not same
 
     def take_share(self) -> bool:
         """Find what of the mesh's error belongs to the mechanisms, in proportion to their sizes; whether it is known.

@@ -164,6 +164,40 @@ class HypothesisSearch:
             else:
                 self._spread_from(names)
 
+    def explaining(self, mechanisms: frozenset[str]) -> Weighed:
+        """The most probable fitted set with just these mechanisms, fitted if none was."""
+        sets = [one for one in self.weighed if frozenset(one.mechanisms) == mechanisms]
+        known = next((one for one in sets if one.refit is not None), None)
+        for one in sets if known is None else []:
+            self._fit(one.names)
+            known = self._weighed[one.names]
+            if known.refit is not None:
+                break
+        if known is None:
+            raise SolveError(f"no set of causes with {' and '.join(sorted(mechanisms))} was weighed")
+        return known
+
+    def without(self, one: Weighed, name: str) -> Weighed:
+        """A set less one of its mechanisms, linear about the same point; its evidence is comparable with the set's."""
+        number = one.mechanisms.index(name)
+        effect = one.effects[number]
+        widths = [own.columns.shape[1] for own in one.effects]
+        first = one.columns.shape[1] - sum(widths[number:])
+        columns = np.delete(one.columns, np.s_[first : first + widths[number]], axis=1)
+        residual = one.residual + effect.mean
+        weighed = marginal(
+            GaussianModel(self.base.model.noise_factor, columns), residual, self.base.points, one.marginal.scale
+        )
+        at = one.hypothesis.causes.index(name)
+        hypothesis = replace(
+            one.hypothesis,
+            causes=one.hypothesis.causes[:at] + one.hypothesis.causes[at + 1 :],
+            kinds=one.hypothesis.kinds[:at] + one.hypothesis.kinds[at + 1 :],
+            log_evidence=one.hypothesis.log_evidence - one.marginal.log_evidence + weighed.log_evidence,
+        )
+        effects = one.effects[:number] + one.effects[number + 1 :]
+        return Weighed(hypothesis, effects, one.extra, residual, columns, weighed)
+
     def _done(self, one: Weighed) -> bool:
         """Whether nothing is left to do: fitted and looked beside, or linear about a fit that is."""
         if one.why:

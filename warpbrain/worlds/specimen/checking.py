@@ -1,4 +1,4 @@
-"""The checks of one set of causes put together, and what they take back of a verdict."""
+"""The checks of one set of causes put together."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.inference.causes import Kind
-from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decision
+from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.predict import Prediction
 from warpbrain.worlds.specimen.checks import blocks_of, folds_of, held_out, p_of_nothing_left, placebo_p
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.measures import rms, score
 from warpbrain.worlds.specimen.protocol import Protocol
-from warpbrain.worlds.specimen.result import Confirmation, Score
+from warpbrain.worlds.specimen.result import Score
 from warpbrain.worlds.specimen.search import Sets, names_of
 
 Floats = NDArray[np.float64]
@@ -104,26 +104,7 @@ class Checking:
         return Confirmation(name, evidence[0] - evidence[1], gained, self._improvement(others, fit), p)
 
 
-def after_checks(decision: Decision, checked: Checked, alpha: float) -> tuple[Decision, tuple[str, ...]]:
-    """A verdict after its checks, and what failed in words.
-
-    Names that fail are not spoken; without any other name, or where the error of held-out tests grows, nothing can be
-    said. Where anything is left, or a test that was not fitted is predicted worse, a rest is said.
-    """
-    grown, doubts = _what_grows(checked)
-    if decision.verdict not in (NAMED, NAMED_AND_REST):
-        return decision, (*grown, *doubts)
-    if checked.p_left is not None and checked.p_left <= alpha:
-        doubts.append(f"Other causes would explain what is left (p = {checked.p_left:.2g} that nothing is).")
-    failed = {one.name: one.why_not(alpha) for one in checked.confirmations if one.why_not(alpha)}
-    doubts += [f"{name} is not named: {why}." for name, why in failed.items() if name in decision.causes]
-    kept = tuple(name for name in decision.causes if name not in failed)
-    if grown or not kept:
-        return Decision(CANNOT_SAY, decision.causes), (*grown, *doubts)
-    return (Decision(NAMED_AND_REST, kept) if doubts else decision), tuple(doubts)
-
-
-def _what_grows(checked: Checked) -> tuple[list[str], list[str]]:
+def what_grows(checked: Checked) -> tuple[list[str], list[str]]:
     """Errors that are larger with what was added than without, in words: of held-out tests, of tests never fitted."""
     if "explained" not in checked.scores:
         return [], []

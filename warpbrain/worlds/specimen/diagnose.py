@@ -13,12 +13,13 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Kind
+from warpbrain.inference.confirm import after_checks
 from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, Decision, decide
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.specimen import specimen_of
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.specimen.acting import Effect
-from warpbrain.worlds.specimen.checking import Checking, after_checks
+from warpbrain.worlds.specimen.checking import Checking, what_grows
 from warpbrain.worlds.specimen.effects import effects_of
 from warpbrain.worlds.specimen.explained import explained_case
 from warpbrain.worlds.specimen.fit import Fit, Fitting
@@ -146,7 +147,10 @@ class DiagnosingSpecimen:
                 by_posterior = Decision(NOTHING)
             best = base if by_posterior.verdict == NOTHING else _explaining(ordered, by_posterior)
             checked = checking.of(best)
-            decision, doubts = after_checks(by_posterior, checked, options.alpha)
+            grown, worse = what_grows(checked)
+            decision, doubts = after_checks(
+                by_posterior, checked.confirmations, checked.p_left, options.alpha, grown, worse
+            )
         named = decision.causes if decision.verdict in (NAMED, NAMED_AND_REST) else ()
         with self._timed("next measurement"):
             measurements = _next(ordered, base)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.inference.causes import Kind
+from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.decide import Decision
 from warpbrain.worlds.specimen.protocol import Protocol
 
@@ -71,39 +72,6 @@ class Combination:
     log_evidence: float
     probability: float
     fitted: bool
-
-
-@dataclass(frozen=True)
-class Confirmation:
-    """What a cause is worth where all others act.
-
-    Attributes
-    ----------
-    name : str
-    log_evidence : float
-        Of the fit against that without the cause.
-    heldout_log_density : float
-        By how much held-out rows are more probable with it [nats].
-    gain : (part, low, high)
-        Of the held-out error of all rows that is gone with it, and its 95 % interval.
-    placebo_p : float
-        Probability that a pattern that means nothing does as well in its place.
-    """
-
-    name: str
-    log_evidence: float
-    heldout_log_density: float
-    gain: tuple[float, float, float]
-    placebo_p: float
-
-    def why_not(self, alpha: float) -> str:
-        """What keeps it from being named; empty if nothing does."""
-        said = []
-        if self.heldout_log_density <= 0.0:
-            said.append("tests that were held out are not predicted better with it")
-        if self.placebo_p > alpha:
-            said.append("patterns that mean nothing predict as well")
-        return " and ".join(said)
 
 
 @dataclass(frozen=True)

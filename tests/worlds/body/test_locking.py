@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from sinking_block import write_sinking
 
-from warpbrain.diagnosis.base import Base, BaseFinder
 from warpbrain.physics.mechanisms.compressibility import Compressibility
 from warpbrain.physics.mechanisms.gravity import Gravity
+from warpbrain.worlds.body.base import Base, BaseFinder
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.mesh_error import expected_answer, volume_of
 from warpbrain.worlds.body.nuisances import other_volume
