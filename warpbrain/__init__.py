@@ -43,12 +43,17 @@ _HOMES = {
     "cases.checking": ("check_case",),
     "simulation.observation": ("observe",),
     "estimation.estimate": ("EstimationOptions", "estimate"),
+    "diagnosis.diagnose": ("diagnose",),
+    "diagnosis.options": ("DiagnosisOptions",),
+    "diagnosis.result": ("Diagnosis",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Case",
     "Damping",
+    "Diagnosis",
+    "DiagnosisOptions",
     "Equilibrium",
     "EquilibriumOptions",
     "EquilibriumSolver",
@@ -71,6 +76,7 @@ __all__ = [
     "System",
     "TetMesh",
     "check_case",
+    "diagnose",
     "draw_laws",
     "estimate",
     "find_case",
@@ -97,6 +103,9 @@ if TYPE_CHECKING:
     from warpbrain.cases.reading import read_case
     from warpbrain.cases.shipped import find_case
     from warpbrain.cases.writing import write_case
+    from warpbrain.diagnosis.diagnose import diagnose
+    from warpbrain.diagnosis.options import DiagnosisOptions
+    from warpbrain.diagnosis.result import Diagnosis
     from warpbrain.errors import InputError, SolveError
     from warpbrain.estimation.estimate import EstimationOptions, estimate
     from warpbrain.gp.literature.studies import read_studies

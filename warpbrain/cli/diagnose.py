@@ -124,14 +124,11 @@ def _of_a_body() -> _Way:
 def _of_a_specimen() -> _Way:
     from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines
     from warpbrain.report.diagnosis.specimen_curves import write_curves
-    from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
-
-    def options(asked: Any) -> SpecimenOptions:
-        return SpecimenOptions(asked.candidates, asked.alpha, asked.seed, asked.draws, asked.ends)
+    from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 
     return _Way(
-        lambda case, asked, device, listener: DiagnosingSpecimen(case, options(asked), device, listener.stage),
-        lambda found, asked, device: describe_specimen_diagnosis(found, options(asked), device),
+        lambda case, asked, device, listener: DiagnosingSpecimen(case, asked.of_specimen, device, listener.stage),
+        lambda found, asked, device: describe_specimen_diagnosis(found, asked.of_specimen, device),
         lambda found, _said: specimen_diagnosis_lines(found),
         {"curves.csv": write_curves},
     )

@@ -34,6 +34,8 @@ from warpbrain.worlds.body.observable import require_observable
 from warpbrain.worlds.body.states import States
 from warpbrain.worlds.body.surfaces import with_sets_that_act
 from warpbrain.worlds.listener import Listener
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
+from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 #: Sets of causes that are told.
 _TOLD = 20
@@ -226,6 +228,42 @@ class Diagnosing:
         begun = time.perf_counter()
         yield
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
+
+
+def diagnose(
+    case: Case,
+    options: DiagnosisOptions | None = None,
+    device: str | None = None,
+    listener: Listener | None = None,
+) -> Diagnosis | SpecimenDiagnosis:
+    """Say what a case leaves out.
+
+    Parameters
+    ----------
+    case : Case
+        A body, or a specimen with its tests.
+    options : DiagnosisOptions, optional
+    device : str, optional
+        ``"cpu"``, ``"cuda:0"``, ...; the GPU if there is one.
+    listener : Listener, optional
+        Told what is done.
+
+    Returns
+    -------
+    Diagnosis or SpecimenDiagnosis
+        What ``warpbrain diagnose`` writes its report from.
+
+    Raises
+    ------
+    InputError
+        If the case has too few recordings for any conclusion.
+    SolveError
+        If the case as declared has no equilibrium.
+    """
+    if case.specimen is None:
+        return Diagnosing(case, options, device, listener).run()
+    asked = (options or DiagnosisOptions()).of_specimen
+    return DiagnosingSpecimen(case, asked, device, (listener or Listener()).stage).run()
 
 
 def left_of(one: Weighed) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

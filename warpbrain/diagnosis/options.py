@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from warpbrain.errors import InputError
+from warpbrain.worlds.specimen.diagnose import SpecimenOptions
 
 
 @dataclass(frozen=True)
@@ -50,3 +51,8 @@ class DiagnosisOptions:
             raise InputError(f"alpha = {self.alpha:g}: expected a number between 0 and 0.5")
         if self.draws < 1.0 / self.alpha:
             raise InputError(f"draws = {self.draws}: too few for alpha = {self.alpha:g}")
+
+    @property
+    def of_specimen(self) -> SpecimenOptions:
+        """The same of a specimen."""
+        return SpecimenOptions(self.candidates, self.alpha, self.seed, self.draws, self.ends)
