@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference
-from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.marginal import Marginal, marginal
 from warpbrain.physics.proposal import Proposal
@@ -405,7 +404,7 @@ class _Search:
         base, z = self._base, self.z
         q = self._U.shape[1]
         linear = self.residual + self.columns @ z
-        evidence = marginal(GaussianModel(base.model.noise_factor, self.columns), linear, base.points, self._scale)
+        evidence = marginal(base.model.of_noise(self.columns), linear, base.points, self._scale)
         columns = np.column_stack([self.columns, *self._unsure(z[q:])])
         # of the size of the mechanism what is unsure says something, of its evidence nothing
         W = self._noise.whitened(columns)
