@@ -16,7 +16,7 @@ acts along the rim alone:
 
 It is left out: every linear solver here is one for symmetric matrices, and it is small, about the pressure beside the
 shear modulus. Forces are exact, so the equilibrium is. Newton's method learns what is missing from the steps that it
-has taken (`warpbrain.simulation.multisecant`): -1.5 kPa on the wall of 0529's resection take 8 iterations, 10 without
+has taken (`warpbrain.simulation.multisecant`): -1.2 kPa on the wall of 0529's resection take 8 iterations, 10 without
 that. The line search takes the work along a step for the change of energy. No cap is put on an opening: its pressure
 would have to be carried by the tissue at the rim, and what closes an opening (skull, dura, a dressing) bears its share
 itself. So the pressure has a resultant, `p` times the opening.
