@@ -10,7 +10,8 @@ Of two blocks the second is seen after the first has been eliminated, a Schur co
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import copy
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +51,27 @@ class Blocks:
     """
 
     def __init__(self, model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> None:
+        self._see(model.standardised(self._arranged(residual, causes)))
+
+    @classmethod
+    def at_scales(
+        cls, model: GaussianModel, scales: Sequence[float], residual: Floats, causes: Sequence[Cause]
+    ) -> Iterator[Blocks]:
+        """Blocks with each of some factors on the noise."""
+        plain: Blocks = object.__new__(cls)
+        rows = plain._arranged(residual, causes)
+        for seen in model.standardised_at(scales, rows):
+            blocks = copy.copy(plain)
+            blocks._see(seen)
+            yield blocks
+
+    def _see(self, rows: Floats) -> None:
+        """Take standardised rows (n, 1 + p + q): residual, means and columns."""
+        first = 1 + len(self.cause)
+        self._r, self._m, self._Z = rows[:, 0], rows[:, 1:first], rows[:, first:]
+
+    def _arranged(self, residual: Floats, causes: Sequence[Cause]) -> Floats:
+        """Put blocks in order; their rows as they are."""
         widths = [max(place.columns.shape[1] for place in cause.places) for cause in causes]
         order = np.argsort([-width for width in widths], kind="stable").tolist()
         self.cause = np.concatenate([np.full(len(causes[c].places), c) for c in order]).astype(np.int64)
@@ -58,17 +80,16 @@ class Blocks:
         self._first = np.concatenate([[0], np.cumsum(self._width)])
         self._sizes = np.array([cause.sizes for cause in causes])[self.cause]
         self.log_weights = np.concatenate([causes[c].log_weights for c in order])
-        columns = np.zeros((len(model), self._first[-1]))
-        means = np.zeros((len(model), len(self.cause)))
+        first = 1 + len(self.cause)
+        rows = np.zeros((len(residual), first + self._first[-1]))
+        rows[:, 0] = residual
         for block, (c, p) in enumerate(zip(self.cause.tolist(), self.place.tolist(), strict=True)):
             place = causes[c].places[p]
-            at = self._first[block]
-            columns[:, at : at + place.columns.shape[1]] = place.columns
+            at = first + self._first[block]
+            rows[:, at : at + place.columns.shape[1]] = place.columns
             if place.mean is not None:
-                means[:, block] = place.mean
-        self._r = model.standardised(residual)
-        self._Z = model.standardised(columns)
-        self._m = model.standardised(means) if means.any() else means
+                rows[:, 1 + block] = place.mean
+        return rows
 
     def __len__(self) -> int:
         return len(self.cause)

@@ -8,6 +8,7 @@ products of n by q, the number of columns, which is smaller than the number n of
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -64,6 +65,12 @@ class GaussianModel:
         other.__dict__["_noise"] = self._noise
         other.__dict__["_whitened_columns"] = self._whitened_columns
         other.__dict__["_spectrum"] = self._spectrum
+        return other
+
+    def of_noise(self, columns: Floats) -> GaussianModel:
+        """Other columns (n, q) with the same noise, at a scale of one; nothing of the noise is made again."""
+        other = GaussianModel(self.noise_factor, columns)
+        other.__dict__["_noise"] = self._noise
         return other
 
     def with_columns(self, columns: Floats) -> GaussianModel:
@@ -143,12 +150,17 @@ class GaussianModel:
 
         `(kappa^2 I + W W^T)^(-1/2) L^-1 r`, whose products are those with `S^-1`.
         """
+        return next(self.standardised_at([self.scale], rows))
+
+    def standardised_at(self, scales: Sequence[float], rows: Floats) -> Iterator[Floats]:
+        """`standardised` rows with each of some factors on the noise: what they have in common is made once."""
         values, directions = self._spectrum
         white = self._by_noise(rows)
-        root = np.sqrt(self.scale**2 + values)
         seen = directions.T @ white
-        weights = 1.0 / (root * (root + self.scale))
-        return np.asarray((white - directions @ (weights * seen.T).T) / self.scale)
+        for scale in scales:
+            root = np.sqrt(scale**2 + values)
+            weights = 1.0 / (root * (root + scale))
+            yield np.asarray((white - directions @ (weights * seen.T).T) / scale)
 
     @cached_property
     def log_determinant(self) -> float:

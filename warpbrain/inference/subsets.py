@@ -154,12 +154,12 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
     """
     sums = _Sums()
     by_scale: list[tuple[float, float, Blocks, Floats]] = []
-    for scale, log_prior in zip(search.scales.tolist(), search.log_scale_prior.tolist(), strict=True):
-        at_scale = model.with_scale(scale)
-        none = float(at_scale.log_density(residual)) + log_prior
+    scales = search.scales.tolist()
+    at_scales = Blocks.at_scales(model, scales, residual, causes) if causes else iter([None] * len(scales))
+    for scale, log_prior, blocks in zip(scales, search.log_scale_prior.tolist(), at_scales, strict=True):
+        none = float(model.with_scale(scale).log_density(residual)) + log_prior
         sums.add(frozenset(), none, Configuration((), scale, none))
-        if causes:
-            blocks = Blocks(at_scale, residual, causes)
+        if blocks is not None:
             logs = blocks.log_factors() + blocks.log_weights + none
             sums.add_blocks(blocks, 0, logs, (), scale)
             by_scale.append((scale, none, blocks, logs))

@@ -230,6 +230,17 @@ class TetMesh:
         other.__dict__.update(shared, node_sets=checked)
         return other
 
+    def is_as(self, other: TetMesh) -> bool:
+        """Whether another mesh is this one, or was made of the same by `with_node_sets` and has the same sets."""
+        if self is other:
+            return True
+        sets, others = self.node_sets, other.node_sets
+        return (
+            self._made is other._made
+            and sets.keys() == others.keys()
+            and all(sets[name] is others[name] or np.array_equal(sets[name], others[name]) for name in sets)
+        )
+
     @property
     def volume(self) -> float:
         """Volume of the body [m3]."""

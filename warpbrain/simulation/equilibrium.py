@@ -22,10 +22,14 @@ from warpbrain.simulation.coupled import LinearSolver
 from warpbrain.simulation.held import require_held
 from warpbrain.simulation.keeping import with_kept
 from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.multisecant import Multisecant
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
+
+#: Out-of-balance force, relative, from which on steps say something of the steps to come.
+_NEAR = 0.1
 
 
 @dataclass(frozen=True)
@@ -328,6 +332,8 @@ class EquilibriumSolver:
         previous = np.inf
         forcing = options.cg_tolerance
         shift = 0.0
+        # of forces without a potential the linear solver has a part of the tangent
+        secants = None if all(term.conservative for term in system.terms) else Multisecant()
         for iteration in range(1, options.max_newton + 1):
             with self.clock.phase("internal forces"):
                 system.u.assign(u)
@@ -359,7 +365,11 @@ class EquilibriumSolver:
                     f"not in balance yet (relative residual {relative:.1e}, goal {self.tolerance:.1e})"
                     f"{self._worst_element()}"
                 )
-            d, linear, shift, indefinite = self._descent(r, prescribed, moving, min(eta, 0.5), shift)
+            # far from equilibrium the tangent changes too much from step to step
+            near = secants is not None and not moving and relative < _NEAR
+            known, left = secants.split(u, r) if secants is not None and near else (0.0, r)
+            d, linear, shift, indefinite = self._descent(left, prescribed, moving, min(eta, 0.5), shift)
+            d = d + known
             with self.clock.phase("line search"):
                 alpha, u, potential, min_J = self._line_search(u, d, r, external, potential, moving)
             record = NewtonStep(load, iteration, relative, linear.iterations, alpha, min_J, indefinite)

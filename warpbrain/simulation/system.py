@@ -320,7 +320,9 @@ class System:
     def _require_alike(self, model: Model) -> None:
         """Raise `InputError` if a model needs pre-processing of its own."""
         before = self.model
-        for name in ("mesh", "elements", "density", "damping"):
+        if not before.mesh.is_as(model.mesh):
+            raise InputError("model: another mesh than the one that was pre-processed")
+        for name in ("elements", "density", "damping"):
             if getattr(before, name) is not getattr(model, name) and getattr(before, name) != getattr(model, name):
                 raise InputError(f"model: another {name} than the one that was pre-processed")
         if before.constrained is not model.constrained and np.any(before.constrained != model.constrained):

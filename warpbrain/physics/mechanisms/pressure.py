@@ -15,11 +15,11 @@ acts along the rim alone:
     K_ab = -p/2 int N_a N_b [dx]                        along the rim, as the triangles run along it
 
 It is left out: every linear solver here is one for symmetric matrices, and it is small, about the pressure beside the
-shear modulus. Forces are exact, so the equilibrium is, and derivatives by parameters are; Newton's method converges
-linearly, by a factor of that size an iteration (10 Pa on the wall of 0529's resection take as many iterations as none,
-100 Pa one more), and the line search takes the work along a step for the change of energy. No cap is put on an
-opening: its pressure would have to be carried by the tissue at the rim, and what closes an opening (skull, dura, a
-dressing) bears its share itself. So the pressure has a resultant, `p` times the opening.
+shear modulus. Forces are exact, so the equilibrium is. Newton's method learns what is missing from the steps that it
+has taken (`warpbrain.simulation.multisecant`): -1.2 kPa on the wall of 0529's resection take 8 iterations, 10 without
+that. The line search takes the work along a step for the change of energy. No cap is put on an opening: its pressure
+would have to be carried by the tissue at the rim, and what closes an opening (skull, dura, a dressing) bears its share
+itself. So the pressure has a resultant, `p` times the opening.
 
 The wall of a resection is part of the surface of what is left: `nodes` names its nodes, or the element set that was
 taken out if the mesh has no node set of that name. Triangles of the surface beside it, whose nodes are all on the rim,

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference
-from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.marginal import Marginal, marginal
 from warpbrain.physics.proposal import Proposal
+from warpbrain.simulation.extrapolated import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, Effects, parts_of
 from warpbrain.worlds.body.linearisation import Linearisation
@@ -38,6 +38,8 @@ _ANEW = 0.3
 _MATTERS = 0.3
 #: Step [standard deviations] of a difference between states.
 _BESIDE = 0.05
+#: States beside the last one from which the next is begun at most.
+_KEPT = 9
 #: Steps shorter than this in standard deviations of the prior end the search.
 _SHORT = 0.03
 
@@ -211,6 +213,10 @@ class _Search:
         self._aligned = np.zeros(self._U.shape[1])
         self._aligned[nuisances.part("registration")] = fits.base.states.motion / registration_sd()
         self._own = _slices(effects, self._U.shape[1])
+        self._moving = np.ones(self._U.shape[1] + sum(effect.columns.shape[1] for effect in effects), dtype=bool)
+        self._moving[: len(self._linear)] = ~self._linear
+        # coordinates that move the body, of states of this fit, and where it was
+        self._known: list[tuple[Floats, Floats]] = []
         self._share: _Share | None = None
         # of the last state of this fit that was followed over time
         self._course: tuple[Floats, ...] = ()
@@ -235,9 +241,8 @@ class _Search:
             self._draw_back()
         self.converged, solved = False, False
         made_at = np.full(len(self.z), np.inf)
-        moving = ~np.concatenate([self._linear, np.zeros(len(self.z) - len(self._linear), dtype=bool)])
         for iteration in range(_ITERATIONS):
-            if anew and iteration > 0 and np.abs(self.z - made_at)[moving].max(initial=0.0) > _ANEW:
+            if anew and iteration > 0 and np.abs(self.z - made_at)[self._moving].max(initial=0.0) > _ANEW:
                 self.columns, made_at = self._columns_here(), self.z
                 if solved:
                     self.columns = self._columns_solved()
@@ -308,10 +313,7 @@ class _Search:
         theta = base.prior.mean + base.prior.factor @ z[self._tissue]
         hypothesis = Hypothesis(theta, z[self._field], tuple(mechanisms), tuple(patches))
         error = None if mesh is None else expected(mesh.of(hypothesis, base.prior))
-        try:
-            state = base.states.solve(hypothesis, near.u, error, near.course or self._course)
-        except SolveError:
-            state = base.states.solve(hypothesis, None, error)
+        state = self._solved(hypothesis, z[self._moving], near, error)
         self._course = state.course or self._course
         q = self._U.shape[1]
         residual = state.sensors.residual - self._U[:, self._linear] @ (z[:q] - self._aligned)[self._linear]
@@ -331,6 +333,17 @@ class _Search:
             self._best = np.inf
             self._take_if_better(self.z, self.state, self.residual)
         return not same
+
+    def _solved(self, hypothesis: Hypothesis, z: Floats, near: SolvedState, error: Difference | None) -> SolvedState:
+        """The state at coordinates that move the body, from those that are known."""
+        states = self._base.states
+        begin = extrapolated(self._known, z) if self._known else near.u
+        try:
+            state = states.solve(hypothesis, begin, error, near.course or self._course)
+        except SolveError:
+            state = states.solve(hypothesis, None, error)
+        self._known = [*self._known[-_KEPT:], (z, state.u)]
+        return state
 
     def take_share(self) -> bool:
         """Find what of the mesh's error belongs to the mechanisms, in proportion to their sizes; whether it is known.
@@ -408,7 +421,7 @@ class _Search:
         base, z = self._base, self.z
         q = self._U.shape[1]
         linear = self.residual + self.columns @ z
-        evidence = marginal(GaussianModel(base.model.noise_factor, self.columns), linear, base.points, self._scale)
+        evidence = marginal(base.model.of_noise(self.columns), linear, base.points, self._scale)
         columns = np.column_stack([self.columns, *self._unsure(z[q:])])
         # of the size of the mechanism what is unsure says something, of its evidence nothing
         W = self._noise.whitened(columns)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from warpbrain.inference.calibration import calibration
 from warpbrain.inference.marginal import Marginal, marginal
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import Hypothesis
+from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses, causes_of
 from warpbrain.worlds.body.dictionary import Candidates, candidates_beside
@@ -146,8 +148,8 @@ class HypothesisSearch:
             models.append(GaussianModel(louder, base.nuisances.columns))
         for model in models:
             found = posterior(model, base.residual, self.causes.causes, _search(most=2))
-            for hypothesis in _worth_looking_at(found):
-                self._take(self._linear(hypothesis, model))
+            for one in in_threads(partial(self._linear, model=model), _worth_looking_at(found)):
+                self._take(one)
 
     def fit(self) -> None:
         """Fit the best sets without linearising, and weigh what may act beside them."""
@@ -255,9 +257,7 @@ class HypothesisSearch:
         known = sum(effect.columns.shape[1] for effect in there)
         split = columns.shape[1] - known
         ordered = np.column_stack([columns[:, :split], *extra, columns[:, split:], *(one.columns for one in new)])
-        weighed = marginal(
-            GaussianModel(self.base.model.noise_factor, ordered), left, self.base.points, hypothesis.best.scale
-        )
+        weighed = marginal(self.base.model.of_noise(ordered), left, self.base.points, hypothesis.best.scale)
         return Weighed(
             replace(hypothesis, log_evidence=hypothesis.log_evidence + weighed.log_evidence - plain),
             (*there, *new),
@@ -318,9 +318,7 @@ class HypothesisSearch:
             columns = one.columns.copy()
             columns[:, own] = found.effect.columns
             residual = one.residual + effect.mean - found.effect.mean
-            better = marginal(
-                GaussianModel(self.base.model.noise_factor, columns), residual, self.base.points, one.marginal.scale
-            )
+            better = marginal(self.base.model.of_noise(columns), residual, self.base.points, one.marginal.scale)
             effects[number] = found.effect
             one = replace(
                 one, effects=tuple(effects), residual=residual, columns=columns, marginal=better
@@ -340,10 +338,11 @@ class HypothesisSearch:
         found = posterior(louder, one.residual, causes.causes, _search(most=1))
         values, log_prior = scales()
         without = louder.log_marginal(one.residual, values, log_prior)
-        for hypothesis in _worth_looking_at(found, singles=False):
-            if not hypothesis.causes:
-                continue
-            beside = self._beside(hypothesis, causes, one.residual, one.columns, one.effects, louder)
+        worth = [hypothesis for hypothesis in _worth_looking_at(found, singles=False) if hypothesis.causes]
+        each = in_threads(
+            lambda more: self._beside(more, causes, one.residual, one.columns, one.effects, louder), worth
+        )
+        for hypothesis, beside in zip(worth, each, strict=True):
             gain = beside.hypothesis.log_evidence - without
             # the evidence without it has its own gross errors, too
             gain -= one.marginal.log_evidence - without

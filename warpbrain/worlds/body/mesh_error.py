@@ -24,6 +24,7 @@ from warpbrain.kernels.linear import ConjugateGradient
 from warpbrain.kernels.two_level import TwoLevelGradient
 from warpbrain.physics.proposal import Proposal
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
+from warpbrain.simulation.extrapolated import extrapolated
 from warpbrain.simulation.finer import FinerCase, free_prolongation, restricted
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System
@@ -37,6 +38,8 @@ Floats = NDArray[np.float64]
 _ROUGH = 10.0 * TOLERANCE
 #: Iterations of conjugate gradients at most, where the two levels are of no help.
 _MOST = 10_000
+#: States that are remembered beside the last one.
+_KEPT = 11
 #: Change of the tissue [standard deviations] whose error is compared: far more than rounding, little beside the error.
 _STEP = 0.2
 
@@ -93,7 +96,7 @@ def expected_answer(sensors: Sensors, known: Difference) -> Floats:
 
 
 class FinerStates:
-    """Solves hypotheses on elements of half the size, each from what the last was beyond its mesh.
+    """Solves hypotheses on elements of half the size, each from what others near to it were beyond their mesh.
 
     On the CPU the mesh that there was, factorised at the first of them, preconditions all of them: see
     `warpbrain.kernels.two_level`. It is factorised anew when it helps less.
@@ -105,7 +108,8 @@ class FinerStates:
 
     def __init__(self, states: States) -> None:
         self.states = states
-        self._beyond: Floats | float = 0.0
+        # kinds of mechanisms that acted, displacements that were found, flat, and what the finer ones were beyond them
+        self._beyond: list[tuple[frozenset[str], Floats, Floats]] = []
         self._system: System | None = None
         self._factors: tuple[Factors, NDArray[np.bool_]] | None = None
         # of the system and the factors that there are
@@ -160,13 +164,17 @@ class FinerStates:
         linear = self._two_level(system, coarse, finer.prolongation)
         solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=_ROUGH), linear=linear)
         flat = finer.prolongation @ coarse.u
+        acting = frozenset(mechanism.kind for mechanism in even.mechanisms)
+        # what another mechanism has at its edges is not here: begun from that, elements are nearly inside out
+        alike = [(u, beyond) for kinds, u, beyond in self._beyond if kinds <= acting]
+        begin = flat + extrapolated(alike, coarse.u.ravel()) if alike else flat
         try:
-            found = solver.solve(external, flat + self._beyond)
+            found = solver.solve(external, begin)
         except SolveError:
             found = solver.solve(external, flat)
         if linear is not None and linear.slow:
             self._factors = self._linear = None
-        self._beyond = found.u - flat
+        self._beyond = [*self._beyond[-_KEPT:], (acting, coarse.u.ravel(), found.u - flat)]
         u, reactions = restricted(finer.prolongation, found.u, model.reactions(found.internal, external))
         return Difference(u - coarse.u, reactions - coarse.reactions, hypothesis.theta)
 

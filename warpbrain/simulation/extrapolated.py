@@ -1,0 +1,42 @@
+"""Where a state may be, from states nearby that are known: the nearest one, and what is linear between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+#: What a part of a difference between states costs beside what it does not explain: none is stretched far.
+_STRETCH = 0.01
+
+
+def extrapolated(known: Sequence[tuple[Floats, Floats]], at: Floats) -> Floats:
+    """What is expected of a function of numbers (k,) at some of them, from its values (...) at others.
+
+    Of the nearest value, and as much of the differences of others to it as makes up for the distance. It is only where
+    to begin: nothing that is found depends on it.
+
+    Parameters
+    ----------
+    known : sequence of pairs of numbers (k,) and values (...)
+        One or more.
+    at : (k,) array
+    """
+    distances = [float(np.linalg.norm(at - one)) for one, _ in known]
+    order = np.argsort(distances, kind="stable").tolist()
+    nearest, value = known[order[0]]
+    away = at - nearest
+    size = float(np.linalg.norm(away))
+    others = [known[number] for number in order[1:]]
+    if size == 0.0 or not others:
+        return value
+    between = np.column_stack([one - nearest for one, _ in others]) / size
+    gram = between.T @ between + _STRETCH * np.eye(len(others))
+    shares = np.linalg.solve(gram, between.T @ (away / size))
+    found = value.copy()
+    for share, (_, other) in zip(shares.tolist(), others, strict=True):
+        found += share * (other - value)
+    return found
