@@ -46,6 +46,7 @@ from warpbrain.diagnosis.traits import Traits, traits_of
 from warpbrain.diagnosis.verdict import CLAIM, overall
 from warpbrain.diagnosis.virtual import VirtualCases
 from warpbrain.errors import InputError, SolveError
+from warpbrain.physics.values import Smallest
 from warpbrain.threads import beside, in_threads, one_thread_of_blas
 from warpbrain.worlds.body.dictionary import Candidates, candidates_at, candidates_beside, dictionary_of
 from warpbrain.worlds.body.effects import Effect
@@ -54,7 +55,6 @@ from warpbrain.worlds.body.observable import require_observable
 from warpbrain.worlds.body.parameters import SEEN, smallest_of
 from warpbrain.worlds.body.states import States
 from warpbrain.worlds.body.surfaces import with_sets_that_act
-from warpbrain.worlds.body.values import Smallest
 from warpbrain.worlds.listener import Listener
 
 Floats = NDArray[np.float64]

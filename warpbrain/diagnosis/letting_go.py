@@ -20,9 +20,9 @@ from warpbrain.diagnosis.stage import Stage
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.proposal import Patch, Proposal
+from warpbrain.physics.values import Value
 from warpbrain.worlds.body.dictionary import BETWEEN, RADII, patch_of
 from warpbrain.worlds.body.effects import Effect
-from warpbrain.worlds.body.values import Value
 
 Floats = NDArray[np.float64]
 

@@ -18,6 +18,7 @@ from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.result import Measurement
 from warpbrain.diagnosis.screening import Screen
+from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.worlds.body.dictionary import Candidates
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.sensors import spread_points
@@ -26,8 +27,6 @@ Floats = NDArray[np.float64]
 
 #: Points of a further recording.
 _POINTS = 25
-#: Error of direct readings: a pressure [Pa].
-_READING = {"pressure": (20.0, "a reading of the pressure, to 20 Pa")}
 
 
 def next_measurements(
@@ -62,12 +61,13 @@ def next_measurements(
         what = f"{len(where)} more tracked points {name}"
         found.append(Measurement(what, _apart(base, first, second, z, columns, kappa, rows, noise)))
     for kind in kinds[:2]:
-        if kind in _READING:
-            error, what = _READING[kind]
+        reading = mechanisms()[kind].reading if kind in mechanisms() else None
+        if reading is not None:
+            error, what = reading.error, reading.words
             size = abs(z[0]) * first.proposed.sd[0] if kind == kinds[0] else second.proposed.sd[0]
             found.append(Measurement(what, found[0].expected_nats + 0.5 * (float(size) / error) ** 2))
-    if "gravity" in kinds[:2]:
-        # only gravity turns with the head: a second pose is a second experiment
+    if any(kind in mechanisms() and mechanisms()[kind].stays_in_room for kind in kinds[:2]):
+        # what does not turn with the head: a second pose is a second experiment
         found.append(Measurement("the same points with the head turned by 30 degrees", 1.5 * found[0].expected_nats))
     return tuple(sorted(found, key=lambda one: -one.expected_nats))
 

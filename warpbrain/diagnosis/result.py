@@ -15,7 +15,7 @@ from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.traits import Traits
-from warpbrain.worlds.body.values import Smallest, Value
+from warpbrain.physics.values import Smallest, Value
 
 Floats = NDArray[np.float64]
 

@@ -20,10 +20,11 @@ from warpbrain.diagnosis.result import (
 )
 from warpbrain.diagnosis.traits import Traits
 from warpbrain.diagnosis.verdict import Conclusion, Verdict
-from warpbrain.diagnosis.words import measured, size_in_words, smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.sizes import size_in_words, smallest_in_words
+from warpbrain.physics.values import Smallest
+from warpbrain.physics.words import measured
 from warpbrain.worlds.body.not_physics import SENTENCES
-from warpbrain.worlds.body.values import Smallest
 
 #: A share of virtual cases below the first is hardly ever, below the second as good as none.
 _SELDOM, _RARELY = 0.05, 0.01

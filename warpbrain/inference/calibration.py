@@ -29,11 +29,14 @@ class Calibration:
         of sets with the unknown, and of sets with what is no physics.
     losses : mapping of str to float
         What each kind of wrong verdict costs, in units of silence where something is missing.
+    most_said : float
+        The share of right names that was counted: no probability is said to be more.
     """
 
     temperature: float
     log_weights: Mapping[str, float]
     losses: Mapping[str, float]
+    most_said: float
 
     def probabilities(self, hypotheses: Sequence[Hypothesis]) -> NDArray[np.float64]:
         """Of each hypothesis, (h,)."""
@@ -57,4 +60,4 @@ class Calibration:
 def calibration() -> Calibration:
     """Those of the package."""
     read = json.loads((files("warpbrain.inference") / "calibration.json").read_text(encoding="utf-8"))
-    return Calibration(read["temperature"], read["log_weights"], read["losses"])
+    return Calibration(read["temperature"], read["log_weights"], read["losses"], read["most_said"])
