@@ -106,7 +106,7 @@ def fit_table(said: dict[str, Any]) -> str:
             cells.append(_error(value, unit.factor))
         rows.append(cells)
     head = ("", f"fitted [{unit.name}]", f"held out [{unit.name}]", f"check [{unit.name}]")
-    return table(head, rows, numbers=(1, 2, 3), caption="Root mean square errors")
+    return table(head, rows, numbers=(1, 2, 3), caption=f"Root mean square {unit.error}")
 
 
 def _error(value: Any, factor: float) -> str:
