@@ -29,7 +29,7 @@ PRICES, WRONG = (5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0, 80.0), 0.03
 
 
 def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path, write: Path = FILE) -> str:
-    """Fit temperature, weights of sets and the price of a false name, and write them.
+    """Fit temperature, weights of sets and the price of a false name, count right names, and write all of it.
 
     Parameters
     ----------
@@ -67,6 +67,8 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path, wri
         "source": f"`python -m referee calibrate`, {len(useful)} cases of the set {cases.resolve().parent.name}",
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "temperature": round(scale.temperature, 3),
+        # by the rule of succession: that all were right does not make the next one certain
+        "most_said": round((spoken.hits + 1) / (spoken.of + 2), 3),
         "log_weights": {trait: round(weight, 3) for trait, weight in zip(TRAITS, scale.weights, strict=True)},
         "losses": losses,
         "intervals": {name: np.round(ends[:, k], 3).tolist() for k, name in enumerate(values)},

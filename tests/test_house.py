@@ -1,10 +1,13 @@
-"""The house: every floor imports only from floors below it."""
+"""The house: every floor imports only from floors below it, and what is particular to a mechanism is in its file."""
 
 import ast
+from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
+
+from warpbrain.physics.mechanisms import mechanisms
 
 PACKAGE = Path(str(files("warpbrain")))
 #: From the ground up; docs/house.md says what each is for.
@@ -14,6 +17,21 @@ FLOORS = [
 ]
 #: Modules that any floor may use, and that use none.
 LEAVES = ["errors", "atomic", "frame", "problems", "threads", "values"]
+#: Where a kind of mechanism, or a class of one, may stand outside `physics/mechanisms`, and why.
+NAMED = {
+    "__init__.py": "names that users import",
+    "cases/boundary.py": "[[boundary]] kinds of case.toml",
+    "cases/format/tables.py": "[[boundary]] kinds of case.toml",
+    "cases/parts/boundaries.py": "[[boundary]] kinds of case.toml",
+    "cases/case.py": "a case's anatomy is what its resection leaves",
+    "simulation/of_case.py": "[[boundary]] kinds of case.toml that mechanisms compute",
+    "cases/building/example_sets.py": "name of a node set of a shipped mesh",
+    "cases/building/pipeline.py": "names of sets of a shipped mesh",
+    "report/summary.py": "name of a set of a shipped mesh, in words",
+    "report/views.py": "name of a set of a shipped mesh",
+    "report/mechanisms/picture.py": "name of a node set that is drawn",
+    "report/files.py": "name of a field of the states that `run` writes",
+}
 
 
 def room(module: str) -> str:
@@ -49,3 +67,31 @@ def test_there_is_no_other_room():
     rooms = {path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name != "__pycache__"}
     assert rooms == set(FLOORS)
     assert {path.stem for path in PACKAGE.glob("*.py")} == {*LEAVES, "__init__", "__main__"}
+
+
+def mentions(tree: ast.AST) -> Iterator[str]:
+    """Kinds of mechanisms, their classes, and parameters of theirs that are asked for by name."""
+    known = mechanisms()
+    modules = {known[kind].__module__ for kind in known}
+    asked = {name for mechanism in known.values() for name in mechanism.parameters()}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value in (*known, *modules):
+            yield node.value
+        elif isinstance(node, ast.ImportFrom) and node.module in modules:
+            yield node.module
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("getattr", "hasattr"):
+            name = node.args[1]
+            if isinstance(name, ast.Constant) and name.value in asked:
+                yield f"{node.func.id} {name.value}"
+
+
+def test_no_kind_of_mechanism_is_named_outside_its_file():
+    own = PACKAGE / "physics" / "mechanisms"
+    found = {
+        file.relative_to(PACKAGE).as_posix(): list(mentions(ast.parse(file.read_text(encoding="utf-8"))))
+        for file in PACKAGE.rglob("*.py")
+        if own not in file.parents
+    }
+    # a reason that is none any more goes
+    assert {name: said for name, said in found.items() if said and name not in NAMED} == {}
+    assert {name for name in NAMED if not found.get(name)} == set()

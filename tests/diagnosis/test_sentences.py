@@ -13,8 +13,8 @@ from warpbrain.diagnosis.result import Fit, Ranked
 from warpbrain.diagnosis.sentences import effect_sentence, sentence_of
 from warpbrain.inference.decide import VERDICTS, Decision
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.values import Smallest, Value
 from warpbrain.worlds.body.not_physics import SENTENCES
-from warpbrain.worlds.body.values import Smallest, Value
 
 #: What each verdict says, whatever its numbers.
 SAID = {
@@ -125,8 +125,8 @@ def test_gravity_has_a_level_in_millimetres_and_a_tilt_in_degrees():
     )
     text = effect_sentence(found, (0.0, 0.0, -1.0))
     assert "the fluid's surface is 138 ± 6 mm above the lowest point" in text
-    assert "104 ± 6 % of that weight acts" in text
-    assert "tilted by 5.0 ± 1.0 degrees" in text
+    assert "104 ± 6 % of that weight acts, towards inferior" in text
+    assert "tilted by 5.0 ± 1.0 degrees towards right" in text
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,10 @@ def test_gravity_has_a_level_in_millimetres_and_a_tilt_in_degrees():
         (one("pressure", ("value", -480.0, 20.0, "Pa")), "it is 480 ± 20 Pa lower there than elsewhere"),
         (one("traction", ("value_size", 2130.0, 50.0, "Pa")), "it acts with 2.13 ± 0.05 kPa"),
         (one("fibres", ("stiffness", 260.0, 40.0, "Pa")), "their stiffness is 260 ± 40 Pa"),
-        (one("asymmetry", ("exponent", -17.0, 3.0, "")), "tension: Ogden's exponent is -17 ± 3."),
+        (
+            one("asymmetry", ("exponent", -17.0, 3.0, "")),
+            "tension: Ogden's exponent is -17 ± 3: it resists",
+        ),
         (one("compressibility", ("poisson", 0.425, 0.016, "")), "its Poisson ratio at rest is 0.425 ± 0.016"),
         (one("falx", ("thickness", 1.2, 0.3, "mm")), "its thickness is 1.2 ± 0.3 mm"),
         (

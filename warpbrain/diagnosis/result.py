@@ -17,9 +17,9 @@ from warpbrain.inference import Kind
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.decide import Decision
 from warpbrain.inference.predict import Prediction
+from warpbrain.physics.values import Smallest, Value
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
-from warpbrain.worlds.body.values import Smallest, Value
 
 Floats = NDArray[np.float64]
 

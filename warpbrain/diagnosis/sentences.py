@@ -9,9 +9,7 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.result import Confusion, Diagnosis, Fit, Ranked
 from warpbrain.diagnosis.traits import Traits
-from warpbrain.diagnosis.words import measured, size_in_words, smallest_in_words
 from warpbrain.inference.beliefs import belief
-from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import (
     CANNOT_SAY,
     GROUP,
@@ -21,7 +19,10 @@ from warpbrain.inference.decide import (
     NOTHING,
     UNKNOWN,
 )
+from warpbrain.inference.probability import percent
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.sizes import size_in_words, smallest_in_words
+from warpbrain.physics.words import measured
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.hypotheses import Weighed
 from warpbrain.worlds.body.not_physics import SENTENCES
@@ -144,14 +145,6 @@ def _grounds(named: Sequence[Ranked], fit: Fit) -> str:
 
 def _chance(found: Diagnosis) -> str:
     return f"p = {found.p_value:.2g}"
-
-
-def percent(probability: float) -> str:
-    """A probability for people."""
-    most = calibration().most_said
-    if probability > most:
-        return f"above {100.0 * most:.0f} %"
-    return "below 1 %" if probability < 0.005 else f"{100.0 * probability:.0f} %"
 
 
 def traits_in_words(unknown: Traits | None) -> str:

@@ -62,7 +62,7 @@ def _level_columns(held: Sequence[str]) -> list[str]:
 def score_lines(scores: Sequence[Score]) -> list[str]:
     """The table for the terminal."""
     width = max(len(score.name) for score in scores)
-    lines = [f"{'':{width}}  log density (median) [nats a point]   rms error   within 50 %   95 %"]
+    lines = [f"{'':{width}}  log density a point (median)        rms error   within 50 %   95 %"]
     for score in scores:
         density = f"{score.log_density:8.2f} +- {score.log_density_error:<6.2f} ({score.median:6.2f})"
         within = f"{100 * score.coverage_50:10.0f} %  {100 * score.coverage_95:3.0f} %"
@@ -85,7 +85,7 @@ def calibration_lines(found: Sequence[Calibration], left: str) -> list[str]:
 def comparison_lines(name: str, found: Sequence[Comparison]) -> list[str]:
     """One model against the others for the terminal."""
     width = max(len(one.other) for one in found)
-    lines = [f"{name} against:".ljust(width + 2) + "   ahead in   sign test p   difference [nats a point]"]
+    lines = [f"{name} against:".ljust(width + 2) + "   ahead in   sign test p   difference of log density a point"]
     for one in found:
         ahead = f"{one.wins} of {one.count}"
         difference = f"{one.difference:8.2f} +- {one.difference_error:.2f}"

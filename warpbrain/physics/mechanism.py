@@ -41,6 +41,8 @@ from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.ramp import Ramped
 from warpbrain.physics.term import Following
+from warpbrain.physics.values import Smallest
+from warpbrain.physics.words import Values, clauses, label, number
 
 __all__ = [
     "Emptying",
@@ -49,6 +51,7 @@ __all__ = [
     "Growing",
     "Mechanism",
     "ParameterError",
+    "Reading",
     "Relaxing",
     "Removing",
     "Says",
@@ -137,6 +140,22 @@ class ParameterError(InputError):
 
 
 @dataclass(frozen=True)
+class Reading:
+    """How the size of a mechanism can be read, without what it does to tissue.
+
+    Attributes
+    ----------
+    error : float
+        Standard deviation [SI].
+    words : str
+        What is read, and how well.
+    """
+
+    error: float
+    words: str
+
+
+@dataclass(frozen=True)
 class Facts:
     """What a mechanism may know of the case that assumes it.
 
@@ -176,8 +195,6 @@ class Mechanism(Ramped, abc.ABC):
     """
 
     #: Its name in `case.toml`, on the command line and in a diagnosis.
-    reading: ClassVar[Any] = None
-    stays_in_room: ClassVar[bool] = False
     kind: ClassVar[str]
     #: What it is, in one sentence that a surgeon understands.
     sentence: ClassVar[str]
@@ -199,6 +216,12 @@ class Mechanism(Ramped, abc.ABC):
     several: ClassVar[bool] = False
     #: Whether it means something in a laboratory specimen between its grips.
     of_specimens: ClassVar[bool] = False
+    #: How its size can be read directly, if it can.
+    reading: ClassVar[Reading | None] = None
+    #: Whether its direction is that of the room, not of the body: a body that is turned shows it anew.
+    stays_in_room: ClassVar[bool] = False
+    #: Key of the belief of how much of it every tissue has, whatever a case says (`about_law`); empty if of none.
+    always: ClassVar[str] = ""
 
     @classmethod
     def parameters(cls) -> dict[str, Says]:
@@ -306,8 +329,50 @@ class Mechanism(Ramped, abc.ABC):
         raise NotTestableError(f"needs {' and '.join(cls.needs) or 'more than is known of this case'}")
 
     @classmethod
+    def about_law(cls, poisson: float, sd: float) -> Proposal:
+        """It about the law that a case has, where it does nothing; of mechanisms that are `always` there a little.
+
+        Parameters
+        ----------
+        poisson : float
+            Of the case.
+        sd : float
+            Standard deviation of its coefficient.
+        """
+        raise NotImplementedError(cls.kind)
+
+    @classmethod
     def check_tests(cls, tests: Tests) -> None:
         """Raise `NotTestableError` if tests on a specimen, whatever their number and noise, cannot show it."""
+
+    @classmethod
+    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        """What was found of it, one clause for each thing that can be known, with direction and sign.
+
+        Parameters
+        ----------
+        values : mapping of str to Value
+            Finite parameters by name, each in the unit it has in `parameters`; components of vectors as ``value_x``,
+            their length as ``value_size``, of its ramp the last factor as ``share``.
+        gravity_axis : (float, float, float), optional
+            Where 'down' was said to be.
+        """
+        return clauses(cls.parameters(), values)
+
+    @classmethod
+    def smallest_in_words(cls, smallest: Smallest) -> str:
+        """From which size on it would have been seen."""
+        size, unit = smallest.size, smallest.unit
+        if unit == "Pa" and size >= 1000.0:
+            size, unit = 1e-3 * size, "kPa"
+        if unit:
+            return f"from {number(size)} {unit}"
+        return f"from a change of {number(size)} in {label(cls.parameters()[smallest.name.removesuffix('_size')].doc)}"
+
+    @property
+    def lifts(self) -> bool:
+        """Whether what it lets go can leave the wall too, where it is pulled."""
+        return False
 
     def turned(self, rotation: NDArray[np.float64]) -> Self:
         """The same in a body that is turned: every direction `a` becomes `R a`, (3, 3).

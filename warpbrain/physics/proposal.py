@@ -83,6 +83,8 @@ class Situation:
         Points [m] a spacing apart in the tissue, and on its free surface.
     spacing : float
         [m]
+    axes : (str, str, str)
+        How x, y and z run, for people.
     """
 
     mesh: TetMesh
@@ -97,6 +99,7 @@ class Situation:
     volume_sites: Floats
     surface_sites: Floats
     spacing: float
+    axes: tuple[str, str, str] = ("from left to right", "from posterior to anterior", "from inferior to superior")
 
     def require_new(self, kind: str) -> None:
         """Raise `NotTestableError` if the case assumes a mechanism already."""
@@ -233,7 +236,9 @@ class Proposal:
         return [ball(site, radius) for site in situation.volume_sites for radius in radii]
 
     @classmethod
-    def along_axes(cls, make: Callable[[float, Place], Mechanism], sd: float, what: str) -> list[Proposal]:
+    def along_axes(
+        cls, make: Callable[[float, Place], Mechanism], sd: float, what: str, situation: Situation
+    ) -> list[Proposal]:
         """Proportional ones of one coefficient along each axis of the anatomy.
 
         Parameters
@@ -243,11 +248,12 @@ class Proposal:
         sd : float
         what : str
             What lies along the axis, for people.
+        situation : Situation
         """
-        axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+        axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         return [
-            cls.of_one(partial(_along, make, axis), 0.0, sd, region=f"{what} along {name}")
-            for name, axis in axes.items()
+            cls.of_one(partial(_along, make, axis), 0.0, sd, region=f"{what} {name}")
+            for name, axis in zip(situation.axes, axes, strict=True)
         ]
 
     @property

@@ -4,11 +4,12 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from sinking_block import OPTIONS
 
 from warpbrain.inference.decide import VERDICTS, Decision
-from warpbrain.report.diagnosis.description import describe_diagnosis
+from warpbrain.report.diagnosis.description import describe_diagnosis, noise_distance
 from warpbrain.report.files import write_summary
 
 KEYS = {
@@ -19,7 +20,7 @@ KEYS = {
 }
 FIT = {
     *("rmse_m", "heldout_rmse_m", "check_rmse_m", "ceiling_heldout_rmse_m", "noise_m", "improvement", "placebo_p"),
-    *("placebo_heldout_rmse_m", "confirmations"),
+    *("placebo_heldout_rmse_m", "confirmations", "noise_rmse_m"),
 }
 RANKED = {
     *("mechanism", "says", "physics", "log_evidence", "probability", "heldout_rmse_change", "detectability"),
@@ -59,3 +60,13 @@ def test_the_docs_know_every_key():
     text = (Path(__file__).parents[3] / "docs" / "diagnosis.md").read_text(encoding="utf-8")
     for key in KEYS | FIT | RANKED:
         assert f"`{key}`" in text, key
+
+
+def test_the_noise_is_a_distance_where_errors_are(small_diagnosis):
+    """Against distances of drawn noise, in three directions of tracked points and along the normals of surfaces."""
+    sensors = small_diagnosis.base.at.sensors
+    noise = np.linspace(1e-4, 3e-4, len(sensors))
+    drawn = noise * np.random.default_rng(3).standard_normal((4000, len(sensors)))
+    rows = sensors.is_displacement
+    squares = [(drawn[:, rows & (sensors.groups == point)] ** 2).sum(axis=1) for point in set(sensors.groups[rows])]
+    assert noise_distance(noise, sensors) == pytest.approx(np.sqrt(np.mean(squares)), rel=0.01)

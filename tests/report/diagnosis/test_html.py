@@ -105,7 +105,7 @@ def test_a_specimen_has_curves_in_the_place_of_an_anatomy(folder):
     (folder / "curves.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     page = page_of(read_saved(folder))
     assert "450 → 70 Pa" in page and "It shows most in press (compression), loading" in page
-    assert "nothing added" in page and "fibres (0.97)" in page
+    assert "nothing added" in page and "fibres (97 %)" in page
     assert "fibres: a pattern that means nothing does as well with p = 0.01" in page
     assert "pull 80" in page and "Recorded and computed stress of 2 tests" in page
 

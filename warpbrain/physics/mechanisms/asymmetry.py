@@ -1,4 +1,4 @@
-"""Tissue that resists compression more than tension: Ogden's law of one term in the place of the case's own.
+"""Tissue that resists compression otherwise than tension: Ogden's law of one term in the place of the case's own.
 
     Psi = (2 mu0 / alpha^2) (sum_i l_i^alpha - 3) + ...      of the same shear modulus at rest
 
@@ -17,6 +17,10 @@ from warpbrain.physics.laws.ogden import Ogden
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
+from warpbrain.physics.words import Values, measured
+
+#: Exponent of the neo-Hookean law.
+NEO_HOOKEAN = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,9 +45,10 @@ class Asymmetry(Mechanism):
     together: ClassVar[Mapping[str, str]] = {
         "compressibility": "Each says a part of the law, in any order.",
     }
-    sentence: ClassVar[str] = "Tissue resists compression more than tension."
+    sentence: ClassVar[str] = "Tissue resists compression otherwise than tension."
     example: ClassVar[str] = "asymmetry:exponent=-20"
     confused_with: ClassVar[tuple[str, ...]] = ("fibres",)
+    always: ClassVar[str] = "tissue.exponent"
     needs: ClassVar[tuple[str, ...]] = ("regions or tests both in compression and in tension",)
 
     def __post_init__(self) -> None:
@@ -57,7 +62,24 @@ class Asymmetry(Mechanism):
         situation.require_new(cls.kind)
         if "ogden" in situation.laws:
             raise NotTestableError("the law of a tissue has an exponent of its own, which is refitted")
-        return [Proposal.of_one(lambda a: cls(exponent=a), 2.0, 15.0, "smooth", 2.0, region="all tissue")]
+        return [cls.about_law(situation.poisson, 15.0)]
+
+    @classmethod
+    def about_law(cls, poisson: float, sd: float) -> Proposal:
+        """See `warpbrain.physics.mechanism.Mechanism`; the coefficient is the exponent."""
+        return Proposal.of_one(lambda a: cls(exponent=a), NEO_HOOKEAN, sd, "smooth", NEO_HOOKEAN, region="all tissue")
+
+    @classmethod
+    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        if "exponent" not in values:
+            return []
+        exponent = values["exponent"]
+        found = f"Ogden's exponent is {measured(exponent.value, exponent.sd)}"
+        if exponent.sd > abs(exponent.value - NEO_HOOKEAN):
+            return [found]
+        more, less = ("compression", "tension") if exponent.value < NEO_HOOKEAN else ("tension", "compression")
+        return [f"{found}: it resists {more} more, and {less} less, than the neo-Hookean law"]
 
     @classmethod
     def check_tests(cls, tests: Tests) -> None:

@@ -38,14 +38,21 @@ class Compressibility(Mechanism):
     sentence: ClassVar[str] = "Tissue gives way under pressure more, or less, than was assumed."
     example: ClassVar[str] = "compressibility:poisson=0.35"
     confused_with: ClassVar[tuple[str, ...]] = ("drainage", "swelling")
+    always: ClassVar[str] = "tissue.volume"
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
-        """Another ratio; the coefficient is `-ln(1 - 2 nu)`, in which bulk moduli are even steps."""
+        """Another ratio."""
         situation.require_new(cls.kind)
-        own = -math.log1p(-2.0 * situation.poisson)
-        make = lambda c: cls(poisson=-0.5 * math.expm1(-c))  # noqa: E731
-        return [Proposal.of_one(make, own, 1.2, "smooth", own, region="all tissue")]
+        return [cls.about_law(situation.poisson, 1.2)]
+
+    @classmethod
+    def about_law(cls, poisson: float, sd: float) -> Proposal:
+        """See `warpbrain.physics.mechanism.Mechanism`; of `-ln(1 - 2 nu)`, in which bulk moduli are even steps."""
+        own = -math.log1p(-2.0 * poisson)
+        return Proposal.of_one(
+            lambda c: cls(poisson=-0.5 * math.expm1(-c)), own, sd, "smooth", own, region="all tissue"
+        )
 
     @classmethod
     def check_tests(cls, tests: Tests) -> None:

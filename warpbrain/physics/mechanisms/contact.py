@@ -42,6 +42,7 @@ from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.physics.term import Body, Term
+from warpbrain.physics.words import Values, measured
 
 STATES = ("fixed", "sliding", "lifting")
 #: Tangential displacement [m] over which friction builds up.
@@ -130,6 +131,18 @@ class Contact(Mechanism):
         if not released and not walls:
             raise NotTestableError("has no surface")
         return [*released, *walls]
+
+    @classmethod
+    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        if "radius" not in values:
+            return []
+        return [f"what lets go has a radius of {measured(values['radius'].value, values['radius'].sd, 'mm')}"]
+
+    @property
+    def lifts(self) -> bool:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        return self.state == "lifting"
 
     @classmethod
     def _kept(cls, state: str, surface: FreeSurface) -> Proposal:

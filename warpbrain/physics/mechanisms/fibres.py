@@ -24,6 +24,7 @@ from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
+from warpbrain.physics.words import Values, along, measured, vector_in
 
 
 @wp.func
@@ -166,13 +167,31 @@ class Fibres(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy."""
-        return Proposal.along_axes(lambda k1, axis: cls(direction=axis, stiffness=max(k1, 1e-9)), 500.0, "fibres")
+        return Proposal.along_axes(
+            lambda k1, axis: cls(direction=axis, stiffness=max(k1, 1e-9)), 500.0, "fibres", situation
+        )
 
     @classmethod
     def check_tests(cls, tests: Tests) -> None:
         """See `warpbrain.physics.mechanism.Mechanism`."""
         if tests.loads < 2:
             raise NotTestableError(f"needs {' and '.join(cls.needs)}")
+
+    @classmethod
+    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        known = {
+            "stiffness": "their stiffness is",
+            "exponent": "the exponent with which they stiffen is",
+            "dispersion": "their scatter, from 0 all parallel to 1/3 no direction, is",
+        }
+        found = [
+            f"{words} {measured(values[name].value, values[name].sd, values[name].unit)}"
+            for name, words in known.items()
+            if name in values
+        ]
+        line = along(vector_in(values, "direction"))
+        return [*found, *([f"they run {line}"] if line else [])]
 
     def stored_energy(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `warpbrain.physics.mechanism.Storing`; one direction of fibres."""

@@ -16,6 +16,7 @@ difference of two densities, so it takes `tissue_density`, that of brain. The `d
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -38,6 +39,7 @@ from warpbrain.physics.load import Along, BodyForce
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
+from warpbrain.physics.words import Values, measured, towards, vector_in
 
 #: Standard gravity [m/s2] as used by the verification cases of this project.
 STANDARD_GRAVITY = 9.81
@@ -110,6 +112,7 @@ class Gravity(BodyForce, Mechanism):
     }
     sentence: ClassVar[str] = "Cerebrospinal fluid drained, and the brain sinks under the weight it no longer carries."
     example: ClassVar[str] = "gravity:level=130"
+    stays_in_room: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -162,6 +165,25 @@ class Gravity(BodyForce, Mechanism):
             usual = np.array([1.0, 0.0, 0.0])
             found.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(3)))
         return found
+
+    @classmethod
+    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        found = []
+        if "csf_level" in values:
+            level = values["csf_level"]
+            found.append(
+                f"the fluid's surface is {measured(level.value, level.sd, 'mm')} above the lowest point of the anatomy"
+            )
+        down = _down(values, gravity_axis)
+        if "share" in values:
+            share = values["share"]
+            where = towards(math.copysign(1.0, share.value) * down)
+            part = measured(100.0 * share.value, 100.0 * share.sd)
+            found.append(f"{part} % of that weight acts{f', {where}' if where else ''}")
+        elif down.any():
+            found.append(f"its weight acts {towards(down)}")
+        return [*found, *_tilt(values, gravity_axis, down)]
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
@@ -223,3 +245,24 @@ class Gravity(BodyForce, Mechanism):
         """Direction of gravity less that while imaged."""
         assert self.imaged_direction is not None
         return -self._up - unit_vector("imaged_direction", self.imaged_direction)
+
+
+def _down(values: Values, axis: tuple[float, float, float] | None) -> NDArray[np.float64]:
+    """Where 'down' was found to be (3,): a component that is not known better than beforehand is where it was."""
+    found = vector_in(values, "direction")
+    if axis is None:
+        return found
+    known = [f"direction_{letter}" in values for letter in "xyz"]
+    return np.where(known, found, unit_vector("gravity_axis", axis))
+
+
+def _tilt(values: Values, axis: tuple[float, float, float] | None, found: NDArray[np.float64]) -> list[str]:
+    components = [values[name] for letter in "xyz" if (name := f"direction_{letter}") in values]
+    if axis is None or not components:
+        return []
+    down = unit_vector("gravity_axis", axis)
+    across = found - (found @ down) * down
+    degrees = math.degrees(math.atan2(float(np.linalg.norm(across)), float(found @ down)))
+    spread = math.degrees(math.hypot(*(one.sd for one in components)))
+    where = f" {towards(across)}" if degrees > spread else ""
+    return [f"'down' is tilted by {measured(degrees, spread)} degrees{where} from what was declared"]

@@ -20,6 +20,8 @@ from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
+from warpbrain.physics.values import Smallest
+from warpbrain.physics.words import Values, measured, number, radius_in_words
 
 #: Where it is looked for: standard deviation of the logarithm of the ratio, and radii of balls [m].
 _USUAL, _RADII = 1.2, (0.012, 0.018)
@@ -70,6 +72,23 @@ class Inclusion(Mechanism):
             return cls(ratio=math.exp(s), centre=centre, radius=radius)
 
         return Proposal.in_balls(ball, _USUAL, _RADII, situation)
+
+    @classmethod
+    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        if "ratio" not in values or not values["ratio"].value > 0.0:
+            return radius_in_words(values)
+        ratio = values["ratio"]
+        times, word = (ratio.value, "stiff") if ratio.value >= 1.0 else (1.0 / ratio.value, "soft")
+        spread = times * ratio.sd / ratio.value
+        return [f"it is {measured(times, spread)} times as {word} as the tissue around", *radius_in_words(values)]
+
+    @classmethod
+    def smallest_in_words(cls, smallest: Smallest) -> str:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        if smallest.name != "ratio":
+            return super().smallest_in_words(smallest)
+        return f"from {number(1.0 + smallest.size)} times the stiffness around it"
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

@@ -41,12 +41,13 @@ from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, rim_edges
 from warpbrain.mesh.integrals import triangle_rule
 from warpbrain.physics.expectation import Normal
-from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Mechanism, ParameterError, Reading, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_with
 from warpbrain.physics.term import Body
 from warpbrain.physics.triangle_term import TriangleTerm
+from warpbrain.physics.words import HARDLY, Values, measured, unsure
 
 Ints = NDArray[np.int32]
 
@@ -83,6 +84,8 @@ class Pressure(Mechanism):
     example: ClassVar[str] = "pressure:nodes=ventricle,value=300"
     confused_with: ClassVar[tuple[str, ...]] = ("gravity", "swelling")
     several: ClassVar[bool] = True
+    # 2 mm of water in a manometer
+    reading: ClassVar[Reading | None] = Reading(20.0, "a reading of the pressure, to 20 Pa")
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)
@@ -111,6 +114,21 @@ class Pressure(Mechanism):
             Proposal.of_one(partial(_pressing, surface.name), 0.0, 400.0, region=surface.words)
             for surface in situation.free
         ]
+
+    @classmethod
+    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        if "value" not in values:
+            return []
+        found = values["value"]
+        if unsure(found):
+            return [f"it is {measured(found.value, found.sd, 'Pa')} above that elsewhere, {HARDLY}"]
+        word, does = (
+            ("higher", "pushes the wall into the tissue")
+            if found.value >= 0.0
+            else ("lower", "pulls the wall out of the tissue, towards the fluid")
+        )
+        return [f"it is {measured(abs(found.value), found.sd, 'Pa')} {word} there than elsewhere, and {does}"]
 
     def bind(self, body: Body) -> "PressureTerm":
         """See `warpbrain.physics.term.Following`."""

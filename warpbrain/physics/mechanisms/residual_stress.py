@@ -23,6 +23,7 @@ from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
+from warpbrain.physics.words import HARDLY, Values, along, measured, unsure, vector_in
 
 
 @wp.func
@@ -110,7 +111,20 @@ class ResidualStress(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy, in all tissue."""
-        return Proposal.along_axes(lambda tension, axis: cls(tension=tension, direction=axis), 300.0, "tension")
+        return Proposal.along_axes(
+            lambda tension, axis: cls(tension=tension, direction=axis), 300.0, "tension", situation
+        )
+
+    @classmethod
+    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        if "tension" not in values:
+            return []
+        tension, where = values["tension"], along(vector_in(values, "direction"))
+        word = "tension" if tension.value >= 0.0 or unsure(tension) else "compression"
+        size = abs(tension.value) if word == "compression" else tension.value
+        found = f"it is under a {word} of {measured(size, tension.sd, 'Pa')} {where}".rstrip()
+        return [f"{found}, {HARDLY}" if unsure(tension) else found]
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
         """See `warpbrain.physics.term.Following`."""

@@ -19,6 +19,7 @@ from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
+from warpbrain.physics.words import HARDLY, Values, measured, radius_in_words, unsure
 
 #: Where it is looked for: standard deviation of the change everywhere and in a ball, and radii of balls [m].
 _EVERYWHERE, _SOMEWHERE, _RADII = 0.03, 0.2, (0.012, 0.018)
@@ -74,6 +75,19 @@ class Swelling(Mechanism):
             return cls(amount=g, centre=centre, radius=radius)
 
         return [everywhere, *Proposal.in_balls(ball, _SOMEWHERE, _RADII, situation)]
+
+    @classmethod
+    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        if "amount" not in values:
+            return radius_in_words(values)
+        amount = values["amount"]
+        if unsure(amount):
+            size = f"it grows by {measured(amount.value, amount.sd, '%')} of its volume, {HARDLY}"
+        else:
+            word = "swells" if amount.value >= 0.0 else "shrinks"
+            size = f"it {word} by {measured(abs(amount.value), amount.sd, '%')} of its volume"
+        return [size, *radius_in_words(values)]
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

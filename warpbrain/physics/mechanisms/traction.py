@@ -24,6 +24,7 @@ from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import elements_with
+from warpbrain.physics.words import HARDLY, Values, measured, radius_in_words, towards, unsure, vector_in
 
 #: Where it is looked for: radii [m] of patches, and standard deviation of each component [Pa].
 _RADII, _USUAL = (0.009, 0.014), 1000.0
@@ -86,6 +87,15 @@ class Traction(Load, Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Patches of two sizes all over the free surface."""
         return [cls._pulling(site, radius) for site in situation.surface_sites for radius in _RADII]
+
+    @classmethod
+    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        if "value_size" not in values:
+            return radius_in_words(values)
+        size = values["value_size"]
+        where = f"in a direction {HARDLY}" if unsure(size) else towards(vector_in(values, "value"))
+        return [f"it acts with {measured(size.value, size.sd, 'Pa')} {where}".rstrip(), *radius_in_words(values)]
 
     @classmethod
     def _pulling(cls, site: NDArray[np.float64], radius: float) -> Proposal:

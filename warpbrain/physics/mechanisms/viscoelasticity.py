@@ -34,6 +34,8 @@ from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body, Term
+from warpbrain.physics.values import Smallest, Value
+from warpbrain.physics.words import HARDLY, Values, measured, number, unsure
 
 #: Relaxation times [s] that are looked for, alone and in pairs.
 _LOOKED_FOR = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
@@ -130,6 +132,36 @@ class Viscoelasticity(Mechanism):
         ]
 
     @classmethod
+    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        found = []
+        if "moduli" in values:
+            moduli = values["moduli"]
+            found.append(
+                f"at first it is {measured(1.0 + moduli.value, moduli.sd)} times as stiff as in the end, whether it "
+                "relaxes in one time or in two; what relaxes before the first recording is hardly seen"
+            )
+        if "times" in values:
+            of = "of " if unsure(values["times"]) else ""
+            found.append(f"if it has one, its relaxation time is {of}{_time_in_words(values['times'])}")
+        branches = [(values.get(f"moduli_{branch}"), values.get(f"times_{branch}")) for branch in (1, 2)]
+        each = [
+            f"{measured(modulus.value, modulus.sd)} within {_time_in_words(time)}"
+            for modulus, time in branches
+            if modulus is not None and time is not None
+        ]
+        if each:
+            found.append(f"if it has two, what relaxes, as a part of that in the end, is {', and '.join(each)}")
+        return found
+
+    @classmethod
+    def smallest_in_words(cls, smallest: Smallest) -> str:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        if not smallest.name.startswith("moduli"):
+            return super().smallest_in_words(smallest)
+        return f"from a tissue that at first is {number(1.0 + smallest.size)} times as stiff as in the end"
+
+    @classmethod
     def _of_coefficients(cls, c: NDArray[np.float64]) -> "Viscoelasticity":
         shares, times = _spectrum(c)
         # the faster branch first
@@ -158,6 +190,13 @@ def _left(c: NDArray[np.float64], time: float) -> float:
     """Modulus that has not relaxed at a time [s], as a proposal has it: that of strain that is held."""
     shares, times = _spectrum(c)
     return float(c[0] * (shares @ np.exp(-time / times)))
+
+
+def _time_in_words(value: Value) -> str:
+    if unsure(value):
+        # a number with a spread beyond itself would look like a mistake
+        return f"the order of {number(value.value, 1)} {value.unit}, {HARDLY}"
+    return measured(value.value, value.sd, value.unit)
 
 
 class ViscoelasticTerm(Term):

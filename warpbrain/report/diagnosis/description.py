@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Combination, Diagnosis, Ranked
 from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence
 from warpbrain.diagnosis.traits import Traits
-from warpbrain.diagnosis.words import smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.sizes import smallest_in_words
+from warpbrain.physics.values import Value
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
-from warpbrain.worlds.body.values import Value
+from warpbrain.worlds.body.sensors import Sensors
+
+Floats = NDArray[np.float64]
 
 
 def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:
@@ -182,6 +188,14 @@ def _rejected(kind: str, why: str) -> dict[str, Any]:
     }
 
 
+def noise_distance(noise: Floats, sensors: Sensors) -> float | None:
+    """Root mean square [m] of the distance that noise (n,) [m] alone leaves at a recorded point, as errors are said."""
+    rows = sensors.is_displacement
+    if not rows.any():
+        return None
+    return float(np.sqrt(np.sum(noise[rows] ** 2) / len(np.unique(sensors.groups[rows]))))
+
+
 def _fit(found: Diagnosis) -> dict[str, Any]:
     fit = found.fit
     rows = {"declared": fit.declared, "refitted": fit.refitted, "explained": fit.explained}
@@ -195,6 +209,7 @@ def _fit(found: Diagnosis) -> dict[str, Any]:
         "noise_m": float(found.base.noise[found.base.at.sensors.is_displacement].mean())
         if found.base.at.sensors.is_displacement.any()
         else None,
+        "noise_rmse_m": noise_distance(found.base.noise, found.base.at.sensors),
         "improvement": None
         if improvement is None
         else {"part": improvement[0], "interval_95": [improvement[1], improvement[2]]},

@@ -7,6 +7,7 @@ from typing import Any
 
 from warpbrain.atomic import whole_file
 from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
+from warpbrain.inference.probability import percent
 from warpbrain.report.diagnosis.figures.agreement import agreement_figure
 from warpbrain.report.diagnosis.figures.candidates import candidates_figure
 from warpbrain.report.diagnosis.figures.confusion import confusion_figure
@@ -113,7 +114,7 @@ def _verdict(said: dict[str, Any]) -> str:
         # a specimen's says all that it names in another place
         named = said.get("mechanisms") or [said]
         facts.insert(0, ("mechanism", text(" and ".join(one["mechanism"] for one in named))))
-        facts.append(("probability", " and ".join(f"{one['probability']:.3f}" for one in named)))
+        facts.append(("probability", " and ".join(percent(one["probability"]) for one in named)))
     unit = unit_of(said)
     held = said["fit"][f"heldout_rmse_{unit.suffix}"]
     if held.get("refitted") is not None:
@@ -185,10 +186,10 @@ def _where(saved: Saved) -> str:
 
 
 def _apart(said: dict[str, Any]) -> str:
-    if said["group"]:
+    if len(said["group"]) > 1:
         chances = {one["mechanism"]: one["probability"] for one in said["ranking"]}
         members = "".join(
-            f"<li><b>{text(kind)}</b>: probability {chances.get(kind, 0.0):.2f}</li>" for kind in said["group"]
+            f"<li><b>{text(kind)}</b>: probability {percent(chances.get(kind, 0.0))}</li>" for kind in said["group"]
         )
         first = f"<p>These data do not tell these apart:</p><ul>{members}</ul>"
     else:

@@ -9,11 +9,13 @@ from dataclasses import asdict
 from typing import Any
 
 from warpbrain.inference.causes import Kind
+from warpbrain.inference.probability import percent
+from warpbrain.physics.values import Value
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
 from warpbrain.worlds.specimen.diagnose import SpecimenOptions
-from warpbrain.worlds.specimen.result import Ranked, SpecimenDiagnosis, Value
-from warpbrain.worlds.specimen.sentences import chance, sentence_of
+from warpbrain.worlds.specimen.result import Ranked, SpecimenDiagnosis
+from warpbrain.worlds.specimen.sentences import sentence_of
 
 _WIDTH = 110
 _STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what was added"}
@@ -138,7 +140,7 @@ def specimen_diagnosis_lines(found: SpecimenDiagnosis) -> list[str]:
     for combination in found.combinations[:6]:
         causes = " and ".join(combination.causes) or "nothing"
         lines.append(
-            f"    {causes:<60} {chance(combination.probability):>10}   log evidence {combination.log_evidence:+8.1f}"
+            f"    {causes:<60} {percent(combination.probability):>10}   log evidence {combination.log_evidence:+8.1f}"
         )
     if found.p_left is not None:
         lines.append(f"  with {' and '.join(found.assumed)}: p = {found.p_left:.2g} that nothing is left")
@@ -161,6 +163,6 @@ def specimen_diagnosis_lines(found: SpecimenDiagnosis) -> list[str]:
             checks = ", ".join(f"{test} {value:.4g}" for test, value in score.check.items())
             lines.append(f"  {name:<27} {score.fitted:9.4g} {held}   {checks}".rstrip())
     if found.next_measurement:
-        lines += ["", "  what to measure next (expected nats between the two most probable sets):"]
+        lines += ["", "  what to measure next (expected log Bayes factor between the two most probable sets):"]
         lines += [f"    {one.expected_nats:8.1f}  {one.what}" for one in found.next_measurement[:4]]
     return lines

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.diagnosis.words import measured, size_in_words
+from warpbrain.inference.probability import percent
+from warpbrain.physics.sizes import size_in_words
+from warpbrain.physics.values import Value
 from warpbrain.report.diagnosis.saved import STATES, Rows
 from warpbrain.report.diagnosis.units import unit_of
-from warpbrain.worlds.body.values import Value
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = (), caption: str = "") -> str:
@@ -44,7 +45,7 @@ def candidates_table(said: dict[str, Any]) -> str:
         rows.append(
             [
                 f"<b>{text(one['mechanism'])}</b>",
-                f"{one['probability']:.3f}",
+                percent(one["probability"]),
                 f"{one['log_evidence']:+.1f}",
                 f"{seen:.1f}" if one["physics"] and seen is not None else "",
                 "" if held is None else f"{unit.factor * held:+.2g} {unit.name}",
@@ -61,9 +62,7 @@ def estimate_of(one: dict[str, Any]) -> str:
     if "says" in one:
         return str(one["says"])
     values = [Value(name, v["value"], v["sd"], v["unit"]) for name, v in one["estimate"].items()]
-    known = size_in_words(one["mechanism"], values)
-    # what is a mechanism of specimens alone has no other words than its own
-    return "; ".join(known or (f"{v.name} {measured(v.value, v.sd, v.unit)}" for v in values))
+    return "; ".join(size_in_words(one["mechanism"], values))
 
 
 def rejected_table(said: dict[str, Any]) -> str:
@@ -85,7 +84,7 @@ def stages_table(said: dict[str, Any]) -> str:
             [
                 text(" and ".join(stage["with"]) or "nothing added"),
                 f"{stage['p_value']:.2g}",
-                "" if best is None else f"{text(best['mechanism'])} ({best['probability']:.2f})",
+                "" if best is None else f"{text(best['mechanism'])} ({percent(best['probability'])})",
                 text(stage["added"] or ""),
                 text(stage["why_not"]),
             ]
@@ -107,7 +106,7 @@ def fit_table(said: dict[str, Any]) -> str:
             cells.append(_error(value, unit.factor))
         rows.append(cells)
     head = ("", f"fitted [{unit.name}]", f"held out [{unit.name}]", f"check [{unit.name}]")
-    return table(head, rows, numbers=(1, 2, 3), caption="Root mean square errors")
+    return table(head, rows, numbers=(1, 2, 3), caption=f"Root mean square {unit.error}")
 
 
 def _error(value: Any, factor: float) -> str:

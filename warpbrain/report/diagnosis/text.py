@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
+from warpbrain.inference.probability import percent
 from warpbrain.report.files import MILLIMETRES
 
 _WIDTH = 110
@@ -34,7 +35,7 @@ def diagnosis_lines(said: Mapping[str, Any]) -> list[str]:
         lines += [f"    {one['mechanism']}: {one['rejected_because']}" for one in rejected]
     lines += ["", *_fit_lines(said["fit"])]
     if said["next_measurement"]:
-        lines += ["", "  what to measure next (expected nats between the two most probable mechanisms):"]
+        lines += ["", "  what to measure next (expected log Bayes factor between the two most probable mechanisms):"]
         lines += [f"    {one['expected_nats']:8.1f}  {one['what']}" for one in said["next_measurement"][:5]]
     if said["confusion"]:
         lines.append("")
@@ -50,7 +51,7 @@ def when_in_words(when: Mapping[str, Any]) -> str:
         # of a laboratory test it is the part of the record
         return f"{first:.3g} to {last:.3g} s"
     between = f"by {last:.3g} s" if first == 0.0 else f"between {first:.3g} and {last:.3g} s"
-    sure = "" if when["probability"] is None else f" (probability {when['probability']:.2f})"
+    sure = "" if when["probability"] is None else f" (probability {percent(when['probability'])})"
     course = f", {when['course']}" if when["course"] else ""
     return f"it set in {between}{sure}{course}"
 
@@ -63,7 +64,7 @@ def _line(one: Mapping[str, Any]) -> str:
         for name, value in list(one["estimate"].items())[:3]
     )
     d = f"{one['detectability']:8.1f}" if one["physics"] else " " * 8
-    numbers = f"{one['probability']:11.3f} {one['log_evidence']:14.1f} {d}   {held}"
+    numbers = f"{percent(one['probability']):>11} {one['log_evidence']:14.1f} {d}   {held}"
     return f"  {one['mechanism']:<18} {numbers}      {estimate}".rstrip()
 
 

@@ -20,13 +20,18 @@ class Unit:
         From what is saved.
     suffix : str
         Of the keys of `diagnosis.json`.
+    error : str
+        What of one recorded row is squared.
     """
 
     name: str
     factor: float
     suffix: str
+    error: str
 
 
 def unit_of(said: Mapping[str, Any]) -> Unit:
     """That of the errors of a diagnosis."""
-    return Unit("mm", MILLIMETRES, "m") if "rmse_m" in said["fit"] else Unit("Pa", 1.0, "pa")
+    if "rmse_m" in said["fit"]:
+        return Unit("mm", MILLIMETRES, "m", "distance in space")
+    return Unit("Pa", 1.0, "pa", "error of the stress")

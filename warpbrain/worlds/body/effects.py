@@ -173,7 +173,7 @@ class Effects:
         if proposal.is_there_or_not:
             if proposal.follows == "release":
                 patch = proposal.released
-                answer = self.at.released(patch.members, patch.held, _lifts(proposal.make(proposal.mean)))
+                answer = self.at.released(patch.members, patch.held, proposal.make(proposal.mean).lifts)
             else:
                 answer = self._solved.there(proposal.make(proposal.mean))
             return Effect(proposal, proposal.mean[0] * answer, proposal.sd[0] * answer[:, None])
@@ -314,8 +314,3 @@ def _effect_of_course(proposal: Proposal, course: Course) -> Effect:
         return np.column_stack(ends)
 
     return Effect(proposal, course.at(pace(proposal.mean)), about(proposal.mean), about)
-
-
-def _lifts(mechanism: Mechanism) -> bool:
-    """Whether what lets go can leave the wall too, where it was pulled."""
-    return getattr(mechanism, "state", "") == "lifting"

@@ -15,13 +15,15 @@ from __future__ import annotations
 import copy
 import itertools
 import threading
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.mesh import vertex_normals
+from warpbrain.mesh import TetMesh, vertex_normals
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.system import System
 from warpbrain.threads import fill_columns, in_threads
 from warpbrain.worlds.body.factors import Factors
@@ -34,6 +36,19 @@ Floats = NDArray[np.float64]
 _GROWTH = 1e-4
 #: Patches whose answers one thread makes, and sparse columns of forces: of some mechanisms no node is without any.
 _TOGETHER, _TOGETHER_SPARSE = 64, 8
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Grown(Mechanism):
+    """Tissue that is larger everywhere."""
+
+    relative: float
+    kind: ClassVar[str] = "growth"
+    sentence: ClassVar[str] = "All tissue is larger."
+
+    def growth(self, mesh: TetMesh, scale: float) -> Floats:
+        """See `warpbrain.physics.mechanism.Growing`."""
+        return np.full(len(mesh.tetrahedra), scale * self.relative)
 
 
 class Linearisation:
@@ -213,12 +228,10 @@ class Linearisation:
         """Their derivative (m, 4, 3) [N] by a relative growth of volume of each element."""
         from dataclasses import replace
 
-        from warpbrain.physics.mechanisms.swelling import Swelling
-
         sides = []
         for amount in (-_GROWTH, _GROWTH):
             model = self.system.model
-            grown = replace(model, mechanisms=(*model.mechanisms, Swelling(amount=amount)))
+            grown = replace(model, mechanisms=(*model.mechanisms, _Grown(relative=amount)))
             beside = System(grown, str(self.system.device), self.system.precision.name)
             beside.remember_as(self.system)
             sides.append(_element_forces(beside, self.u))

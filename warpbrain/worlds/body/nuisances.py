@@ -6,7 +6,6 @@ were, a rigid error of registration, and the error of the mesh. A cause is credi
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -20,8 +19,7 @@ from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
 from warpbrain.physics.mechanism import Mechanism
-from warpbrain.physics.mechanisms.asymmetry import Asymmetry
-from warpbrain.physics.mechanisms.compressibility import Compressibility
+from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import Proposal
 from warpbrain.simulation.assumed import all_substituted
 from warpbrain.simulation.model import Material
@@ -148,8 +146,8 @@ def nuisances_at(
     families = [
         Family("tissue", tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors)),
         Family("stiffness field", field_columns(at, states)),
-        Family("compressibility", _law_columns(effects, [other_volume(states)])),
-        Family("shape of the law", _law_columns(effects, _other_shape())),
+        Family("Poisson ratio", _law_columns(effects, [other_volume(states)])),
+        Family("shape of the law", _law_columns(effects, _other_shape(states))),
         Family("known loads", _known_loads(at)),
         Family("registration", sensors.rigid * registration_sd()),
     ]
@@ -190,10 +188,13 @@ def _law_columns(effects: Effects, proposals: list[Proposal]) -> Floats:
 
 def other_volume(states: States) -> Proposal:
     """Tissue that is more or less compressible than the case says, as much in all tissues."""
-    own = -math.log1p(-2.0 * states.case.poisson)
-    return Proposal.of_one(
-        lambda c: Compressibility(poisson=-0.5 * math.expm1(-c)), own, belief("tissue.volume"), "smooth", own
-    )
+    return _always(states, "tissue.volume")
+
+
+def _always(states: States, key: str) -> Proposal:
+    """The mechanism of which every tissue has as much as a belief says."""
+    [known] = [mechanism for mechanism in mechanisms().values() if mechanism.always == key]
+    return known.about_law(states.case.poisson, belief(key))
 
 
 def mesh_by_tissue(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:
@@ -217,9 +218,9 @@ class _SecondInvariant(Mechanism):
         return MooneyRivlin(0.5 * mu * (1.0 - self.share), 0.5 * mu * self.share), poisson, formulation
 
 
-def _other_shape() -> list[Proposal]:
+def _other_shape(states: States) -> list[Proposal]:
     return [
-        Proposal.of_one(lambda a: Asymmetry(exponent=a), 2.0, belief("tissue.exponent"), "smooth", 2.0),
+        _always(states, "tissue.exponent"),
         Proposal.of_one(
             lambda share: _SecondInvariant(share=share), 0.5, belief("tissue.second_invariant"), "smooth", 0.5
         ),

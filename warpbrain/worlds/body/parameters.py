@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.values import Smallest, Value
 from warpbrain.worlds.body.effects import Effect
-from warpbrain.worlds.body.values import Smallest, Value
 
 Floats = NDArray[np.float64]
 

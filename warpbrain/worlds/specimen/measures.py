@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.inference.beliefs import belief
+from warpbrain.physics.values import Smallest, Value
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.linear import Linear
 from warpbrain.worlds.specimen.protocol import Protocol, Test
-from warpbrain.worlds.specimen.result import Score, Segment, Smallest, Value
+from warpbrain.worlds.specimen.result import Score, Segment
 
 Floats = NDArray[np.float64]
 

@@ -12,24 +12,10 @@ from warpbrain.cases.case import Case
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.decide import Decision
+from warpbrain.physics.values import Smallest, Value
 from warpbrain.worlds.specimen.protocol import Protocol
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Value:
-    """A parameter of a cause after the fit: its name, value and standard deviation in a unit."""
-
-    name: str
-    value: float
-    sd: float
-    unit: str
-
-    @property
-    def text(self) -> str:
-        """For people."""
-        return f"{self.name} {self.value:.3g} ± {self.sd:.2g} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -101,15 +87,6 @@ class Measurement:
 
     what: str
     expected_nats: float
-
-
-@dataclass(frozen=True)
-class Smallest:
-    """The smallest effect of a cause that these tests show nearly always: its first number."""
-
-    size: float
-    unit: str
-    name: str
 
 
 @dataclass(frozen=True, eq=False)

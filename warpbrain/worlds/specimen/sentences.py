@@ -6,18 +6,15 @@ import numpy as np
 
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.decide import GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
+from warpbrain.inference.probability import percent
+from warpbrain.physics.sizes import size_in_words, smallest_in_words
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.glued_ends import ELEMENTS
 from warpbrain.worlds.specimen.protocol import Protocol
 from warpbrain.worlds.specimen.result import Ranked, SpecimenDiagnosis
 
-#: A probability is never said to be more than this: nobody has counted how often more is right.
-_MOST = 0.99
-
-
-def chance(probability: float) -> str:
-    """A probability for people."""
-    return f"above {_MOST:g}" if probability > _MOST else f"{probability:.2f}"
+#: Of a cause no more numbers are said in a sentence.
+_VALUES = 6
 
 
 def sentence_of(found: SpecimenDiagnosis) -> str:
@@ -25,21 +22,21 @@ def sentence_of(found: SpecimenDiagnosis) -> str:
     doubts = f" {' '.join(found.doubts)}" if found.doubts else ""
     p = f"p = {found.p_value:.2g}"
     if found.verdict == NOTHING:
-        seen = "; ".join(f"{n}: {one.name} {one.size:.2g} {one.unit}".rstrip() for n, one in found.smallest.items())
+        seen = "; ".join(f"{name} {smallest_in_words(name, one)}" for name, one in found.smallest.items())
         return (
-            f"No missing physics is detected ({p}). The smallest effects that these tests would have shown: "
+            f"No missing physics is detected ({p}). What these tests would have shown: "
             f"{seen or 'none of those that were looked for'}."
         )
     sentences = {one.name: one.sentence for one in found.ranking}
     if found.verdict in (NAMED, NAMED_AND_REST):
-        parts = [f"{one.sentence} ({_values(one)}; probability {chance(one.probability)})" for one in found.named]
+        parts = [f"{one.sentence} ({_size(one)}; probability {percent(one.probability)})" for one in found.named]
         rest = " Something else is left." if found.verdict == NAMED_AND_REST else ""
         return f"{' '.join(parts)}{_held_out(found)}{rest}{doubts}"
     if found.verdict == NOT_PHYSICS:
         return f"{' '.join(sentences[name] for name in found.decision.causes)} That explains the mismatch best.{doubts}"
     if found.verdict == GROUP:
         known = {one.name: one.probability for one in found.ranking}
-        names = ", ".join(f"{name} ({chance(known[name])})" for name in found.decision.causes if name != UNKNOWN)
+        names = ", ".join(f"{name} ({percent(known[name])})" for name in found.decision.causes if name != UNKNOWN)
         other = ", or what has no name" if UNKNOWN in found.decision.causes else ""
         return f"Something is missing ({p}): {names}{other}. These tests do not tell which.{doubts}"
     if found.verdict == UNKNOWN:
@@ -53,8 +50,9 @@ def _held_out(found: SpecimenDiagnosis) -> str:
     return f" Tests that were held out: {before:.3g} Pa without, {after:.3g} Pa with it."
 
 
-def _values(one: Ranked) -> str:
-    return ", ".join(value.text for value in one.values[:6])
+def _size(one: Ranked) -> str:
+    sizes = size_in_words(one.name, one.values)[:_VALUES]
+    return "; ".join([*sizes, one.region] if one.region else sizes)
 
 
 def assumptions_of(fit: Fit, protocol: Protocol, by_test: bool) -> tuple[str, ...]:

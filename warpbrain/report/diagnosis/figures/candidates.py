@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from warpbrain.inference.probability import percent
 from warpbrain.report.diagnosis.figures.drawing import TEXT, inlined, panels
 from warpbrain.report.generative.page import BLACK, BLUE, ORANGE, PALE
 
@@ -26,7 +27,7 @@ def candidates_figure(said: dict[str, Any]) -> str:
         chances.text(
             one["probability"],
             row,
-            f"{one['probability']:.2f} " if inside else f" {one['probability']:.2f}",
+            f"{percent(one['probability'])} " if inside else f" {percent(one['probability'])}",
             va="center",
             ha="right" if inside else "left",
             fontsize=TEXT - 1,
@@ -36,13 +37,12 @@ def candidates_figure(said: dict[str, Any]) -> str:
     chances.set_yticks(range(len(tried)), [one["mechanism"] for one in tried], fontsize=TEXT)
     chances.set_ylim(len(tried) - 0.5, -0.5)
     chances.set_xlim(0.0, 1.0)
-    chances.axvline(0.9, color=BLACK, linestyle=":", linewidth=1.0)
     evidence.axvline(0.0, color=BLACK, linewidth=0.8)
     chances.set_xlabel("probability", fontsize=TEXT)
     evidence.set_xlabel("log evidence against nothing missing", fontsize=TEXT)
     caption = (
-        "Left: probability among all candidates; dotted: 0.9, which a name needs. Right: logarithm of the evidence. "
+        "Left: probability that it acts. Right: logarithm of the evidence. "
         "Blue: named, or of the group; dotted bars: no physics, or a force without a name."
     )
-    said_best = ", ".join(f"{one['mechanism']} {one['probability']:.2f}" for one in tried[:3])
+    said_best = ", ".join(f"{one['mechanism']} {percent(one['probability'])}" for one in tried[:3])
     return inlined(figure, f"Probabilities of the candidates as bars: {said_best}.", caption)

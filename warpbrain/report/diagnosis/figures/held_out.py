@@ -27,7 +27,7 @@ def held_out_figure(said: dict[str, Any]) -> str:
         axes.barh(len(names), unit.factor * ceiling, 0.62, facecolor="white", edgecolor=GREEN, linewidth=1.4)
         axes.text(unit.factor * ceiling, len(names), f" {unit.factor * ceiling:.3g}", va="center", fontsize=TEXT)
         names.append("any smooth force")
-    words = ["Root mean square error at points that were held out."]
+    words = [f"Root mean square {unit.error} of what was held out."]
     band = fit.get(f"placebo_heldout_rmse_{unit.suffix}")
     if band is not None:
         low, high = (unit.factor * value for value in band)
@@ -37,10 +37,10 @@ def held_out_figure(said: dict[str, Any]) -> str:
             f"Grey band: nine of ten patterns that mean nothing but have as many parameters ({low:.3g} to {high:.3g} "
             f"{unit.name})."
         )
-    noise = fit.get(f"noise_{unit.suffix}")
+    noise = fit.get(f"noise_rmse_{unit.suffix}")
     if noise is not None:
         axes.axvline(unit.factor * noise, color=QUIET, linestyle=(0, (4, 3)), linewidth=1.2)
-        words.append(f"Dashed: the noise of one number that was recorded, {unit.factor * noise:.3g} {unit.name}.")
+        words.append(f"Dashed: the distance that noise alone leaves at a point, {unit.factor * noise:.3g} {unit.name}.")
     if ceiling is not None:
         words.append("Any smooth force: what a force without a name, as flexible as the data allow, would reach.")
     axes.set_yticks(range(len(names)), names, fontsize=TEXT)

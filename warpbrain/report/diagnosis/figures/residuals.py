@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.diagnosis.words import number
+from warpbrain.physics.words import number
 from warpbrain.report.diagnosis.figures.drawing import COLOURS, TEXT, inlined, panels
 from warpbrain.report.diagnosis.figures.slices import centre_of, draw_slice, frame_slice, millimetres
 from warpbrain.report.diagnosis.saved import STATES, Anatomy, Rows

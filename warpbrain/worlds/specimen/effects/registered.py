@@ -69,11 +69,11 @@ def _turns(test: Test) -> bool:
 
 
 def _situation(case: Case, instants: int) -> Situation:
-    none = np.zeros((0, 3))
+    none, axes = np.zeros((0, 3)), ("along x", "along y", "along z")
     assumed = frozenset(mechanism.kind for mechanism in case.mechanisms)
     laws = frozenset(tissue.model for tissue in case.tissues.values())
     return Situation(
-        case.mesh, case.gravity_axis, case.density, case.poisson, assumed, laws, (), (), instants, none, none, 0.0
+        case.mesh, case.gravity_axis, case.density, case.poisson, assumed, laws, (), (), instants, none, none, 0.0, axes
     )
 
 

@@ -1,4 +1,4 @@
-"""Parameters of a mechanism as a user knows them: with a unit and a standard deviation."""
+"""Parameters of a mechanism, or of what acts in a specimen, as a user knows them: with unit and standard deviation."""
 
 from __future__ import annotations
 

@@ -1,0 +1,122 @@
+"""Numbers and directions as people read them: a spread, a unit, left and right; no name of a parameter.
+
+What a mechanism says of its own numbers is in its file (`size_in_words` of `warpbrain.physics.mechanism.Mechanism`);
+where it says nothing of its own, `clauses` says what its parameters say of themselves.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.physics.values import Value
+
+if TYPE_CHECKING:
+    from warpbrain.physics.mechanism import Says
+
+#: How labels begin that keep their capital.
+_NAMES = ("Poisson", "Young's", "Ogden's")
+#: Both ends of each axis (RAS).
+_ENDS = (("left", "right"), ("posterior", "anterior"), ("inferior", "superior"))
+#: What is said where a spread is larger than what it is the spread of.
+HARDLY = "which these data hardly tell"
+
+#: What was found of the parameters of a mechanism, by name.
+Values = Mapping[str, Value]
+
+
+def number(value: float, digits: int = 2) -> str:
+    """A number with so many digits that count, without an exponent."""
+    if not math.isfinite(value):
+        return "an unknown number"
+    if value == 0.0:
+        return "0"
+    if abs(value) < 1e-4:
+        return f"{value:.{digits - 1}e}"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:z.{decimals}f}"
+
+
+def measured(value: float, sd: float, unit: str = "") -> str:
+    """A number, its standard deviation and its unit: as many digits as the deviation allows."""
+    if unit == "Pa" and abs(value) >= 1000.0:
+        value, sd, unit = 1e-3 * value, 1e-3 * sd, "kPa"
+    if not (math.isfinite(sd) and sd > 0.0):
+        text = number(value, 3)
+    elif max(abs(value), sd) < 1e-4:
+        text = f"{value:.1e} ± {sd:.0e}"
+    else:
+        first = math.floor(math.log10(sd))
+        decimals = max(0, -first + (1 if sd / 10.0**first < 2.95 else 0))
+        text = f"{value:z.{decimals}f} ± {sd:.{decimals}f}"
+    return f"{text} {unit}".rstrip()
+
+
+def towards(direction: ArrayLike) -> str:
+    """Where a direction (3,) in RAS points: the nearest of the axes and the halves between two of them.
+
+    Of two the one that it points to more is said first; empty of a direction that is none.
+    """
+    ends = _nearest(np.asarray(direction, dtype=float))
+    return f"towards {' and '.join(ends)}" if ends else ""
+
+
+def along(direction: ArrayLike) -> str:
+    """The line that a direction (3,) in RAS lies on: as `towards`, from one end of it to the other."""
+    vector = np.asarray(direction, dtype=float)
+    first, last = (" and ".join(_nearest(sign * vector)) for sign in (-1.0, 1.0))
+    return f"from {first} to {last}" if last else ""
+
+
+def _nearest(vector: NDArray[np.float64]) -> list[str]:
+    most, second = np.argsort(-np.abs(vector), kind="stable")[:2].tolist()
+    size = abs(vector)
+    if not size[most] > 0.0:
+        return []
+    # the cosine with the half between two axes against that with the axis itself
+    count = 2 if (size[most] + size[second]) / math.sqrt(2.0) > size[most] else 1
+    return [_ENDS[axis][int(vector[axis] > 0.0)] for axis in (most, second)[:count]]
+
+
+def unsure(value: Value) -> bool:
+    """Whether its spread is larger than itself, so that not even its sign is known."""
+    return value.sd > abs(value.value)
+
+
+def vector_in(values: Values, name: str) -> NDArray[np.float64]:
+    """Components (3,) of a parameter that is a vector; zero where nothing is known."""
+    found = (values.get(f"{name}_{axis}") for axis in "xyz")
+    return np.array([0.0 if one is None else one.value for one in found])
+
+
+def radius_in_words(values: Values) -> list[str]:
+    """Of what acts in a ball or on a patch; none where its radius is not known."""
+    if "radius" not in values:
+        return []
+    return [f"its radius is {measured(values['radius'].value, values['radius'].sd, 'mm')}"]
+
+
+def clauses(parameters: Mapping[str, Says], values: Values) -> list[str]:
+    """Numbers as their parameters say what they are; places and directions are said elsewhere."""
+    found = []
+    if "share" in values:
+        share = values["share"]
+        found.append(f"it is there to {measured(100.0 * share.value, 100.0 * share.sd)} %")
+    for name, value in values.items():
+        if name in parameters and parameters[name].kind in ("number", "numbers"):
+            clause = label(parameters[name].doc)
+            whose = "" if "'" in clause.split(" ")[0] else "its "
+            found.append(f"{whose}{clause} is {measured(value.value, value.sd, value.unit)}")
+    return found
+
+
+def label(doc: str) -> str:
+    """What a parameter is, from the first clause of what it says of itself that is more than a symbol."""
+    parts = [clause.strip() for clause in re.split("[;:,]", doc.rstrip("."))]
+    clause = next((clause for clause in parts if len(clause) > 3), parts[0])
+    return clause if clause.startswith(_NAMES) else clause[0].lower() + clause[1:]
