@@ -53,7 +53,9 @@ def noise_factor(positions: Floats, directions: Floats, times: Floats, sigma: Fl
 
 def outliers() -> Outliers:
     """What is believed of gross errors."""
-    return Outliers(belief("noise.gross_share"), belief("noise.gross_times"))
+    return Outliers(
+        belief("noise.gross_share"), belief("noise.gross_times"), tuple(beliefs("noise.gross_far").tolist())
+    )
 
 
 def log_scale_density(scales: Floats) -> Floats:
