@@ -51,7 +51,12 @@ def test_tables_files_and_figures(folder, tmp_path):
     assert said["discretisation"]["difference_root_mean_square_mm"] > 0.0
     assert len(said["registration"]["shift_mm"]) == 3
     assert set(said["inputs_sha256"]) == {"case.toml", "mesh.vtu", "recordings/beads.csv", "recordings/check.csv"}
-    assert said["likelihood"]["degrees_of_freedom"] == 4.0 and said["seed"] == 0
+    assert said["likelihood"]["degrees_of_freedom"] is None and 0.6 < said["likelihood"]["noise_scale"] < 1.6
+    for one, together in zip(said["predictions"], said["all_recordings"], strict=True):
+        assert together["role"] == one["role"] and together["count"] == one["count"]
+        for key in ("before", "after", "of_run"):
+            assert together[f"root_mean_square_{key}_mm"] == pytest.approx(one[f"root_mean_square_{key}"])
+    assert said["seed"] == 0
     assert said["versions"]["warpbrain"] and said["seconds"] and said["equilibria"]["check of the posterior"] == 25
     rows = (out / "predictions.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + 60 + 40

@@ -18,9 +18,9 @@ from scipy.stats import binom, kstest
 from simulated_draws import Setting, ranks
 
 PROBABILITIES = (0.5, 0.9, 0.95)
-DRAWS = 100
+DRAWS = 36
 #: Each needs its error on quadratic elements of half the size, which takes several times as long.
-DRAWS_OF_OTHER_ELEMENTS = 30
+DRAWS_OF_OTHER_ELEMENTS = 10
 SETTINGS = (
     Setting("block", 1, None, 0.03),
     Setting("block", 1, 0.2, 0.1),

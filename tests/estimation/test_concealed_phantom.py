@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from warpbrain.estimation.estimate import EstimationOptions
+from warpbrain.estimation.options import EstimationOptions
 
 REPETITIONS = 10
 BENCH = Path(__file__).parents[2] / "bench"

@@ -21,6 +21,7 @@ from warpbrain.diagnosis.sensors import Sensors, alike_near, spread_points
 from warpbrain.diagnosis.states import Hypothesis, States
 from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.inference.beliefs import belief
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
 from warpbrain.physics.mechanism import Mechanism
@@ -36,7 +37,7 @@ Floats = NDArray[np.float64]
 #: Standard deviations: of `-ln(1 - 2 nu)`, of an exponent of the law, of a share of I2, of the size of known loads.
 _VOLUME, _EXPONENT, _SECOND, _LOADS = 0.4, 2.0, 0.25, 0.04
 #: Of a rigid error of registration: shift [m] and turn [rad].
-_SHIFT, _TURN = 1e-3, math.radians(1.0)
+_SHIFT, _TURN = belief("registration.shift"), belief("registration.turn")
 REGISTRATION_SD = np.repeat([_SHIFT, _TURN], 3)
 #: Error of the mesh beside what a finer one shows: the largest part of the displacement, and how far [m] it is alike.
 FRACTION, _ALIKE = 0.06, 0.02

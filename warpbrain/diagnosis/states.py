@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.boundary import Boundary, Fixed
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.realigned import realigned
 from warpbrain.diagnosis.sensors import Sensors, sensors_at
 from warpbrain.diagnosis.stiffness_field import StiffnessField, stiffness_modes
 from warpbrain.errors import SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.realigned import realigned
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.composition import CompositionError
 from warpbrain.physics.mechanism import Mechanism
