@@ -158,7 +158,6 @@ def ranks(setting: Setting, count: int, seed: int = 0) -> Floats:
             discretisation=Discretisation() if setting.other_elements else None,
             registration=registration,
             samples=25,
-            chain=120,
             seed=number,
         )
         try:
