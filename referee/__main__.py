@@ -1,4 +1,4 @@
-"""The referee: ``python -m referee make|run|see|score|calibrate``; ``mesh`` makes its meshes. See docs/referee.md."""
+"""The referee: ``python -m referee make|run|see|analyse|score|calibrate|mesh``. See docs/referee.md."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m referee", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("make", help="make a set of cases and seal what is true of them")
-    make.add_argument("--set", required=True, choices=("development", "calibration", "scored", "traps"), dest="which")
-    make.add_argument("--count", type=int, help="how many; 18, 80, 120 or 60 if absent")
+    sets = ("development", "calibration", "scored", "traps", "pairs", "unknown")
+    make.add_argument("--set", required=True, choices=sets, dest="which")
+    make.add_argument("--count", type=int, help="how many; 24, 80, 160, 60, 100 or 100 if absent")
     make.add_argument("--out", type=Path, required=True)
     make.add_argument(
         "--geometry", nargs="+", help="bodies, in turn; phantom 0603 or, for what is not scored, phantom 0529"
@@ -29,21 +30,36 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--workers", type=int, default=1, help="processes")
     run.add_argument("--tool-args", default="", help='more for the tool, such as "--ablation no-nuisances"')
     run.add_argument("--limit", type=float, help="seconds of a case, after which it counts as without a diagnosis")
+    run.add_argument(
+        "--leave-out",
+        metavar="MECHANISM",
+        help="take a mechanism out of the tool's dictionary; 'each': out of each case its own, which needs --labels",
+    )
+    run.add_argument("--labels", type=Path, help="with --leave-out: run the cases of these alone that it is true of")
+    run.add_argument("--commitments", type=Path, help="the published hashes; beside the labels if absent")
+    analyse = commands.add_parser("analyse", help="open the labels and find how often the optimal analyst is right")
+    analyse.add_argument(
+        "--out", type=Path, required=True, help="gets a file for each case; score --analysed reads them"
+    )
+    analyse.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes")
     see = commands.add_parser("see", help="open the labels and find how much what acts stands out for the tool")
     score = commands.add_parser("score", help="open the labels and compare")
     score.add_argument("--out", type=Path, required=True)
     score.add_argument("--no-baselines", action="store_true", help="leave the baselines out")
+    score.add_argument("--analysed", type=Path, help="where analyse wrote: its shares stand beside the tool's")
     score.add_argument(
         "--beside", action="append", default=[], metavar="NAME=DIR", help="another run to compare with; may be repeated"
     )
-    calibrate = commands.add_parser("calibrate", help="fit the tool's temperature and offsets to a calibration set")
+    calibrate = commands.add_parser("calibrate", help="fit the numbers of the tool's calibration.json")
+    calibrate.add_argument("--write", type=Path, help="that of the package if absent")
     for parser_of in (score, calibrate):
         parser_of.add_argument("--cases", type=Path, required=True)
-    for parser_of in (see, score, calibrate):
+    for parser_of in (see, score, calibrate, analyse):
         parser_of.add_argument("--labels", type=Path, required=True)
         parser_of.add_argument(
             "--commitments", type=Path, help="the published hashes; commitments.txt beside the labels if absent"
         )
+    for parser_of in (see, score, calibrate):
         parser_of.add_argument("--diagnoses", type=Path, required=True, help="where run wrote")
     commands.add_parser("mesh", help="make the meshes of truths anew, with MMG")
     return parser
@@ -64,7 +80,9 @@ def _make(given: argparse.Namespace) -> int:
     from referee.make import make_set
     from referee.plan import SETS
 
-    geometries = given.geometry or (["phantom", "phantom", "0603" if given.which in ("scored", "traps") else "0529"])
+    geometries = given.geometry or (
+        ["phantom", "phantom", "0529" if given.which in ("development", "calibration") else "0603"]
+    )
     for name in geometries:
         if name not in NAMES:
             raise InputError(f"--geometry {name}: expected one of {', '.join(NAMES)}")
@@ -80,7 +98,34 @@ def _run(given: argparse.Namespace) -> int:
 
     if given.limit is not None and not given.limit > 0.0:
         raise InputError(f"--limit {given.limit:g}: expected more than 0 s")
-    return run_all(given.cases, given.out, given.device, given.workers, given.tool_args.split(), given.limit)
+    left_out = _left_out(given) if given.leave_out else None
+    words = given.tool_args.split()
+    return run_all(given.cases, given.out, given.device, given.workers, words, given.limit, left_out)
+
+
+def _left_out(given: argparse.Namespace) -> dict[str, str]:
+    """By case the mechanism that its dictionary is without."""
+    from referee.draw import MECHANISMS
+    from referee.labels import open_labels
+    from referee.run import case_folders
+
+    if given.leave_out not in (*MECHANISMS, "each"):
+        raise InputError(f"--leave-out {given.leave_out}: expected each or one of {', '.join(MECHANISMS)}")
+    if given.labels is None:
+        if given.leave_out == "each":
+            raise InputError("--leave-out each: needs --labels, which say what is to be left out")
+        return {folder.name: given.leave_out for folder in case_folders(given.cases)}
+    opened = open_labels(given.labels, _commitments(given))
+    alone = {name: label["names"][0] for name, label in opened.items() if label["kind"] == "effect"}
+    return {name: true for name, true in alone.items() if given.leave_out in ("each", true)}
+
+
+def _analyse(given: argparse.Namespace) -> int:
+    from referee.analyst import analyse
+    from referee.labels import open_labels
+
+    analyse(open_labels(given.labels, _commitments(given)), given.out, given.workers)
+    return 0
 
 
 def _see(given: argparse.Namespace) -> int:
@@ -103,16 +148,23 @@ def _score(given: argparse.Namespace) -> int:
         beside[name] = Path(folder)
     print(
         score_all(
-            given.cases, given.labels, _commitments(given), given.diagnoses, given.out, not given.no_baselines, beside
+            given.cases,
+            given.labels,
+            _commitments(given),
+            given.diagnoses,
+            given.out,
+            not given.no_baselines,
+            beside,
+            given.analysed,
         )
     )
     return 0
 
 
 def _calibrate(given: argparse.Namespace) -> int:
-    from referee.calibrate import calibrate
+    from referee.calibrate import FILE, calibrate
 
-    print(calibrate(given.cases, given.labels, _commitments(given), given.diagnoses))
+    print(calibrate(given.cases, given.labels, _commitments(given), given.diagnoses, given.write or FILE))
     return 0
 
 
@@ -128,7 +180,15 @@ def _mesh(given: argparse.Namespace) -> int:
     return 0
 
 
-_COMMANDS = {"make": _make, "run": _run, "see": _see, "score": _score, "calibrate": _calibrate, "mesh": _mesh}
+_COMMANDS = {
+    "make": _make,
+    "run": _run,
+    "see": _see,
+    "analyse": _analyse,
+    "score": _score,
+    "calibrate": _calibrate,
+    "mesh": _mesh,
+}
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,29 +1,35 @@
-"""Reads what the tool said of a calibration set, and prints the numbers of `warpbrain/diagnosis/calibration.py`."""
+"""Reads what the tool said of a calibration set, and writes the file of all its numbers that are fitted."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from referee.diagnoses import UNKNOWN
-from referee.intervals import share
+import warpbrain
+from referee.decision import decide
+from referee.diagnoses import NOT_PHYSICS, UNKNOWN, Tried
+from referee.intervals import Share, share
 from referee.labels import open_labels
 from referee.outcomes import Outcome, read_outcomes
 from referee.reliability import reliability
-from referee.scores import ALPHA
-from referee.temperature import Ballots, Scale, conformal, fit, held_out, intervals
-from warpbrain.diagnosis.calibration import BODIES
+from referee.temperature import TRAITS, Ballot, Floats, Scale, fit, held_out, intervals, log_loss
 from warpbrain.errors import InputError
 
-#: Fewest cases that a temperature is fitted to.
+#: Where the tool reads it.
+FILE = Path(warpbrain.__file__).parent / "inference" / "calibration.json"
+#: Fewest cases that a scale is fitted to.
 FEWEST = 10
+#: What a false name may cost, and the share of spoken names that may be wrong.
+PRICES, WRONG = (5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0, 80.0), 0.03
 
 
-def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path) -> str:
-    """Fit the temperature and offsets, and the threshold of the alarm.
+def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path, write: Path = FILE) -> str:
+    """Fit temperature, weights of sets and the price of a false name, and write them.
 
     Parameters
     ----------
@@ -31,6 +37,8 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path) -> 
         Folders of case folders, of sealed labels and of what `run` wrote; cases that are not in `cases` are left out.
     commitments : Path
         Published hashes of the labels.
+    write : Path
+        File that is written.
 
     Returns
     -------
@@ -40,64 +48,109 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path) -> 
     Raises
     ------
     InputError
-        If a label or a diagnosis is not one, or there are too few cases in which something is missing.
+        If a label or a diagnosis is not one, or there are too few cases whose truth was tried.
     """
     opened = {name: label for name, label in open_labels(labels, commitments).items() if (cases / name).is_dir()}
     outcomes, missing = read_outcomes(opened, diagnoses)
-    asked = [o for o in outcomes if o.kind != "none" and o.said.p_value <= ALPHA]
-    useful = [o for o in asked if any(o.holds(row) for row in o.said.tried)]
+    ballots = [Ballot(o.said.hypotheses, np.array([true_of(o, h) for h in o.said.hypotheses])) for o in outcomes]
+    useful = [(o, b) for o, b in zip(outcomes, ballots, strict=True) if b.right.any()]
     if len(useful) < FEWEST:
         raise InputError(
-            f"{diagnoses}: {len(useful)} cases in which something is missing raised an alarm and had the truth among "
-            f"what was tried; expected {FEWEST} or more"
+            f"{diagnoses}: the truth was among the hypotheses in {len(useful)} of {len(outcomes)} cases; expected "
+            f"{FEWEST} or more"
         )
-    ballots = ballots_of(useful)
-    found, (low, high) = fit(ballots), intervals(ballots)
-    now = Scale(BODIES.temperature, BODIES.unknown, BODIES.alternative)
-    kinds = ", ".join(f"{sum(o.kind == kind for o in useful)} {kind}" for kind in ("effect", "two", "outside", "trap"))
+    chosen = [b for _, b in useful]
+    scale, ends, apart = fit(chosen), intervals(chosen), held_out(chosen)
+    losses, spoken = priced([o for o, _ in useful], chosen, apart, losses_of(write))
+    values = dict(zip(("temperature", *TRAITS), (scale.temperature, *scale.weights), strict=True))
+    told = {
+        "source": f"`python -m referee calibrate`, {len(useful)} cases of the set {cases.resolve().parent.name}",
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        "temperature": round(scale.temperature, 3),
+        "log_weights": {trait: round(weight, 3) for trait, weight in zip(TRAITS, scale.weights, strict=True)},
+        "losses": losses,
+        "intervals": {name: np.round(ends[:, k], 3).tolist() for k, name in enumerate(values)},
+    }
+    write.write_text(json.dumps(told, indent=1) + "\n", encoding="ascii")
+    kinds = ", ".join(f"{sum(o.kind == kind for o, _ in useful)} {kind}" for kind in _KINDS)
     lines = [
-        f"{len(outcomes)} cases, {len(missing)} without a diagnosis; fitted to {len(useful)} with an alarm: {kinds}.",
-        f"Left out: {len(asked) - len(useful)} whose truth was not among what was tried.",
+        f"{len(outcomes)} cases, {len(missing)} without a diagnosis; fitted to {len(useful)}: {kinds}.",
+        f"Left out: {len(outcomes) - len(useful)} whose truth was not among the hypotheses.",
         "",
-        f"{'':22}{'now':>8}{'fitted':>9}   95 % interval",
+        *(f"{name:14}{v:8.2f}   {ends[0, k]:.2f} to {ends[1, k]:.2f}" for k, (name, v) in enumerate(values.items())),
+        "",
+        f"A false name costs {losses['false name']:g}: names right by what the other four fifths give: {spoken}.",
+        *_before_and_after(chosen, apart),
+        f"Written: {write.name}",
     ]
-    for name in ("temperature", "unknown", "alternative"):
-        ends = f"{getattr(low, name):.2f} to {getattr(high, name):.2f}"
-        lines.append(f"{name:22}{getattr(now, name):8.2f}{getattr(found, name):9.2f}   {ends}")
-    lines += ["", *_before_and_after(ballots, now), "", *_alarm(outcomes)]
     return "\n".join(lines)
 
 
-def ballots_of(outcomes: Sequence[Outcome]) -> Ballots:
-    """Evidences of what was tried in each case, in one table."""
-    count = max(len(o.said.tried) for o in outcomes)
-    evidence = np.full((len(outcomes), count), -np.inf)
-    flags = np.zeros((3, len(outcomes), count), dtype=bool)
-    for i, o in enumerate(outcomes):
-        for k, row in enumerate(o.said.tried):
-            assert row.log_evidence is not None
-            evidence[i, k] = row.log_evidence
-            flags[:, i, k] = o.holds(row), row.name == UNKNOWN, row.alternative
-    return Ballots(evidence, *flags)
+_KINDS = ("none", "effect", "two", "outside", "trap")
 
 
-def _before_and_after(ballots: Ballots, now: Scale) -> list[str]:
-    tried = np.isfinite(ballots.evidence)
-    lines = ["mean log loss and calibration error of all probabilities:"]
-    for name, p in (("now", ballots.probabilities(now)), ("fitted to the other four fifths", held_out(ballots))):
-        true = (p * ballots.right).sum(axis=1)
-        found = reliability(p[tried], ballots.right[tried])
-        loss = -np.log(np.maximum(true, 1e-300)).mean()
-        lines.append(f"  {name}: {loss:.3f}, {found['ece']:.3f}")
+def true_of(outcome: Outcome, tried: Tried) -> bool:
+    """Whether a set of causes is the true one; what is no physics may act beside what is."""
+    if tried.physics:
+        named = all(map(outcome.right, tried.physics)) and UNKNOWN not in tried.causes
+        return named and len(tried.physics) == len(outcome.label["names"])
+    return tried.causes == frozenset(_NAMELESS.get(outcome.kind, ("-",)))
+
+
+_NAMELESS: Mapping[str, tuple[str, ...]] = {"none": (), "outside": (UNKNOWN,), "trap": (NOT_PHYSICS,)}
+
+
+def losses_of(file: Path) -> dict[str, float]:
+    """The table of losses of a calibration; that of the package if there is none yet."""
+    read = json.loads((file if file.exists() else FILE).read_text(encoding="utf-8"))
+    return dict(read["losses"])
+
+
+def priced(
+    outcomes: Sequence[Outcome],
+    ballots: Sequence[Ballot],
+    probabilities: Sequence[Floats],
+    losses: Mapping[str, float],
+) -> tuple[dict[str, float], Share]:
+    """The least price of a false name at which spoken names are right as often as is asked; the highest if none is.
+
+    All that is false costs in proportion; silence, what is left out and groups cost what they did.
+    """
+    for price in PRICES:
+        factor = price / losses["false name"]
+        now = {name: round(value * factor, 3) if name in _FALSE else value for name, value in losses.items()}
+        spoken = share(_spoken(outcomes, ballots, probabilities, now))
+        if spoken.hits >= (1.0 - WRONG) * spoken.of:
+            break
+    return now, spoken
+
+
+#: What costs in proportion to a false name.
+_FALSE = ("false name", "name where nothing is", "false group")
+
+
+def _spoken(
+    outcomes: Sequence[Outcome], ballots: Sequence[Ballot], probabilities: Sequence[Floats], losses: Mapping[str, float]
+) -> list[bool]:
+    right = []
+    for outcome, ballot, p in zip(outcomes, ballots, probabilities, strict=True):
+        posterior: dict[frozenset[str], float] = {}
+        for one, value in zip(ballot.hypotheses, p.tolist(), strict=True):
+            # what is no physics beside what is changes no verdict
+            causes = one.causes - {NOT_PHYSICS} if len(one.causes) > 1 else one.causes
+            posterior[causes] = posterior.get(causes, 0.0) + value
+        said = decide(posterior, losses)
+        if said.verdict in ("named", "named + rest"):
+            right.append(all(map(outcome.right, said.causes)))
+    return right
+
+
+def _before_and_after(ballots: Sequence[Ballot], apart: Sequence[Floats]) -> list[str]:
+    right = np.concatenate([b.right for b in ballots])
+    plain = [Scale().probabilities(b.hypotheses) for b in ballots]
+    lines = ["", f"mean log loss at a temperature of 1: {log_loss(Scale(), ballots):.3f}; calibration error:"]
+    for name, rows in (("at a temperature of 1", plain), ("by the other four fifths", apart)):
+        found: dict[str, Any] = reliability(np.concatenate(rows), right)
+        lines.append(f"  {name}: {found['ece']:.3f}")
         lines += [f"    stated {q:.2f}: right {r:.2f} of {n}" for q, r, n in found["rows"]]
     return lines
-
-
-def _alarm(outcomes: Sequence[Outcome]) -> list[str]:
-    p_values: NDArray[np.float64] = np.array([o.said.p_value for o in outcomes if o.kind == "none"])
-    threshold = conformal(p_values.tolist(), ALPHA)
-    told = "too few of them" if threshold is None else f"p < {threshold:.4f}"
-    return [
-        f"nothing missing, p <= {ALPHA:g}: {share(bool(p <= ALPHA) for p in p_values)}",
-        f"conformal threshold of the alarm for {ALPHA:g}: {told}",
-    ]

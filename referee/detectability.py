@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
@@ -14,6 +16,34 @@ Floats = NDArray[np.float64]
 
 #: For the upper bound: error of registration [m] and [rad], logarithm of stiffness of each tissue.
 UPPER_SHIFT, UPPER_TURN, UPPER_STIFFNESS = 2e-3, float(np.deg2rad(2.0)), 0.5
+
+#: Standard deviation of what another effect may be as well, in parts of the size at which it stands out by 1.
+WIDE = 100.0
+
+
+def covariance(sight: Sight, unknown: Floats) -> Floats:
+    """Covariance (rows, rows) of noise, registration, and rows (k, rows) that are not known by a unit each."""
+    spreads = np.repeat([SHIFT, TURN], 3) / np.sqrt(3.0)
+    columns = np.concatenate([spreads[:, None] * sight.rigid, unknown])
+    whole: Floats = sight.noise + columns.T @ columns
+    return whole
+
+
+def conditional(delta: Floats, others: Floats, precision: Floats) -> float:
+    """``d`` of a change (rows,) where amounts of others (k, rows) are not known, by Woodbury's identity.
+
+    Parameters
+    ----------
+    delta, others : arrays
+    precision : (rows, rows) array
+        Inverse of the covariance without the others.
+    """
+    own = precision @ delta
+    stand = np.sqrt(np.einsum("kr,rs,ks->k", others, precision, others))
+    columns = others[stand > 0.0] / stand[stand > 0.0, None]
+    gram = columns @ precision @ columns.T + np.eye(len(columns)) / WIDE**2
+    seen = columns @ own
+    return float(np.sqrt(max(delta @ own - seen @ np.linalg.solve(gram, seen), 0.0)))
 
 
 class Detectability:
@@ -31,16 +61,19 @@ class Detectability:
 
     def __init__(self, sight: Sight, unknowns: Unknowns) -> None:
         self._sight = sight
-        spreads = np.repeat([SHIFT, TURN], 3) / np.sqrt(3.0)
-        rigid = spreads[:, None] * sight.rigid
-        columns = np.concatenate([rigid, [sight.rows(change) for change in unknowns.drawn]])
-        self._factor = cho_factor(sight.noise + columns.T @ columns)
+        self._factor = cho_factor(covariance(sight, np.stack([sight.rows(change) for change in unknowns.drawn])))
         self._upper = cho_factor(_upper(sight, unknowns))
 
     def d(self, change: Change) -> float:
         """Of all recordings."""
         delta = self._sight.rows(change)
         return float(np.sqrt(delta @ cho_solve(self._factor, delta)))
+
+    def given(self, change: Change, others: Sequence[Change]) -> float:
+        """Of all recordings, where the amounts of other changes are not known."""
+        rows = np.stack([self._sight.rows(other) for other in others])
+        precision = cho_solve(self._factor, np.eye(rows.shape[1]))
+        return conditional(self._sight.rows(change), rows, precision)
 
     def upper(self, change: Change) -> float:
         """The old measure, which run 1 was drawn and scored by: of points alone.

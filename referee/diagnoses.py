@@ -19,6 +19,8 @@ NAMING = ("named", "group", "named + rest")
 TOGETHER = 0.9
 #: A force without a name.
 UNKNOWN = "unknown"
+#: What is no physics, whichever of it.
+NOT_PHYSICS = "not physics"
 _UNITS = {"": 1.0, "1": 1.0, "%": 0.01, "mm": 1e-3, "m": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N": 1.0, "s": 1.0} | {
     "1/Pa": 1.0,
     "1/(Pa s)": 1.0,
@@ -59,6 +61,27 @@ class Ranked:
 
 
 @dataclass(frozen=True)
+class Tried:
+    """A set of causes that was tried.
+
+    Attributes
+    ----------
+    causes : frozenset of str
+        Names of physics, `UNKNOWN`, and `NOT_PHYSICS` whichever of it; the empty set is that nothing acts.
+    log_density : float
+        Log evidence and log prior together.
+    """
+
+    causes: frozenset[str]
+    log_density: float
+
+    @property
+    def physics(self) -> frozenset[str]:
+        """What has a name."""
+        return self.causes - {UNKNOWN, NOT_PHYSICS}
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """What the tool said.
 
@@ -82,6 +105,8 @@ class Diagnosis:
         [m]
     heldout : dict of str to float
         Error at what was not fitted [m]: declared, refitted, explained, as far as it is told.
+    hypotheses : tuple of Tried
+        Every set of causes that has a probability.
     """
 
     verdict: str
@@ -93,6 +118,7 @@ class Diagnosis:
     parameters: dict[str, tuple[float, float | None]]
     centre: tuple[float, float, float] | None
     heldout: dict[str, float]
+    hypotheses: tuple[Tried, ...] = ()
 
     @property
     def alarm(self) -> bool:
@@ -172,7 +198,14 @@ def _diagnosis(data: dict[str, Any]) -> Diagnosis:
         parameters={name: _parameter(said) for name, said in (data.get("parameters") or {}).items()},
         centre=None if centre is None else (float(centre[0]), float(centre[1]), float(centre[2])),
         heldout=_heldout(data.get("fit") or {}),
+        hypotheses=tuple(_tried(row) for row in data.get("hypotheses") or ()),
     )
+
+
+def _tried(row: dict[str, Any]) -> Tried:
+    kinds = {"physics": None, UNKNOWN: UNKNOWN, NOT_PHYSICS: NOT_PHYSICS}
+    causes = frozenset(kinds[kind] or name for name, kind in zip(row["causes"], row["kinds"], strict=True))
+    return Tried(causes, float(row["log_evidence"]) + float(row["log_prior"]))
 
 
 def _parameter(said: dict[str, Any]) -> tuple[float, float | None]:

@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from referee.body import Body
 from referee.effects import (
     Asymmetry,
+    Attraction,
     Contact,
     Effect,
     Gravity,
     Inclusion,
     Pressure,
     PreStress,
+    Stripes,
     Swelling,
+    Swirl,
     Tether,
     Traction,
+    UniformForce,
     Viscoelasticity,
     Wire,
 )
@@ -34,6 +40,12 @@ Random = np.random.Generator
 WANTED = (2.5, 32.0)
 #: Largest angle [rad] between where gravity points and where the case says.
 _TILTED = np.deg2rad(8.0)
+#: Least angle [rad] between a uniform force outside the dictionary and the line of gravity.
+_ASIDE = np.deg2rad(40.0)
+#: Least and largest rigid motion of the trap `registration`: shift [m] and turn [rad].
+RIGID_SHIFT, RIGID_TURN = (0.003, 0.008), (float(np.deg2rad(2.0)), float(np.deg2rad(8.0)))
+#: Of the traps `noise` and `stiffness`: factor on all noise, spread of the logarithm of stiffness.
+NOISY, UNEVEN = 3.0, 0.6
 #: How far a local effect is from what is held [m].
 _AWAY = 0.03
 
@@ -78,9 +90,10 @@ def _traction(random: Random, setting: Setting) -> Effect:
 
 def _contact(random: Random, setting: Setting) -> Effect:
     body = setting.body
-    nodes = np.flatnonzero(body.nodes("side"))
+    support = "side" if random.random() < 0.5 else "fixed"
+    nodes = np.flatnonzero(body.nodes(support))
     centre = _place(body.points[random.choice(nodes)])
-    return Contact(size=0.03, centre=centre, lifts=bool(random.random() < 0.5))
+    return Contact(size=0.03, centre=centre, lifts=bool(random.random() < 0.5), support=support)
 
 
 def _swelling(random: Random, setting: Setting) -> Effect:
@@ -126,10 +139,35 @@ def _pre_stress(random: Random, setting: Setting) -> Effect:
 
 
 def _wire(random: Random, setting: Setting) -> Effect:
-    here, there = (_surface(random, setting.body)[0] for _ in range(2))
-    while np.linalg.norm(np.subtract(here, there)) < 0.05:
-        there = _surface(random, setting.body)[0]
+    here, there = _apart(lambda: _surface(random, setting.body)[0], 0.05)
     return Wire(size=0.1, centre=here, other=there, radius=float(random.uniform(0.008, 0.014)))
+
+
+def _uniform_force(random: Random, setting: Setting) -> Effect:
+    direction = unit(random.normal(size=3))
+    while abs(direction @ np.array(DOWN)) > np.cos(_ASIDE):
+        direction = unit(random.normal(size=3))
+    return UniformForce(size=200.0, direction=_place(direction))
+
+
+def _swirl(random: Random, setting: Setting) -> Effect:
+    axis = _place(unit(random.normal(size=3)))
+    length = float(random.uniform(0.02, 0.04))
+    return Swirl(size=500.0, centre=_inside(random, setting.body), axis=axis, length=length)
+
+
+def _attraction(random: Random, setting: Setting) -> Effect:
+    here, there = _apart(lambda: _inside(random, setting.body), 0.03)
+    return Attraction(size=0.1, centre=here, other=there, radius=float(random.uniform(0.01, 0.016)))
+
+
+def _stripes(random: Random, setting: Setting) -> Effect:
+    return Stripes(
+        size=100.0,
+        direction=_place(unit(random.normal(size=3))),
+        wavelength=float(random.uniform(0.025, 0.05)),
+        phase=float(random.uniform(0.0, 2.0 * np.pi)),
+    )
 
 
 _KINDS: dict[str, Callable[[Random, Setting], Effect]] = {
@@ -144,6 +182,10 @@ _KINDS: dict[str, Callable[[Random, Setting], Effect]] = {
     "tether": _tether,
     "pre-stress": _pre_stress,
     "wire": _wire,
+    "uniform-force": _uniform_force,
+    "swirl": _swirl,
+    "attraction": _attraction,
+    "stripes": _stripes,
 }
 #: Names of the tool's mechanisms that truths may have.
 MECHANISMS = tuple(_KINDS)[:8]
@@ -152,16 +194,17 @@ OUTSIDE = tuple(_KINDS)[8:]
 
 
 def _trap_registration(random: Random, setting: Setting) -> Setting:
-    shift = 0.005 * unit(random.normal(size=3))
-    turn = np.deg2rad(2.5) * unit(random.normal(size=3))
+    # an exact rigid motion: the turn is finite
+    shift = random.uniform(*RIGID_SHIFT) * unit(random.normal(size=3))
+    turn = random.uniform(*RIGID_TURN) * unit(random.normal(size=3))
     return replace(setting, shift=_place(shift), turn=_place(turn))
 
 
 _TRAPS: dict[str, Callable[[Random, Setting], Setting]] = {
     "registration": _trap_registration,
     "mispaired": lambda random, setting: replace(setting, mispaired=0.12),
-    "noise": lambda random, setting: replace(setting, noise=3.0, declares_sigma=True),
-    "stiffness": lambda random, setting: replace(setting, field_sd=0.6, field_length=0.02),
+    "noise": lambda random, setting: replace(setting, noise=NOISY, declares_sigma=True),
+    "stiffness": lambda random, setting: replace(setting, field_sd=UNEVEN, field_length=0.02),
     "coarse": lambda random, setting: replace(setting, mesh="phantom-coarse"),
     "segmentation": lambda random, setting: replace(setting, bent=float(random.uniform(0.001, 0.002))),
 }
@@ -186,24 +229,39 @@ def _place(vector: Floats) -> Place:
 def _free(body: Body, points: Floats) -> NDArray[np.bool_]:
     """Which points are away from what is held."""
     held = body.points[body.nodes("fixed") | body.nodes("side")]
-    return np.array([np.linalg.norm(held - point, axis=1).min() > _AWAY for point in points])
+    found: NDArray[np.bool_] = cKDTree(held).query(points)[0] > _AWAY
+    return found
+
+
+# many effects are drawn in one body
+@lru_cache(maxsize=4)
+def _surface_of(body: Body, away: float) -> tuple[NDArray[np.int64], Floats]:
+    """Nodes of the outer surface that are so far from what is held, and area vectors of all nodes."""
+    other = body.nodes("ventricle") | body.nodes("superior")
+    nodes = np.setdiff1d(np.unique(body.outer.nodes[:, :3]), np.flatnonzero(other))
+    return nodes[_free(body, body.points[nodes])], body.outer.spread(body.outer.vectors(body.points))
 
 
 def _surface(random: Random, body: Body) -> tuple[Place, Floats]:
     """A point of the outer surface and its outward normal."""
-    other = body.nodes("ventricle") | body.nodes("superior")
-    nodes = np.setdiff1d(np.unique(body.outer.nodes[:, :3]), np.flatnonzero(other))
-    nodes = nodes[_free(body, body.points[nodes])]
+    nodes, normals = _surface_of(body, _AWAY)
     node = int(random.choice(nodes))
-    normals = body.outer.spread(body.outer.vectors(body.points))
     around = np.linalg.norm(body.points - body.points[node], axis=1) < 0.01
     return _place(body.points[node]), unit(normals[around].sum(axis=0))
+
+
+def _apart(draw: Callable[[], Place], least: float) -> tuple[Place, Place]:
+    """Two places that are at least so far apart [m]."""
+    here, there = draw(), draw()
+    while np.linalg.norm(np.subtract(here, there)) < least:
+        there = draw()
+    return here, there
 
 
 def _inside(random: Random, body: Body) -> Place:
     """A point well within the tissue."""
     places = body.centroids[random.permutation(len(body.centroids))[:400]]
     surface = body.points[np.unique(body.outer.nodes[:, :3])]
-    depth = np.array([np.linalg.norm(surface - place, axis=1).min() for place in places])
+    depth = cKDTree(surface).query(places)[0]
     deep = places[(depth > 0.006) & _free(body, places)]
     return _place(deep[0])

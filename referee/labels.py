@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from concealed.sealing import fingerprint, open_sealed, read_sealed, sealed, write_sealed
 from referee.observe import seen
 from referee.plan import Planned
+from referee.sizing import Sized
 from referee.truth import Truth
 from warpbrain.errors import InputError
 
@@ -34,10 +35,10 @@ def label_of(name: str, plan: Planned, truth: Truth, attempts: list[str]) -> dic
     clean = truth.effect(fitted)
     noise = seen(truth, checked, 2) - _registered(truth, checked)
     effects = []
-    for one in truth.found:
-        stands = {"detectability": one.d, "upper": one.upper, "wanted": one.wanted}
+    for one, given in zip(truth.found, truth.given, strict=True):
+        stands = {"detectability": one.d, "conditional": given, "upper": one.upper, "wanted": one.wanted}
         told = {name: _number(value) for name, value in stands.items()}
-        effects.append({**one.effect.told(), **told, "drawn_again": one.again})
+        effects.append({**one.effect.told(), **told, "drawn_again": one.again, **_alone(truth, one)})
     return {
         "case": name,
         "kind": plan.kind,
@@ -57,6 +58,19 @@ def label_of(name: str, plan: Planned, truth: Truth, attempts: list[str]) -> dic
         "check_noise_m": _number(np.sqrt((noise**2).sum(axis=2).mean())),
         "forces_left": _number(truth.left),
         "attempts": attempts,
+    }
+
+
+def _alone(truth: Truth, one: Sized) -> dict[str, Any]:
+    """What one of several effects changes to first order of what is recorded, by the names that all together have."""
+    if len(truth.found) < 2:
+        return {}
+    move = one.change.move[:, truth.sensors.fitted]
+    times = max(1, len(truth.setting.times))
+    return {
+        "clean_effect_m": _array(np.repeat(move, times // len(move), axis=0)),
+        "clean_effect_on_wall_m": _array(truth.sensors.on_wall(one.change.move[-1])),
+        "clean_effect_n": _array(one.change.force),
     }
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from referee.diagnoses import UNKNOWN, Diagnosis, Ranked, read_diagnosis
-from referee.run import DIAGNOSIS
+from referee.run import DIAGNOSIS, read_runs
 from referee.seen_by_tool import read_seen
 
 
@@ -26,17 +26,24 @@ class Outcome:
     said : Diagnosis
     seen : float or None
         How much the effects stand out for the tool, see `referee.seen_by_tool`; None if it was not found out.
+    seen_given : tuple of float
+        The same of each of two where the size of the other is not known; nothing if it was not found out.
+    left_out : str
+        Mechanism that the tool's dictionary was without.
     """
 
     name: str
     label: Mapping[str, Any]
     said: Diagnosis
     seen: float | None = None
+    seen_given: tuple[float, ...] = ()
+    left_out: str = ""
 
     @property
     def kind(self) -> str:
-        """none, effect, two, outside or trap."""
-        return str(self.label["kind"])
+        """none, effect, two, outside or trap; left out: an effect whose mechanism the dictionary was without."""
+        kind = str(self.label["kind"])
+        return "left out" if kind == "effect" and self.truth == self.left_out else kind
 
     @property
     def truth(self) -> str:
@@ -55,6 +62,12 @@ class Outcome:
         return float(self.label["detectability"])
 
     @property
+    def given(self) -> tuple[float, ...]:
+        """How much each effect stands out where those of the others are not known; nothing if the label is older."""
+        effects = self.label["effects"]
+        return tuple(float(e["conditional"]) for e in effects) if all("conditional" in e for e in effects) else ()
+
+    @property
     def upper(self) -> float:
         """The same by the measure of run 1, which knows noise, a rigid motion and the stiffness of tissues alone."""
         return float(self.label.get("upper", self.label["detectability"]))
@@ -67,14 +80,14 @@ class Outcome:
     def right(self, name: str) -> bool:
         """Whether a name is that of something that acts."""
         also = [other for effect in self.label["effects"] for other in effect["also"]]
-        return self.kind != "trap" and name in (*self.label["names"], *also)
+        return self.kind not in ("trap", "left out") and name in (*self.label["names"], *also)
 
     def holds(self, row: Ranked) -> bool:
         """Whether a candidate is true: all its parts act; the unknown outside the dictionary; no physics in a trap."""
         if row.alternative:
             return self.kind == "trap"
         if row.name == UNKNOWN:
-            return self.kind == "outside"
+            return self.kind in ("outside", "left out")
         return all(self.right(part) for part in row.parts)
 
     @property
@@ -95,7 +108,8 @@ class Outcome:
     @property
     def held(self) -> bool:
         """Whether it gives the right name, alone or in a group; outside the dictionary that of the unknown."""
-        right = {name for name in self.said.said if self.right(name) or (self.kind == "outside" and name == UNKNOWN)}
+        nameless = self.kind in ("outside", "left out")
+        right = {name for name in self.said.said if self.right(name) or (nameless and name == UNKNOWN)}
         return self.named or (self.said.verdict == "group" and bool(right))
 
     @property
@@ -145,10 +159,13 @@ def read_outcomes(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> t
     """Outcomes of all cases of which there is a diagnosis, and the names of those of which there is none."""
     found, missing = [], []
     seen = read_seen(diagnoses)
+    left_out = {row["case"]: row.get("left_out") or "" for row in read_runs(diagnoses)}
     for name, label in labels.items():
         file = diagnoses / name / DIAGNOSIS
         if file.exists():
-            found.append(Outcome(name, label, read_diagnosis(file), seen.get(name)))
-        else:
+            whole, *given = seen.get(name) or [None]
+            said = read_diagnosis(file)
+            found.append(Outcome(name, label, said, whole, tuple(given), left_out.get(name, "")))
+        elif not any(left_out.values()) or name in left_out:
             missing.append(name)
     return found, missing

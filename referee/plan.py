@@ -11,12 +11,14 @@ import numpy as np
 from referee.draw import MECHANISMS, OUTSIDE, TRAPS
 
 #: Sets, and how many cases each has if nobody says.
-SETS = {"development": 18, "calibration": 80, "scored": 120, "traps": 60}
+SETS = {"development": 24, "calibration": 80, "scored": 160, "traps": 60, "pairs": 100, "unknown": 100}
 #: Shares of cases; all others have one mechanism each, in turn.
 SHARES = {
     "scored": {"none": 0.2, "two": 0.1, "outside": 0.05, "trap": 0.05},
     "calibration": {"none": 0.375, "two": 0.075, "outside": 0.075, "trap": 0.075},
     "traps": {"trap": 1.0},
+    "pairs": {"two": 1.0},
+    "unknown": {"outside": 1.0},
 }
 #: Least detectability of each of two effects at once.
 BOTH = 5.0
@@ -47,9 +49,10 @@ def planned(which: str, count: int, geometries: Sequence[str], seed: int) -> lis
     which : str
         A name in `SETS`.
     count : int
-        The scored set of 120 has 24 cases in which nothing is missing, 9 of each mechanism, 12 of two at once, 6
-        outside the dictionary and 6 traps; calibration of 80 has 30, 4 of each, 6, 6 and 6; any other number has the
-        same shares. Traps has nothing else, of each as many. Development takes one of everything in turn.
+        The scored set of 160 has 32 cases in which nothing is missing, 12 of each mechanism, 16 of two at once, 8
+        outside the dictionary and 8 traps; calibration of 80 has 30, 4 of each, 6, 6 and 6; any other number has the
+        same shares. Traps, pairs (two at once) and unknown (outside the dictionary) have nothing else, of each as
+        many. Development takes one of everything in turn.
     geometries : sequence of str
         In turn.
     seed : int
@@ -82,6 +85,7 @@ def _development(count: int, two: list[tuple[str, str]]) -> Chosen:
     once += [("effect", (name,)) for name in MECHANISMS[4:]] + [("none", ()), ("two", two[0])]
     once += [("outside", (OUTSIDE[0],)), ("trap", (TRAPS[0],)), ("effect", ("inclusion",)), ("effect", ("contact",))]
     once += [("outside", (OUTSIDE[1],)), ("trap", (TRAPS[4],))]
+    once += [("outside", (name,)) for name in OUTSIDE[3:]] + [("two", two[1]), ("two", two[2])]
     return [once[k % len(once)] for k in range(count)]
 
 

@@ -8,16 +8,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 import warpbrain
 from warpbrain.errors import InputError
+from warpbrain.physics.mechanisms import mechanisms
 
 #: The list of runs, in the folder of results.
 RUNS = "runs.csv"
-COLUMNS = ("case", "status", "seconds", "version", "commit", "arguments")
+COLUMNS = ("case", "status", "seconds", "version", "commit", "arguments", "left_out")
 #: Status of a run that took too long.
 NO_DIAGNOSIS = "no diagnosis"
 #: What the tool writes into the folder of a case.
@@ -25,7 +26,13 @@ DIAGNOSIS = "diagnosis.json"
 
 
 def run_all(
-    cases: Path, out: Path, device: str | None, workers: int, more: Sequence[str], limit: float | None = None
+    cases: Path,
+    out: Path,
+    device: str | None,
+    workers: int,
+    more: Sequence[str],
+    limit: float | None = None,
+    left_out: Mapping[str, str] | None = None,
 ) -> int:
     """Run the tool on every case that has not been run; list every run.
 
@@ -42,30 +49,49 @@ def run_all(
         Further arguments of the tool.
     limit : float, optional
         Seconds of a case, after which it is stopped and listed as `NO_DIAGNOSIS`.
+    left_out : mapping of str to str, optional
+        By case the mechanism that is taken out of the tool's dictionary; other cases are not run then.
 
     Returns
     -------
     int
         1 if any run was stopped or ended with another exit status than 0, else 0.
     """
-    folders = sorted(path.parent for path in cases.glob("*/case.toml"))
-    if not folders:
-        raise InputError(f"{cases}: no folder in it has a case.toml")
+    folders = case_folders(cases)
+    if left_out is not None:
+        folders = [folder for folder in folders if folder.name in left_out]
     out.mkdir(parents=True, exist_ok=True)
     done = {row["case"]: row["status"] for row in read_runs(out)}
     arguments = [*(["--device", device] if device else []), *more]
     about = (warpbrain.__version__, _commit())
     with ThreadPoolExecutor(workers) as pool:
         waiting = [folder for folder in folders if folder.name not in done]
-        jobs = {pool.submit(_run, folder, out / folder.name, arguments, limit): folder.name for folder in waiting}
+        words = {f.name: [*arguments, *_without((left_out or {}).get(f.name, ""))] for f in folders}
+        jobs = {pool.submit(_run, f, out / f.name, words[f.name], limit): f.name for f in waiting}
         for job in as_completed(jobs):
             status, seconds = job.result()
             done[jobs[job]] = status
             # a row is written once its run has ended: what was interrupted is run again
-            _add(out, (jobs[job], status, f"{seconds:.1f}", *about, " ".join(arguments)))
+            name = jobs[job]
+            _add(out, (name, status, f"{seconds:.1f}", *about, " ".join(words[name]), (left_out or {}).get(name, "")))
             said = status if status == NO_DIAGNOSIS else f"exit status {status}"
-            print(f"{jobs[job]}: {said} after {seconds:.0f} s", flush=True)
+            print(f"{name}: {said} after {seconds:.0f} s", flush=True)
     return int(any(done[folder.name] != "0" for folder in folders))
+
+
+def case_folders(cases: Path) -> list[Path]:
+    """Case folders of a set; `InputError` if there are none."""
+    folders = sorted(path.parent for path in cases.glob("*/case.toml"))
+    if not folders:
+        raise InputError(f"{cases}: no folder in it has a case.toml")
+    return folders
+
+
+def _without(mechanism: str) -> list[str]:
+    """Arguments of the tool that take a mechanism out of its dictionary."""
+    if not mechanism:
+        return []
+    return ["--candidates", ",".join(name for name in mechanisms() if name != mechanism)]
 
 
 def read_runs(out: Path) -> list[dict[str, str]]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from referee.analysed import NOT_ASKED, analysts, read_analyses, rightness, with_conditionals
 from referee.figures import draw_figures
 from referee.intervals import Share
 from referee.labels import open_labels
@@ -17,7 +18,14 @@ from warpbrain.errors import InputError
 
 
 def score_all(
-    cases: Path, labels: Path, commitments: Path, diagnoses: Path, out: Path, compared: bool, beside: Mapping[str, Path]
+    cases: Path,
+    labels: Path,
+    commitments: Path,
+    diagnoses: Path,
+    out: Path,
+    compared: bool,
+    beside: Mapping[str, Path],
+    analysed: Path | None = None,
 ) -> str:
     """Write `score.json`, `score.md` and figures.
 
@@ -32,6 +40,8 @@ def score_all(
         Whether the baselines diagnose the cases too.
     beside : mapping of str to Path
         Other runs of the same cases by name, such as an ablation, to be compared with.
+    analysed : Path, optional
+        What `analyse` wrote: the optimal analyst's shares stand beside all others.
 
     Returns
     -------
@@ -43,7 +53,9 @@ def score_all(
     InputError
         If a label is not the one that was committed to, a diagnosis is not one, or another run has no case in common.
     """
-    opened = open_labels(labels, commitments)
+    opened = dict(open_labels(labels, commitments))
+    analyses = read_analyses(analysed, opened) if analysed else {}
+    opened = {name: with_conditionals(label, analyses.get(name)) for name, label in opened.items()}
     outcomes, missing = read_outcomes(opened, diagnoses)
     if not outcomes:
         raise InputError(f"{diagnoses}: no diagnosis of any case")
@@ -55,12 +67,17 @@ def score_all(
 
         baselines = compare(cases, outcomes)
     others = _beside(opened, outcomes, beside) if beside else {}
-    text = score_text(found, calibrated, measured, confused, baselines, others, outcomes, missing)
+    of_analyst = [o for outcome in outcomes for o in analysts(outcome, analyses)]
+    optimal = {name: value for name, value in shares(of_analyst).items() if not name.startswith(NOT_ASKED)}
+    right = {o.name: value for o in outcomes if (value := rightness(o, analyses)) is not None}
+    text = score_text(found, calibrated, measured, confused, baselines, others, outcomes, missing, optimal, right)
     out.mkdir(parents=True, exist_ok=True)
     told = {
         "cases": len(outcomes),
         "without_diagnosis": missing,
         "shares": {name: value.told() for name, value in found.items()},
+        "optimal": {name: value.value for name, value in optimal.items()},
+        "optimal analyst asked": len({o.name for o in of_analyst}),
         "calibration": calibrated,
         "measured": measured,
         "baselines": {m: {name: value.told() for name, value in row.items()} for m, row in baselines.items()},

@@ -1,4 +1,7 @@
-"""The scores of the diagnosis: shares with exact intervals, each with its bar."""
+"""The scores of the diagnosis: shares with exact intervals, each with its bar.
+
+Where two act, `d` of each is that where the size of the other is not known.
+"""
 
 from __future__ import annotations
 
@@ -16,22 +19,32 @@ from referee.reliability import reliability
 BINS = ((0.0, 3.0), (3.0, 5.0), (5.0, 8.0), (8.0, np.inf))
 #: What is visible, and what is plainly so.
 VISIBLE, PLAIN = 5.0, 8.0
-#: Bars: false alarms and traps at most, all others at least.
-BARS = {
+#: Bars: at most so much.
+AT_MOST = {
     "false alarms": 0.05,
     "significant where nothing is missing": 0.05,
     "traps named as physics": 0.05,
+    "rigid motions said to be missing physics": 0.0,
+    "outside the dictionary, called by a wrong name": 0.03,
+    "mechanism left out, called by a name, d >= 8": 0.1,
+}
+#: At least so much.
+AT_LEAST = {
     "right name or group holding it, d >= 8": 0.95,
     "right name or group holding it, the tool's d >= 8": 0.95,
-    "right name alone, d >= 8": 0.85,
-    "right name alone, the tool's d >= 8": 0.85,
+    "right name alone, d >= 8": 0.92,
+    "right name alone, the tool's d >= 8": 0.92,
     "90 % label set holds the truth": 0.9,
-    "spoken names right": 0.95,
+    "spoken names right": 0.97,
     "centre within 10 mm": 0.5,
-    "unknown found": 0.6,
-    "both of two named": 0.6,
-    "both of two named, each d >= 5": 0.6,
+    "unknown found, d >= 8": 0.6,
+    "both of two named, each d >= 8": 0.75,
+    "both of two named, each d >= 5": 0.55,
+    "both of two named, each of the tool's d >= 8": 0.75,
+    "both of two named, each of the tool's d >= 5": 0.55,
 }
+#: Kinds of cases.
+KINDS = ("none", "effect", "two", "outside", "trap", "left out")
 #: Level of the tool's alarm.
 ALPHA = 0.05
 #: A centre is found if it is nearer than this [m].
@@ -45,7 +58,7 @@ def bin_name(low: float, high: float) -> str:
 
 def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
     """Every share that is scored, by name."""
-    of = {kind: [o for o in outcomes if o.kind == kind] for kind in ("none", "effect", "two", "outside", "trap")}
+    of = {kind: [o for o in outcomes if o.kind == kind] for kind in KINDS}
     effects = of["effect"]
     plain = [o for o in effects if o.d >= PLAIN]
     for_tool = [o for o in effects if o.seen is not None and o.seen >= PLAIN]
@@ -54,6 +67,9 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
         "significant where nothing is missing": share(o.said.p_value <= ALPHA for o in of["none"]),
         "traps named as physics": share(o.said.verdict in NAMING for o in of["trap"]),
         "traps said to be unknown physics": share(o.said.verdict == "unknown" for o in of["trap"]),
+        "rigid motions said to be missing physics": share(
+            o.said.alarm for o in of["trap"] if o.truth == "registration"
+        ),
     }
     for low, high in BINS:
         found[f"best candidate right, {bin_name(low, high)}"] = share(o.top for o in effects if low <= o.d < high)
@@ -77,16 +93,35 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
         "centre within 10 mm": share(e < NEAR for o in effects if o.d >= VISIBLE and (e := o.centre_error) is not None),
         "amount within 2 sd": share(a[1] for o in effects if (a := o.amount) is not None and a[1] is not None),
         "unknown found": share(o.said.verdict in ("unknown", "named + rest") for o in of["outside"] if o.d >= VISIBLE),
-        "both of two named": share(set(o.label["names"]) <= o.said.said for o in of["two"]),
-        "both of two named, each d >= 5": share(set(o.label["names"]) <= o.said.said for o in of["two"] if _both(o)),
+        "unknown found, d >= 8": share(o.said.verdict == "unknown" or o.held for o in of["outside"] if o.d >= PLAIN),
+        "outside the dictionary, called by a wrong name": share(o.said.spoken and not o.named for o in of["outside"]),
+        "both of two named": share(_both(o) for o in of["two"]),
         "one of two named": share(o.held for o in of["two"]),
     }
-    return found
+    for least in (PLAIN, VISIBLE):
+        for words, given in (("d", _given), ("the tool's d", _seen_given)):
+            name = f"both of two named, each {'of ' if words != 'd' else ''}{words} >= {least:g}"
+            found[name] = share(_both(o) for o in of["two"] if (d := given(o)) and min(d) >= least)
+    missing = [o for o in of["left out"] if o.d >= PLAIN]
+    return found | {
+        "mechanism left out, called by a name, d >= 8": share(o.said.spoken for o in missing),
+        "mechanism left out, unknown or a group with it, d >= 8": share(
+            o.said.verdict == "unknown" or o.held for o in missing
+        ),
+    }
 
 
 def _both(outcome: Outcome) -> bool:
-    """Whether each of two effects is visible."""
-    return all(float(effect["detectability"]) >= VISIBLE for effect in outcome.label["effects"])
+    """Whether it names both of two effects."""
+    return set(outcome.label["names"]) <= outcome.said.said
+
+
+def _given(outcome: Outcome) -> tuple[float, ...]:
+    return outcome.given
+
+
+def _seen_given(outcome: Outcome) -> tuple[float, ...]:
+    return outcome.seen_given
 
 
 def calibration(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:
@@ -139,8 +174,9 @@ def confusion(outcomes: Sequence[Outcome]) -> tuple[list[str], list[str], list[l
 
 
 def _true(outcome: Outcome) -> str:
-    names = {"none": "nothing", "two": "two at once", "trap": f"trap: {outcome.truth}"}
-    return names.get(outcome.kind, outcome.truth)
+    true = outcome.truth
+    names = {"none": "nothing", "two": "two at once", "trap": f"trap: {true}", "left out": f"{true}, left out"}
+    return names.get(outcome.kind, true)
 
 
 def _told(outcome: Outcome) -> str:

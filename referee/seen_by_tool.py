@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from referee.detectability import conditional
 from warpbrain.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -25,8 +26,9 @@ _RECORDED = {
 }
 
 
-def write_seen(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> dict[str, float]:
-    """Write `d` of every case with effects and a diagnosis, by name of case.
+def write_seen(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> dict[str, list[float]]:
+    """Write `d` of every case with effects and a diagnosis, by name of case: of all, then of each of several given the
+    others.
 
     What is known stays: covariances are large, and of no use once `d` is known.
     """
@@ -39,14 +41,17 @@ def write_seen(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> dict
     return found
 
 
-def read_seen(diagnoses: Path) -> dict[str, float]:
-    """What was written; nothing if nothing was."""
+def read_seen(diagnoses: Path) -> dict[str, list[float]]:
+    """What was written, also by runs that told `d` of all alone; nothing if nothing was."""
     file = diagnoses / SEEN
-    return json.loads(file.read_text(encoding="ascii")) if file.exists() else {}
+    found = json.loads(file.read_text(encoding="ascii")) if file.exists() else {}
+    return {name: value if isinstance(value, list) else [value] for name, value in found.items()}
 
 
-def stands_out(label: Mapping[str, Any], folder: Path) -> float:
+def stands_out(label: Mapping[str, Any], folder: Path) -> list[float]:
     """`sqrt(D^T S^-1 D)` with the true change `D` of what was recorded and the tool's `S` of noise and nuisances.
+
+    Then that of each effect whose change the label tells apart, where the sizes of the others are not known.
 
     Raises
     ------
@@ -57,16 +62,26 @@ def stands_out(label: Mapping[str, Any], folder: Path) -> float:
         names = np.array([row["recording"] for row in csv.DictReader(stream)])
     with np.load(folder / COVARIANCE) as known:
         covariance, directions = known["covariance"].astype(np.float64), known["direction"]
-    change = np.zeros(len(names))
-    for name in dict.fromkeys(names.tolist()):
-        own = names == name
-        true = _change(label, name)
-        if len(true) != np.count_nonzero(own):
-            raise InputError(f"{folder / POINTS}: {np.count_nonzero(own)} numbers of '{name}', {len(true)} were made")
-        # a force is told by its components, one row each
-        along = directions[own] if directions[own].any() else np.tile(np.eye(3), (len(true) // 3, 1))
-        change[own] = np.einsum("ki,ki->k", along, true)
-    return float(np.sqrt(change @ np.linalg.solve(covariance, change)))
+
+    def rows(true: Mapping[str, Any]) -> Floats:
+        change = np.zeros(len(names))
+        for name in dict.fromkeys(names.tolist()):
+            own = names == name
+            moved = _change(true, name)
+            if len(moved) != np.count_nonzero(own):
+                raise InputError(
+                    f"{folder / POINTS}: {np.count_nonzero(own)} numbers of '{name}', {len(moved)} were made"
+                )
+            # a force is told by its components, one row each
+            along = directions[own] if directions[own].any() else np.tile(np.eye(3), (len(moved) // 3, 1))
+            change[own] = np.einsum("ki,ki->k", along, moved)
+        return change
+
+    precision = np.linalg.inv(covariance)
+    whole = rows(label)
+    each = [rows(effect) for effect in label["effects"] if "clean_effect_m" in effect]
+    given = [conditional(own, np.delete(each, k, axis=0), precision) for k, own in enumerate(each)]
+    return [float(np.sqrt(whole @ precision @ whole)), *given]
 
 
 def _change(label: Mapping[str, Any], name: str) -> Floats:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from referee.body import Body
 from referee.sensing import FORCE_ERROR, Sensors
@@ -88,6 +89,28 @@ class Sight:
         if self._force is not None:
             parts.append(change.force)
         return np.concatenate(parts)
+
+    @property
+    def has_force(self) -> bool:
+        """Whether the force of the cap is recorded."""
+        return self._force is not None
+
+    @property
+    def selection(self) -> csr_matrix:
+        """Matrix (numbers, 3 n) that reads points, once, and the wall from displacements."""
+        nodes, shapes = self._sensors.wall
+        k, p = len(self._nodes), len(nodes)
+        rows = [np.arange(3 * k), np.repeat(3 * k + np.arange(p), 18)]
+        columns = [(3 * self._nodes[:, None] + np.arange(3)).ravel(), (3 * nodes[:, :, None] + np.arange(3)).ravel()]
+        values = [np.ones(3 * k), (shapes[:, :, None] * self._normals[:, None, :]).ravel()]
+        shape = (3 * k + p, self._points.size)
+        return csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
+
+    def moved_rigidly(self, shift: Floats, turn: Floats) -> Floats:
+        """Rows of an exact rigid motion about the middle: a shift [m] and a rotation vector [rad]."""
+        blur = replace(self.setting.blur, shift=tuple(shift), rotation=tuple(turn))
+        move = blur.misaligned(self._moved, np.zeros_like(self._moved), self._middle)
+        return self.rows(Change(move[None], np.zeros(3)))
 
     @cached_property
     def rigid(self) -> Floats:

@@ -1,4 +1,4 @@
-"""Temperature and offsets of log evidences that make the truth most likely."""
+"""Temperature and weights of sets of causes that make the truth most likely."""
 
 from __future__ import annotations
 
@@ -8,118 +8,115 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from referee.diagnoses import NOT_PHYSICS, UNKNOWN, Tried
+
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-#: Weak normal priors of the logarithm of the temperature and of both offsets, for sets that do not tell one of them.
-_SPREADS = np.array([1.5, 5.0, 5.0])
+#: Traits of a set that have a log weight.
+TRAITS = ("nothing", "another", UNKNOWN, NOT_PHYSICS)
+#: Weak normal priors of the logarithm of the temperature, to 1, and of weights, to 0: a calibration set may not tell.
+_SPREADS = np.array([0.7, *[3.0] * len(TRAITS)])
 
 
 @dataclass(frozen=True)
 class Scale:
-    """What log evidences become probabilities by: ``softmax((log E + offset) / temperature)``.
+    """What log densities become probabilities by: ``softmax((log p + weight) / temperature)``.
 
     Attributes
     ----------
     temperature : float
-    unknown, alternative : float
-        Added to the log evidence of the unknown, and of what is no physics.
+    weights : tuple of float
+        Added for each of `TRAITS` that a set has, of `another` for each mechanism beyond the first.
     """
 
-    temperature: float
-    unknown: float
-    alternative: float
+    temperature: float = 1.0
+    weights: tuple[float, ...] = (0.0,) * len(TRAITS)
+
+    def probabilities(self, hypotheses: Sequence[Tried]) -> Floats:
+        """Of each hypothesis of one case."""
+        from scipy.special import softmax
+
+        log = np.array([one.log_density for one in hypotheses])
+        found: Floats = softmax((log + traits(hypotheses) @ self.weights) / self.temperature)
+        return found
+
+
+def traits(hypotheses: Sequence[Tried]) -> Floats:
+    """How often each hypothesis has each of `TRAITS`, (k, traits)."""
+    rows = [
+        (not h.causes, max(len(h.physics) - 1, 0), UNKNOWN in h.causes, NOT_PHYSICS in h.causes) for h in hypotheses
+    ]
+    return np.array(rows, dtype=np.float64).reshape(-1, len(TRAITS))
 
 
 @dataclass(frozen=True, eq=False)
-class Ballots:
-    """Log evidences of cases in which something is missing.
+class Ballot:
+    """A case: what was tried, and which of it is true.
 
     Attributes
     ----------
-    evidence : (cases, kinds) array
-        Minus infinity where a kind was not tried.
-    right : (cases, kinds) bool array
-        Whether a kind is true; in each case one that was tried is.
-    unknown, alternative : (cases, kinds) bool arrays
-        Which is the unknown, and which are no physics.
+    hypotheses : tuple of Tried
+    right : (k,) bool array
+        At least one is.
     """
 
-    evidence: Floats
+    hypotheses: tuple[Tried, ...]
     right: Bools
-    unknown: Bools
-    alternative: Bools
-
-    def __len__(self) -> int:
-        return len(self.evidence)
-
-    def of(self, rows: NDArray[np.int64]) -> Ballots:
-        """Some cases, also several times."""
-        return Ballots(self.evidence[rows], self.right[rows], self.unknown[rows], self.alternative[rows])
-
-    def probabilities(self, scale: Scale) -> Floats:
-        """Probability (cases, kinds) of each kind."""
-        from scipy.special import softmax
-
-        offset = scale.unknown * self.unknown + scale.alternative * self.alternative
-        found: Floats = softmax((self.evidence + offset) / scale.temperature, axis=1)
-        return found
-
-    def loss(self, scale: Scale) -> float:
-        """Mean of minus the logarithm of the probability of what is true."""
-        true = (self.probabilities(scale) * self.right).sum(axis=1)
-        return float(-np.log(np.maximum(true, 1e-300)).mean())
 
 
-def fit(ballots: Ballots) -> Scale:
-    """The scale of highest likelihood of the truth, with weak priors."""
+def log_loss(scale: Scale, ballots: Sequence[Ballot]) -> float:
+    """Mean of minus the logarithm of the probability of what is true."""
+    true = [scale.probabilities(b.hypotheses)[b.right].sum() for b in ballots]
+    return float(-np.log(np.maximum(true, 1e-300)).mean())
+
+
+def fit(ballots: Sequence[Ballot]) -> Scale:
+    """The scale of highest likelihood of the truth, with weak priors to a temperature of 1 and weights of 0."""
     from scipy.optimize import minimize
+    from scipy.special import softmax
 
-    tried = np.isfinite(ballots.evidence)
+    most = max(len(b.hypotheses) for b in ballots)
+    log = np.full((len(ballots), most), -np.inf)
+    has, right = np.zeros((*log.shape, len(TRAITS))), np.zeros(log.shape, dtype=bool)
+    for k, ballot in enumerate(ballots):
+        own = np.array([h.log_density for h in ballot.hypotheses])
+        # what is common to all of a case does not matter
+        log[k, : len(own)], has[k, : len(own)] = own - own.max(), traits(ballot.hypotheses)
+        right[k, : len(own)] = ballot.right
+    tried = np.isfinite(log)
 
     def cost(x: Floats) -> tuple[float, Floats]:
-        scale = Scale(float(np.exp(x[0])), float(x[1]), float(x[2]))
-        p = ballots.probabilities(scale)
-        true = np.maximum((p * ballots.right).sum(axis=1, keepdims=True), 1e-300)
-        # by the exponents of the softmax
-        slope = p - p * ballots.right / true
-        offset = scale.unknown * ballots.unknown + scale.alternative * ballots.alternative
-        exponent = np.where(tried, ballots.evidence + offset, 0.0) / scale.temperature
-        slopes = [-(slope * exponent).sum()]
-        slopes += [(slope * flag).sum() / scale.temperature for flag in (ballots.unknown, ballots.alternative)]
-        value = -np.log(true).sum() + 0.5 * ((x / _SPREADS) ** 2).sum()
-        return float(value), np.array(slopes) + x / _SPREADS**2
+        temperature = np.exp(x[0])
+        exponent = (log + has @ x[1:]) / temperature
+        p = softmax(exponent, axis=1)
+        true = np.maximum((p * right).sum(axis=1, keepdims=True), 1e-300)
+        by_exponent = p - p * right / true
+        slope = np.array(
+            [
+                -(by_exponent * np.where(tried, exponent, 0.0)).sum(),
+                *np.einsum("ck,ckt->t", by_exponent, has) / temperature,
+            ]
+        )
+        return float(-np.log(true).sum() + 0.5 * ((x / _SPREADS) ** 2).sum()), slope + x / _SPREADS**2
 
-    bounds = [(-3.0, 5.0), (-30.0, 30.0), (-30.0, 30.0)]
-    found = minimize(cost, np.zeros(3), jac=True, method="L-BFGS-B", bounds=bounds)
-    return Scale(float(np.exp(found.x[0])), float(found.x[1]), float(found.x[2]))
+    bounds = [(-3.0, 5.0), *[(-30.0, 30.0)] * len(TRAITS)]
+    found = minimize(cost, np.zeros(len(_SPREADS)), jac=True, method="L-BFGS-B", bounds=bounds)
+    return Scale(float(np.exp(found.x[0])), tuple(found.x[1:].tolist()))
 
 
-def held_out(ballots: Ballots, folds: int = 5) -> Floats:
-    """Probabilities (cases, kinds) of each case by the scale that the other folds give."""
+def held_out(ballots: Sequence[Ballot], folds: int = 5) -> list[Floats]:
+    """Probabilities of each case by the scale that the other folds give."""
     place = np.random.default_rng(0).permutation(len(ballots)) % folds
-    out = np.zeros_like(ballots.evidence)
-    for fold in range(min(folds, len(ballots))):
-        scale = fit(ballots.of(np.flatnonzero(place != fold)))
-        rows = np.flatnonzero(place == fold)
-        out[rows] = ballots.of(rows).probabilities(scale)
-    return out
+    scales = {fold: fit([b for b, k in zip(ballots, place, strict=True) if k != fold]) for fold in set(place.tolist())}
+    return [scales[fold].probabilities(b.hypotheses) for b, fold in zip(ballots, place.tolist(), strict=True)]
 
 
-def intervals(ballots: Ballots, draws: int = 200) -> tuple[Scale, Scale]:
-    """Ends of 95 % intervals, by fitting cases drawn with replacement."""
+def intervals(ballots: Sequence[Ballot], draws: int = 100) -> Floats:
+    """Ends (2, 1 + traits) of 95 % intervals of temperature and weights, by fitting cases drawn with replacement."""
     random = np.random.default_rng(1)
-    found = [fit(ballots.of(random.integers(len(ballots), size=len(ballots)))) for _ in range(draws)]
-    values = np.array([(scale.temperature, scale.unknown, scale.alternative) for scale in found])
-    low, high = np.percentile(values, [2.5, 97.5], axis=0).tolist()
-    return Scale(*low), Scale(*high)
-
-
-def conformal(p_values: Sequence[float], alpha: float) -> float | None:
-    """An alarm below this p-value is false in at most a share `alpha` of cases like these, in which nothing is missing.
-
-    The k-th smallest of n, with k the whole part of ``alpha (n + 1)`` (Vovk, Gammerman and Shafer 2005); None if there
-    are too few.
-    """
-    k = int(alpha * (len(p_values) + 1) + 1e-9)
-    return float(np.sort(np.asarray(p_values))[k - 1]) if k else None
+    found = []
+    for _ in range(draws):
+        scale = fit([ballots[k] for k in random.integers(len(ballots), size=len(ballots))])
+        found.append((scale.temperature, *scale.weights))
+    return np.percentile(np.array(found), [2.5, 97.5], axis=0)

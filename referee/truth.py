@@ -17,7 +17,7 @@ from referee.problem import Problem
 from referee.sensing import Sensors, place_sensors
 from referee.setting import Setting
 from referee.sight import Change, Sight
-from referee.sizing import Sized, Wish, sized
+from referee.sizing import Sized, Wish, first_order, sized
 from referee.unknowns import unknowns_of
 
 Floats = NDArray[np.float64]
@@ -35,6 +35,8 @@ class Truth:
     setting : Setting
     found : tuple of Sized
         Effects at the size that they have, and how much each stands out, alone and to first order.
+    given : tuple of float
+        How much each stands out where the size of the other is not known.
     sensors : Sensors
     u : (times, n, 3) array
         Displacement of all nodes [m]; one time if none is told.
@@ -50,6 +52,7 @@ class Truth:
 
     setting: Setting
     found: tuple[Sized, ...]
+    given: tuple[float, ...]
     sensors: Sensors
     u: Floats
     declared: Floats
@@ -92,15 +95,16 @@ def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf)
     problem = setting.problem()
     sensors = place_sensors(setting)
     base = balance(problem, until=until)
-    held = _cap_force(problem, base.u)
+    held = cap_force_of(problem, base.u)
     if not wishes:
         u = np.repeat(base.u[None], max(1, len(setting.times)), axis=0)
-        return Truth(setting, (), sensors, u, base.u, held, held, 0.0, 0.0, base.left)
+        return Truth(setting, (), (), sensors, u, base.u, held, held, 0.0, 0.0, base.left)
     seen = Detectability(Sight(setting, sensors, base.u, held), unknowns_of(problem, base))
     found = [sized(wish, problem, base, seen, setting.times) for wish in wishes]
+    given = conditionals(found, problem, base, seen, setting.times)
     acting, states = _settle(problem, found, setting.times, base, until)
     u = np.stack([state.u for state in states])
-    force = _cap_force(acting, u[-1])
+    force = cap_force_of(acting, u[-1])
     change = Change(u - base.u, force - held)
     whole = seen.d(change)
     if not LEAST <= whole <= MOST:
@@ -108,7 +112,24 @@ def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf)
     if len(u) < len(setting.times):
         u = np.repeat(u, len(setting.times), axis=0)
     left = max(base.left, *(state.left for state in states))
-    return Truth(setting, tuple(found), sensors, u, base.u, force, held, whole, seen.upper(change), left)
+    return Truth(setting, tuple(found), given, sensors, u, base.u, force, held, whole, seen.upper(change), left)
+
+
+def conditionals(
+    found: Sequence[Sized], problem: Problem, base: Balance, seen: Detectability, times: tuple[float, ...]
+) -> tuple[float, ...]:
+    """How much each effect stands out where the size of the others, and of a traction the direction, is not known."""
+    if len(found) < 2:
+        return tuple(one.d for one in found)
+    columns = [
+        [one.change] if len(spanning) == 1 else [first_order(part, problem, base, times) for part in spanning]
+        for one in found
+        for spanning in [one.effect.spanning]
+    ]
+    return tuple(
+        seen.given(one.change, [column for k, more in enumerate(columns) if k != j for column in more])
+        for j, one in enumerate(found)
+    )
 
 
 def _settle(
@@ -136,7 +157,7 @@ def _settle(
     raise AssertionError
 
 
-def _cap_force(problem: Problem, u: Floats) -> Floats:
+def cap_force_of(problem: Problem, u: Floats) -> Floats:
     """Force [N] with which the cap is held, or that acts on it."""
     F = problem.gradient(u)
     cap = problem.body.nodes("superior")

@@ -55,6 +55,13 @@ def unknowns_of(problem: Problem, base: Balance) -> Unknowns:
     base : Balance
         Of it.
     """
+    tissues, others = unknown_forces(problem, base)
+    changes = answers(base, problem.body.nodes("superior"), [*tissues, *others], _CLOSE)
+    return Unknowns(changes[: len(tissues)], changes[len(tissues) :])
+
+
+def unknown_forces(problem: Problem, base: Balance) -> tuple[list[Floats], list[Floats]]:
+    """Inner forces (n, 3) [N] that come up with the tissues and with the others of `Unknowns`."""
     F = problem.gradient(base.u)
     response = problem.response(F)
     inner = problem.local(response.stress(problem.factor))
@@ -63,8 +70,7 @@ def unknowns_of(problem: Problem, base: Balance) -> Unknowns:
     fields = stiffness_modes(problem.body.centroids, np.linalg.norm(inner, axis=(1, 2)))
     others = [problem.gathered(inner * field[:, None, None]) for field in fields.T]
     others += [problem.gathered(problem.local(_poisson(problem, F))), *_laws(problem, F)]
-    changes = answers(base, problem.body.nodes("superior"), [*tissues, *others], _CLOSE)
-    return Unknowns(changes[: len(tissues)], changes[len(tissues) :])
+    return tissues, others
 
 
 def answers(base: Balance, cap: NDArray[np.bool_], forces: list[Floats], close: float) -> list[Change]:

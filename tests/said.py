@@ -9,7 +9,15 @@ from referee.outcomes import Outcome
 
 def label(case, kind="none", names=(), d=0.0, **effect):
     """What is true of a case."""
-    unknown = {"where_m": None, "also": [], "amount": None, "parameter": "", "size": 1.0, "detectability": d}
+    unknown = {
+        "where_m": None,
+        "also": [],
+        "amount": None,
+        "parameter": "",
+        "size": 1.0,
+        "detectability": d,
+        "conditional": d,
+    }
     first = {"kind": names[0], **unknown} if names else {}
     return {
         "case": case,

@@ -16,9 +16,6 @@ from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.reading import read_case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.cases.writing import write_case
-from warpbrain.diagnosis.options import DiagnosisOptions, Listener
-from warpbrain.diagnosis.specimen.diagnose import DiagnosingSpecimen
-from warpbrain.diagnosis.specimen.result import SpecimenDiagnosis
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.report.diagnosis.files import write_explained
@@ -26,6 +23,8 @@ from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, spe
 from warpbrain.report.diagnosis.specimen_curves import write_curves
 from warpbrain.report.files import write_summary
 from warpbrain.terminal.quiet import start_warp_quietly
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
+from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 Floats = NDArray[np.float64]
 
@@ -93,10 +92,14 @@ def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosi
     folder = out / case.name
     if not (folder / "case.toml").exists():
         write_case(folder, case)
-    options = DiagnosisOptions(ends=ends)
+    options = SpecimenOptions(ends=ends)
     start = time.perf_counter()
-    listener = Listener(stage=lambda text: print(f"{time.perf_counter() - start:7.1f} s  {text}", flush=True))
-    found = DiagnosingSpecimen(read_case(folder), options, "cpu", listener).run()
+    found = DiagnosingSpecimen(
+        read_case(folder),
+        options,
+        "cpu",
+        lambda text: print(f"{time.perf_counter() - start:7.1f} s  {text}", flush=True),
+    ).run()
     said = describe_specimen_diagnosis(found, options, "cpu")
     beside = out / f"{case.name}-diagnosis{'' if ends else '-homogeneous'}"
     beside.mkdir(parents=True, exist_ok=True)
@@ -104,13 +107,25 @@ def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosi
     if found.explained is not None:
         write_explained(beside / "explained", found.explained)
     write_summary(beside / "diagnosis.json", said)
-    print("", *specimen_diagnosis_lines(said), "", sep="\n", flush=True)
+    print("", *specimen_diagnosis_lines(found), "", sep="\n", flush=True)
     return found, said
 
 
 def row(found: SpecimenDiagnosis, said: dict[str, Any]) -> dict[str, Any]:
     """What the docs say of a case: no curve, no row of the data."""
-    keys = ("verdict", "sentence", "p_value", "mechanism", "named", "stages", "group", "where", "when", "fit")
+    keys = (
+        "verdict",
+        "sentence",
+        "p_value",
+        "mechanism",
+        "named",
+        "combinations",
+        "group",
+        "doubts",
+        "where",
+        "when",
+        "fit",
+    )
     by_test: dict[str, Any] = {}
     for each, rows in zip(found.protocol.tests, found.protocol.rows, strict=True):
         errors = {
@@ -121,6 +136,7 @@ def row(found: SpecimenDiagnosis, said: dict[str, Any]) -> dict[str, Any]:
         by_test[each.name] = {
             "role": "fit" if each.fitted else "check",
             "largest_stress_pa": each.peak,
+            "rows": len(each.strain),
             "rmse_pa": errors,
         }
     return {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from referee.effects.body_forces import Attraction, Stripes, Swirl, UniformForce
 from referee.effects.contact import Contact
 from referee.effects.effect import Effect
 from referee.effects.forces import Gravity, Pressure, Traction
@@ -10,15 +11,19 @@ from referee.effects.tissue import Asymmetry, Inclusion, Swelling, Viscoelastici
 
 __all__ = [
     "Asymmetry",
+    "Attraction",
     "Contact",
     "Effect",
     "Gravity",
     "Inclusion",
     "PreStress",
     "Pressure",
+    "Stripes",
     "Swelling",
+    "Swirl",
     "Tether",
     "Traction",
+    "UniformForce",
     "Viscoelasticity",
     "Wire",
 ]

@@ -1,4 +1,4 @@
-"""The patch at the side that the case declares as fixed slides along the skull in truth, or lifts off it."""
+"""A patch of a support that the case declares as fixed slides along the skull in truth, or lifts off it."""
 
 from __future__ import annotations
 
@@ -16,13 +16,15 @@ SKULL = 2e8
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(Effect):
-    """Nodes of the set `side` within `size` [m] of a point are not stuck.
+    """Nodes of a support within `size` [m] of a point are not stuck.
 
     Parameters
     ----------
     centre : (x, y, z)
     lifts : bool
         Whether they can lift off too, or only slide.
+    support : {"side", "fixed"}
+        Set of nodes: the patch at the side, or the base of the skull, which is free over a patch only.
     """
 
     kind: ClassVar[str] = "contact"
@@ -32,11 +34,14 @@ class Contact(Effect):
 
     centre: Place
     lifts: bool
+    support: str = "side"
 
     def act(self, problem: Problem) -> Problem:
         body = problem.body
         within = np.linalg.norm(body.points - np.asarray(self.centre), axis=1) < self.size
-        loose = body.nodes("side") & within & ~body.nodes("fixed")
+        loose = body.nodes(self.support) & within
+        if self.support == "side":
+            loose &= ~body.nodes("fixed")
         vectors = body.outer.vectors(body.points)
         areas = np.linalg.norm(body.outer.spread(vectors), axis=1)
         # the mean of the faces about a node: of their areas a corner gets nothing, and nothing has no direction

@@ -56,6 +56,11 @@ class Effect(abc.ABC):
         return np.ones(1)
 
     @property
+    def spanning(self) -> tuple[Self, ...]:
+        """Effects of which this one is a sum, whatever its size and direction, where its place is known."""
+        return (self,)
+
+    @property
     def amount(self) -> float | None:
         """What the tool's parameter should be [SI], None if there is nothing to compare with."""
         return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -109,6 +109,10 @@ class Traction(Effect):
         weight = self.size * hill(outer.places, self.centre, self.radius) * outer.areas
         force = outer.spread(weight[..., None] * unit(np.asarray(self.direction)))
         return adding(problem, lambda u: force)
+
+    @property
+    def spanning(self) -> tuple[Self, ...]:
+        return tuple(replace(self, direction=axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
 
 def patch(problem: Problem, centre: Place, radius: float) -> Floats:

@@ -1,16 +1,21 @@
-"""One effect is found again with its size; beside it, what is in no dictionary is left as the unknown."""
+"""One effect is found with its size; beside it another by its name, and what is in no dictionary as the unknown."""
+
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
-from sinking_block import diagnose_sinking
+from sinking_block import OPTIONS, write_sinking
 
-from warpbrain.diagnosis.result import NAMED_AND_REST, Diagnosis
+from warpbrain.cases.case import Case
+from warpbrain.diagnosis.diagnose import Diagnosing
+from warpbrain.diagnosis.result import NAMED, NAMED_AND_REST, Diagnosis
 from warpbrain.physics.mechanisms.pressure import Pressure
 
 
 @pytest.fixture(scope="module")
-def pressed(tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
-    """Of a block that sinks and is pressed from a side, which touches what is held: no pressure is looked for there."""
-    return diagnose_sinking(tmp_path_factory.mktemp("pressed") / "case", (Pressure(value=150.0, nodes="side"),))
+def pressed(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    """A block that sinks and is pressed from a side, a node set that touches what is held."""
+    return write_sinking(Path(tmp_path_factory.mktemp("pressed")) / "case", (Pressure(value=150.0, nodes="side"),))
 
 
 def test_one_is_found_with_its_size(small_diagnosis: Diagnosis) -> None:
@@ -21,7 +26,19 @@ def test_one_is_found_with_its_size(small_diagnosis: Diagnosis) -> None:
     assert small_diagnosis.named[0].detectability > 20.0
 
 
-def test_what_no_mechanism_explains_gets_no_name_beside_one(pressed: Diagnosis) -> None:
-    assert [one.kind for one in pressed.named] == ["gravity"]
-    assert pressed.verdict == NAMED_AND_REST
-    assert pressed.unknown is not None
+def test_a_pressure_on_a_set_that_touches_what_is_held_is_named_beside_it(pressed: Case) -> None:
+    found = Diagnosing(pressed, OPTIONS, "cpu").run()
+    assert found.verdict in (NAMED, NAMED_AND_REST)
+    assert {one.kind for one in found.named} == {"gravity", "pressure"}
+    [side] = [one for one in found.named if one.kind == "pressure"]
+    assert side.region == "side"
+    value = next(value for value in side.values if value.name == "value")
+    assert abs(value.value - 150.0) < 4.0 * value.sd
+
+
+def test_what_no_mechanism_explains_gets_no_name_beside_one(pressed: Case) -> None:
+    options = replace(OPTIONS, candidates=("gravity", "swelling", "falx"))
+    found = Diagnosing(pressed, options, "cpu").run()
+    assert [one.kind for one in found.named] == ["gravity"]
+    assert found.verdict == NAMED_AND_REST
+    assert found.unknown is not None

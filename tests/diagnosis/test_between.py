@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from warpbrain.diagnosis.between import between_neighbours
-from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.physics.proposal import Proposal
+from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.worlds.body.effects import Effect
 
 
 def relaxing(time: float, answer: list[float]) -> Effect:

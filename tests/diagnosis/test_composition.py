@@ -8,11 +8,6 @@ from slow_block import CAUSES, write_slow
 from verification_rows import Row
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.dictionary import dictionary_of
-from warpbrain.diagnosis.effects import Effects
-from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.states import Hypothesis, States
-from warpbrain.diagnosis.tissue_prior import declared
 from warpbrain.errors import SolveError
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.cavity import Cavity
@@ -22,6 +17,11 @@ from warpbrain.physics.mechanisms.inclusion import Inclusion
 from warpbrain.physics.mechanisms.residual_stress import ResidualStress
 from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.proposal import Proposal
+from warpbrain.worlds.body.dictionary import dictionary_of
+from warpbrain.worlds.body.effects import Effects
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.states import Hypothesis, States
+from warpbrain.worlds.body.tissue_prior import declared
 
 #: What the tissue is made of beside its law.
 MADE_OF = (

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, multivariate_normal
 
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import KAPPAS, Explanation, kappa_log_prior
 from warpbrain.diagnosis.stack_evidence import StackEvidence
+from warpbrain.worlds.body.effects import Effect
 
 N = 40
 

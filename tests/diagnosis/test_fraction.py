@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from warpbrain.diagnosis.fraction import likely_fraction
-from warpbrain.diagnosis.nuisances import FRACTION, Family, Nuisances
+from warpbrain.inference.beliefs import beliefs
+from warpbrain.worlds.body.nuisances import Family, Nuisances
 
 ROWS = 300
+
+FRACTION = float(beliefs("mesh.unknown").max())
 
 
 @pytest.fixture
@@ -15,7 +18,7 @@ def made() -> tuple[np.random.Generator, Nuisances, np.ndarray]:
     tissue = Family("tissue", random.normal(size=(ROWS, 2)))
     mesh = Family("mesh, unknown", 3.0 * random.normal(size=(ROWS, 60)) / np.sqrt(60.0))
     smooth = random.normal(size=(ROWS, 20)) / np.sqrt(20.0)
-    return random, Nuisances((tissue, mesh), np.zeros((20, 3))), smooth
+    return random, Nuisances((tissue, mesh), np.zeros((20, 3)), FRACTION), smooth
 
 
 @pytest.mark.parametrize("part", [0.1, 0.35, 1.0])

@@ -7,7 +7,7 @@ import pytest
 
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.gross_errors import gross_errors
-from warpbrain.diagnosis.sensors import Sensors, rows_of_points
+from warpbrain.worlds.body.sensors import Sensors, rows_of_points
 
 POINTS = 12
 

@@ -7,20 +7,20 @@ import pytest
 from slow_block import CAUSES, PERMEABILITY, TIMES, write_slow
 
 from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.course import Course, course_times
 from warpbrain.diagnosis.diagnose import Diagnosing
-from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
 from warpbrain.diagnosis.onset import OF_ITS_OWN, Onset, onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.diagnosis.screening import UNKNOWN, Screening
-from warpbrain.diagnosis.states import Hypothesis, States, steps_to
-from warpbrain.diagnosis.switching import Known, Solving
-from warpbrain.diagnosis.time_courses import AT_ONCE, EVENLY, time_courses
-from warpbrain.diagnosis.tissue_prior import declared
 from warpbrain.physics.mechanisms.drainage import Drainage
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.report.diagnosis.text import when_in_words
+from warpbrain.worlds.body.course import Course, course_times
+from warpbrain.worlds.body.dictionary import Candidates, candidates_at, dictionary_of
+from warpbrain.worlds.body.states import Hypothesis, States, steps_to
+from warpbrain.worlds.body.switching import Known, Solving
+from warpbrain.worlds.body.time_courses import AT_ONCE, EVENLY, time_courses
+from warpbrain.worlds.body.tissue_prior import declared
 
 _OPTIONS = DiagnosisOptions(candidates=("drainage", "viscoelasticity", "swelling"), mesh_error=False, draws=100)
 

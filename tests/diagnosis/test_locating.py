@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from warpbrain.diagnosis.flexible import force_patches
 from warpbrain.diagnosis.locating import score_map
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
+from warpbrain.worlds.body.unknown import force_patches
 
 #: Length of patches, and distance between them [m].
 LENGTH, SPACING = 0.012, 0.016

@@ -7,13 +7,13 @@ import pytest
 from sinking_block import write_sinking
 
 from warpbrain.diagnosis.base import Base, BaseFinder
-from warpbrain.diagnosis.effects import Effects
-from warpbrain.diagnosis.mesh_error import expected_answer, volume_of
-from warpbrain.diagnosis.nuisances import other_volume
-from warpbrain.diagnosis.options import Listener
-from warpbrain.diagnosis.states import States
 from warpbrain.physics.mechanisms.compressibility import Compressibility
 from warpbrain.physics.mechanisms.gravity import Gravity
+from warpbrain.worlds.body.effects import Effects
+from warpbrain.worlds.body.mesh_error import expected_answer, volume_of
+from warpbrain.worlds.body.nuisances import other_volume
+from warpbrain.worlds.body.states import States
+from warpbrain.worlds.listener import Listener
 
 
 @pytest.fixture(scope="module")

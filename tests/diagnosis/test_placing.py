@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpbrain.diagnosis.dictionary import candidates_at, dictionary_of
-from warpbrain.diagnosis.parameters import values_of
 from warpbrain.diagnosis.placing import placed
 from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage, compared, linear_point
+from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of
+from warpbrain.worlds.body.parameters import values_of
 
 
 def stage_of(diagnosis, kind: str, move, radius: float, size) -> tuple[Stage, np.ndarray]:

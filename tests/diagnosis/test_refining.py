@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from loosened_block import loosened
 
-from warpbrain.diagnosis.dictionary import BETWEEN, RADII
-from warpbrain.diagnosis.parameters import values_of
 from warpbrain.diagnosis.refining import refined
 from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage, linear_point
+from warpbrain.worlds.body.dictionary import BETWEEN, RADII
+from warpbrain.worlds.body.parameters import values_of
 
 CENTRE, RADIUS = np.array([0.036, 0.024, 0.0]), 0.027
 

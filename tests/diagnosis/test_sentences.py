@@ -8,11 +8,12 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from warpbrain.diagnosis.alternatives import SENTENCES
-from warpbrain.diagnosis.result import VERDICTS, Fit, Ranked, Smallest, Value
+from warpbrain.diagnosis.result import VERDICTS, Fit, Ranked
 from warpbrain.diagnosis.sentences import effect_sentence, sentence_of
 from warpbrain.diagnosis.verdict import Conclusion, Verdict
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.worlds.body.not_physics import SENTENCES
+from warpbrain.worlds.body.values import Smallest, Value
 
 #: What each verdict says, whatever its numbers.
 SAID = {

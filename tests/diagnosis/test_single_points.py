@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.diagnosis.single_points import log_evidence_and_odds, log_odds
+from warpbrain.worlds.body.sensors import Sensors
 
 POINTS = 12
 

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.spectrum import amount_in_all
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.physics.proposal import Proposal
+from warpbrain.worlds.body.effects import Effect
 
 TIMES, POINTS, NOISE, SAMPLES = (1.5, 7.5, 37.5), 12, 0.02, 60000
 #: Moduli and times of what relaxes, in two times, far apart, or in one.

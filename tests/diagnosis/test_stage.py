@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpbrain.diagnosis.dictionary import candidates_at, dictionary_of
 from warpbrain.diagnosis.stage import Stage, compared
+from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.result import NOT_PHYSICS, NOTHING, WITH_IT, Confusion
 from warpbrain.diagnosis.screening import Screening
 from warpbrain.diagnosis.sentences import confusion_sentences
 from warpbrain.diagnosis.virtual import SIZES, VirtualCases
+from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.worlds.body.effects import Effect
 
 N = 60
 

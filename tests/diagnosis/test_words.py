@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from warpbrain.diagnosis.result import Smallest
 from warpbrain.diagnosis.words import measured, number, smallest_in_words
+from warpbrain.worlds.body.values import Smallest
 
 
 @pytest.mark.parametrize(

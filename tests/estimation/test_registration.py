@@ -88,12 +88,12 @@ def test_an_exact_rigid_motion_is_recovered(seed: int, surface: bool, verify) ->
 
 
 def test_an_estimate_takes_the_registration_that_a_diagnosis_takes() -> None:
-    from warpbrain.diagnosis.nuisances import REGISTRATION_SD
     from warpbrain.estimation.options import EstimationOptions
+    from warpbrain.worlds.body.nuisances import registration_sd
 
     registration = EstimationOptions().registration
     assert registration is not None
-    np.testing.assert_allclose(np.diag(registration.precision) ** -0.5, REGISTRATION_SD)
+    np.testing.assert_allclose(np.diag(registration.precision) ** -0.5, registration_sd())
 
 
 @pytest.mark.parametrize("values", [(0.0, 0.1), (0.001, -1.0), (np.nan, 0.1)])

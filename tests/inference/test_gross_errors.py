@@ -8,7 +8,7 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import Outliers, columns_of_gross_errors, columns_of_inflation, with_gross_errors
+from warpbrain.inference.gross_errors import Outliers, columns_of_inflation, with_gross_errors
 
 PRIOR = Outliers(0.03, 15.0)
 #: Two kinds of gross errors.
@@ -115,6 +115,6 @@ def test_points_of_three_rows_and_of_one_against_covariances_written_out() -> No
         other[point] = ~gross[point]
         odds = (here - log_density(other)) * (1.0 if gross[point] else -1.0)
         assert found.log_odds[point] == pytest.approx(odds, abs=1e-8)
-    wider = one.with_columns(columns_of_gross_errors(one, points, gross, PRIOR))
+    wider = one.with_columns(columns_of_inflation(one, points, found.inflation))
     prior = np.where(gross, np.log(PRIOR.probability), np.log1p(-PRIOR.probability)).sum()
     assert float(wider.log_density(residual)) + prior == pytest.approx(here, abs=1e-8)

@@ -1,87 +1,122 @@
-"""Temperatures of evidences whose right temperature is known."""
+"""Temperatures and weights of hypotheses whose right ones are known, and the file that the tool reads."""
+
+import json
 
 import numpy as np
 import pytest
 from said import diagnosis, label, outcome, sealed_labels
 
 from referee.__main__ import main
+from referee.calibrate import FILE, priced, true_of
+from referee.diagnoses import NOT_PHYSICS, UNKNOWN, Tried
 from referee.reliability import reliability
-from referee.temperature import Ballots, Scale, conformal, fit, held_out, intervals
+from referee.temperature import TRAITS, Ballot, Scale, fit, held_out, intervals, log_loss
 
-TRUE = Scale(3.0, -4.0, 2.0)
+SETS = [(), ("gravity",), ("pressure",), ("swelling",), ("gravity", "pressure"), ("gravity", "swelling")]
+SETS += [("gravity", "pressure", "swelling"), (UNKNOWN,), ("gravity", UNKNOWN), (NOT_PHYSICS,)]
+TRUE = Scale(2.0, (1.5, -1.0, -2.0, 1.0))
 
 
-def ballots(cases, kinds=9, seed=0):
-    """Cases whose truth is drawn with the probabilities of `TRUE`; the last two kinds are unknown and no physics."""
+def ballots(cases, seed=0):
+    """Cases whose truth is drawn with the probabilities of `TRUE`."""
     random = np.random.default_rng(seed)
-    evidence = random.normal(0.0, 9.0, size=(cases, kinds))
-    evidence[random.random(evidence.shape) < 0.2] = -np.inf
-    evidence[:, 0] = 0.0
-    unknown, alternative = (np.arange(kinds) == k for k in (kinds - 1, kinds - 2))
-    flags = [np.tile(flag, (cases, 1)) for flag in (unknown, alternative)]
-    p = Ballots(evidence, np.zeros(evidence.shape, dtype=bool), *flags).probabilities(TRUE)
-    truth = [random.choice(kinds, p=row) for row in p]
-    return Ballots(evidence, np.arange(kinds) == np.array(truth)[:, None], *flags)
+    found = []
+    for _ in range(cases):
+        tried = tuple(Tried(frozenset(causes), 5.0 * random.normal()) for causes in SETS)
+        truth = random.choice(len(tried), p=TRUE.probabilities(tried))
+        found.append(Ballot(tried, np.arange(len(tried)) == truth))
+    return found
 
 
-def test_the_right_scale_is_found():
-    found = fit(ballots(3000))
-    # Monte Carlo error of 3,000 truths: 2.9 %, 0.12 and 0.17 off
-    assert found.temperature == pytest.approx(TRUE.temperature, rel=0.05)
-    assert found.unknown == pytest.approx(TRUE.unknown, abs=0.25)
-    assert found.alternative == pytest.approx(TRUE.alternative, abs=0.3)
+def test_the_right_scale_is_found(verify):
+    found = fit(ballots(1500))
+    # Monte Carlo error of 1,500 truths: 3 % and about 0.2
+    verify(
+        "temperature of log evidences, from 1,500 truths drawn with a known one",
+        "the temperature they were drawn with",
+        abs(found.temperature / TRUE.temperature - 1.0),
+        0.08,
+    )
+    np.testing.assert_allclose(found.weights, TRUE.weights, atol=0.5)
+
+
+def test_nothing_known_leaves_the_scale_as_it_is():
+    even = [Ballot(b.hypotheses, np.ones(len(SETS), dtype=bool)) for b in ballots(20)]
+    found = fit(even)
+    assert (found.temperature, *found.weights) == pytest.approx((1.0, 0.0, 0.0, 0.0, 0.0), abs=1e-6)
 
 
 def test_intervals_hold_the_right_scale_and_held_out_probabilities_are_right():
     given = ballots(150, seed=1)
-    low, high = intervals(given, draws=60)
-    for name in ("temperature", "unknown", "alternative"):
-        assert getattr(low, name) < getattr(TRUE, name) < getattr(high, name)
-    p = held_out(given)
-    np.testing.assert_allclose(p.sum(axis=1), 1.0)
-    tried = np.isfinite(given.evidence)
-    plain = given.probabilities(Scale(1.0, 0.0, 0.0))
-    assert reliability(p[tried], given.right[tried])["ece"] < reliability(plain[tried], given.right[tried])["ece"]
-    assert -np.log((p * given.right).sum(axis=1)).mean() < given.loss(Scale(1.0, 0.0, 0.0))
+    low, high = intervals(given, draws=30)
+    assert low[0] < TRUE.temperature < high[0]
+    # all weights hang together by the temperature: none is far out of its interval
+    middle, half = 0.5 * (low + high)[1:], 0.5 * (high - low)[1:]
+    assert (np.abs(np.array(TRUE.weights) - middle) < 1.5 * half).all() and len(middle) == len(TRAITS)
+    p, right = held_out(given), np.concatenate([b.right for b in given])
+    plain = [Scale().probabilities(b.hypotheses) for b in given]
+    assert reliability(np.concatenate(p), right)["ece"] < reliability(np.concatenate(plain), right)["ece"]
+    assert log_loss(fit(given), given) < log_loss(Scale(), given)
 
 
-def test_the_threshold_of_the_alarm_by_hand():
-    p = [0.01 * k for k in range(1, 40)]
-    # 39 cases: the second smallest, and an alarm below it is one of forty
-    assert conformal(p, 0.05) == pytest.approx(0.02)
-    assert conformal(p[:18], 0.05) is None
-    random = np.random.default_rng(0)
-    false = [random.random() < conformal(random.random(39).tolist(), 0.05) for _ in range(4000)]
-    # Monte Carlo error of 4,000 alarms: 0.0034; 0.002 off
-    assert np.mean(false) == pytest.approx(0.05, abs=0.005)
+def test_the_true_set_of_each_kind_of_case(tmp_path):
+    def true(kind, names, **effect):
+        found = outcome(tmp_path, label("c", kind, names, 9.0, **effect), diagnosis())
+        return {causes for causes in SETS if true_of(found, Tried(frozenset(causes), 0.0))}
+
+    assert true("none", ()) == {()}
+    assert true("effect", ("gravity",)) == {("gravity",)}
+    assert true("outside", ("tether",), also=["swelling"]) == {(UNKNOWN,), ("swelling",)}
+    assert true("trap", ("registration",)) == {(NOT_PHYSICS,)}
+    assert true("two", ("gravity", "pressure")) == {("gravity", "pressure")}
 
 
-def rows(**evidence):
-    kinds = {"registration": False, "unknown": False}
+def hypotheses(**logs):
+    kinds = {"unknown": "unknown", "registration": "not physics"}
     return [
-        {"mechanism": k, "probability": 0.2, "log_evidence": e, "physics": kinds.get(k, True)}
-        for k, e in evidence.items()
+        {
+            "causes": [] if name == "nothing" else name.split("_"),
+            "kinds": [] if name == "nothing" else [kinds.get(cause, "physics") for cause in name.split("_")],
+            "log_evidence": log,
+            "log_prior": -1.0,
+        }
+        for name, log in logs.items()
     ]
 
 
-def test_the_command_prints_what_it_found(tmp_path, capsys):
+def test_the_command_writes_what_the_tool_reads(tmp_path, capsys):
     labels = []
-    for k in range(14):
-        kind, names = [("effect", ("gravity",)), ("outside", ("tether",)), ("trap", ("registration",))][k % 3]
-        labels.append(label(f"c{k}", kind, names, 9.0))
-        said = rows(gravity=5.0 + k % 2, pressure=3.0, unknown=4.0, registration=2.0)
-        outcome(tmp_path, labels[-1], diagnosis("cannot say", p_value=0.001, ranking=said))
     for k in range(20):
-        labels.append(label(f"n{k}"))
-        outcome(tmp_path, labels[-1], diagnosis(p_value=0.04 + 0.04 * k))
+        kinds = [("effect", ("gravity",)), ("outside", ("swirl",)), ("trap", ("registration",)), ("none", ())]
+        labels.append(label(f"c{k}", *kinds[k % 4], 9.0))
+        best = ("gravity", "unknown", "registration", "nothing")[k % 4]
+        tried = {"gravity": 3.0, "pressure": 2.0, "unknown": 2.0, "registration": 2.0, "nothing": 2.0}
+        tried |= {best: 9.0, "gravity_pressure": 1.0}
+        outcome(tmp_path, labels[-1], diagnosis("cannot say", hypotheses=hypotheses(**tried)))
+        (tmp_path / f"c{k}" / "case.toml").touch()
     sealed_labels(tmp_path / "labels", *labels)
+    file = tmp_path / "calibration.json"
     words = ["calibrate", "--cases", tmp_path, "--labels", tmp_path / "labels", "--diagnoses", tmp_path]
+    words += ["--write", file]
     assert main([*map(str, words)]) == 0
-    told = capsys.readouterr().out
-    assert "fitted to 14 with an alarm: 5 effect, 0 two, 5 outside, 4 trap" in told
-    assert "temperature" in told and "p < 0.0400" in told
-    (tmp_path / "c3" / "diagnosis.json").unlink()
-    for k in range(5, 14):
+    assert "fitted to 20: 5 none, 5 effect, 0 two, 5 outside, 5 trap" in capsys.readouterr().out
+    told, now = json.loads(file.read_text()), json.loads(FILE.read_text())
+    assert set(told["log_weights"]) == set(now["log_weights"]) and set(told["losses"]) == set(now["losses"])
+    assert told["temperature"] > 0.0 and told["losses"]["cannot say"] == now["losses"]["cannot say"]
+    for k in range(11):
         (tmp_path / f"c{k}" / "diagnosis.json").unlink()
     assert main([*map(str, words)]) == 2
-    assert "4 cases in which something is missing" in capsys.readouterr().err
+    assert "in 9 of 9 cases; expected 10" in capsys.readouterr().err
+
+
+def test_a_false_name_costs_more_where_names_are_often_false(tmp_path):
+    losses = json.loads(FILE.read_text())["losses"]
+    tried = (Tried(frozenset({"gravity"}), 0.0), Tried(frozenset({"pressure"}), 0.0))
+    given = [Ballot(tried, np.array([True, False]))] * 20
+    stated = [np.array([0.95, 0.05])] * 20
+    right = [outcome(tmp_path, label(f"r{k}", "effect", ("gravity",), 9.0), diagnosis()) for k in range(20)]
+    wrong = [outcome(tmp_path, label(f"w{k}", "effect", ("pressure",), 9.0), diagnosis()) for k in range(4)]
+    cheap, _ = priced(right, given, stated, losses)
+    dear, spoken = priced([*right[4:], *wrong], given, stated, losses)
+    assert dear["false name"] > cheap["false name"] and spoken.of == 0
+    assert dear["false group"] / cheap["false group"] == pytest.approx(dear["false name"] / cheap["false name"])

@@ -15,7 +15,7 @@ from referee.sensing import place_sensors
 from referee.setting import BOTH_LAWS, DEMIRAY, FIELD, LENGTHS, OGDEN, draw_setting
 from referee.sight import Change, Sight
 from referee.sizing import Wish
-from referee.truth import _cap_force, solve_truth
+from referee.truth import cap_force_of, solve_truth
 from referee.unknowns import stiffness_modes, unknowns_of
 
 
@@ -29,7 +29,7 @@ def known(request, small):
     setting = replace(setting, points=40, checks=10)
     problem = setting.problem()
     base = balance(problem)
-    force = _cap_force(problem, base.u)
+    force = cap_force_of(problem, base.u)
     sight = Sight(setting, place_sensors(setting), base.u, force)
     return setting, problem, base, unknowns_of(problem, base), sight
 
@@ -41,7 +41,7 @@ def test_columns_are_those_of_full_equilibria(known):
         factor = np.exp(step * (problem.body.mesh.tissue == label))[:, None]
         other = replace(problem, mu=problem.mu * factor, bulk=problem.bulk * factor)
         found = balance(other, base.u)
-        full = Change((found.u - base.u)[None], _cap_force(other, found.u) - _cap_force(problem, base.u))
+        full = Change((found.u - base.u)[None], cap_force_of(other, found.u) - cap_force_of(problem, base.u))
         rows = sight.rows(full.times(1.0 / step))
         # a difference over a step of 2 % is of first order: at most 1.3 % off
         np.testing.assert_allclose(sight.rows(unknowns.tissues[k]), rows, atol=0.02 * np.abs(rows).max())
@@ -120,7 +120,7 @@ def test_the_recorded_force_is_that_of_tissue_with_the_effect(known):
     truth = solve_truth(setting, [Wish(lambda: whole, lambda most: 2.0)])
     ratio = np.exp(truth.effects[0].size)
     assert ratio > 1.2
-    np.testing.assert_allclose(truth.force, ratio * _cap_force(problem, base.u), rtol=1e-3)
+    np.testing.assert_allclose(truth.force, ratio * cap_force_of(problem, base.u), rtol=1e-3)
     np.testing.assert_allclose(truth.u[0], truth.declared, atol=1e-5)
 
 

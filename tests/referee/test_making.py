@@ -4,12 +4,14 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
 
 from concealed.sealing import open_sealed, read_sealed
 from referee import make
-from referee.draw import MECHANISMS, OUTSIDE, TRAPS
+from referee.draw import MECHANISMS, OUTSIDE, TRAPS, draw_effect, trapped
 from referee.labels import label_of
-from referee.plan import Planned, planned
+from referee.plan import SETS, Planned, planned
+from referee.setting import draw_setting
 from warpbrain.cases.reading import read_case
 from warpbrain.physics.mechanisms import mechanisms
 
@@ -39,6 +41,10 @@ def test_a_case_of_every_class(plan, small, tmp_path):
         assert all(effect["wanted"] > 0.0 and effect["drawn_again"] >= 0 for effect in label["effects"])
     else:
         assert label["detectability"] == 0.0 and label["rms_effect_m"] == 0.0
+    if plan.kind == "two":
+        for effect in label["effects"]:
+            assert 0.0 < effect["conditional"] <= 1.001 * effect["detectability"]
+            assert np.shape(effect["clean_effect_m"]) == np.shape(label["clean_effect_m"])
     if "viscoelasticity" in plan.names:
         assert len(np.unique(case.recordings[0].time)) == 3
         # tissue that creeps is stiffer at first
@@ -77,10 +83,10 @@ def _classes():
 
 
 def test_the_scored_set_is_what_was_announced():
-    cases = planned("scored", 120, ["phantom", "0603"], 1)
-    assert Counter(case.kind for case in cases) == {"none": 24, "effect": 72, "two": 12, "outside": 6, "trap": 6}
+    cases = planned("scored", SETS["scored"], ["phantom", "0603"], 1)
+    assert Counter(case.kind for case in cases) == {"none": 32, "effect": 96, "two": 16, "outside": 8, "trap": 8}
     each = Counter(case.names[0] for case in cases if case.kind == "effect")
-    assert each == dict.fromkeys(MECHANISMS, 9)
+    assert each == dict.fromkeys(MECHANISMS, 12)
     assert {case.names[0] for case in cases if case.kind == "trap"} == set(TRAPS)
     assert {case.names[0] for case in cases if case.kind == "outside"} == set(OUTSIDE)
 
@@ -98,6 +104,40 @@ def test_traps_have_nothing_else_and_as_many_of_each():
     # a trap is not of one body only, but for the mesh that there is of the phantom alone
     for name in set(TRAPS) - {"coarse"}:
         assert len({case.geometry for case in cases if case.names == (name,)}) == 2
+
+
+def test_sets_of_pairs_and_of_what_has_no_name():
+    cases = planned("pairs", SETS["pairs"], ["phantom", "phantom", "0603"], 1)
+    assert len(cases) == 100 and {case.kind for case in cases} == {"two"}
+    of_pair = Counter(frozenset(case.names) for case in cases)
+    assert len(of_pair) == 28 and set(of_pair.values()) == {3, 4}
+    cases = planned("unknown", SETS["unknown"], ["phantom", "phantom", "0603"], 1)
+    assert len(cases) == 100 and {case.kind for case in cases} == {"outside"}
+    assert set(Counter(case.names for case in cases).values()) == {14, 15}
+
+
+def test_the_trap_of_registration_is_an_exact_rigid_motion(small):
+    random = np.random.default_rng(0)
+    setting = draw_setting(random, "phantom", False)
+    points = small.points[::50]
+    for _ in range(20):
+        blur = trapped(random, "registration", setting).blur
+        turned = points + blur.misaligned(points, np.zeros_like(points), points.mean(axis=0))
+        assert 3e-3 <= np.linalg.norm(blur.shift) <= 8e-3
+        assert 2.0 <= np.rad2deg(np.linalg.norm(blur.rotation)) <= 8.0
+        np.testing.assert_allclose(pdist(turned), pdist(points), atol=1e-15)
+
+
+def test_a_support_may_be_free_over_a_patch(small):
+    random = np.random.default_rng(0)
+    drawn = [draw_effect(random, "contact", draw_setting(random, "phantom", False)) for _ in range(20)]
+    assert {effect.support for effect in drawn} == {"side", "fixed"}
+    base = next(effect for effect in drawn if effect.support == "fixed").resized(0.03)
+    problem = draw_setting(random, "phantom", False).problem()
+    loose = problem.held[:, 0] & ~base.act(problem).held[:, 0]
+    assert loose.any() and not (loose & ~small.nodes("fixed")).any()
+    assert (np.linalg.norm(small.points[loose] - base.centre, axis=1) < 0.03).all()
+    assert not loose[small.nodes("fixed")].all()
 
 
 def test_a_seed_is_any_text():

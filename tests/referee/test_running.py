@@ -3,7 +3,9 @@
 import sys
 
 import pytest
+from said import label, sealed_labels
 
+from referee import __main__ as command
 from referee import run
 from warpbrain.errors import InputError
 
@@ -62,3 +64,28 @@ def test_a_case_that_takes_too_long_has_no_diagnosis(cases, tmp_path, monkeypatc
 def test_a_folder_without_cases_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"no folder in it has a case\.toml"):
         run.run_all(tmp_path, tmp_path / "out", None, 1, [])
+
+
+def test_a_mechanism_is_left_out_of_the_dictionary(cases, tmp_path, monkeypatch):
+    calls = []
+
+    def runs(words, **_):
+        from subprocess import CompletedProcess
+
+        calls.append(words)
+        return CompletedProcess(words, 0)
+
+    monkeypatch.setattr(run, "_commit", lambda: "c0ffee")
+    monkeypatch.setattr(run.subprocess, "run", runs)
+    words = ["run", "--cases", cases, "--out", tmp_path / "all", "--leave-out"]
+    assert command.main([*map(str, words), "gravity"]) == 0
+    dictionary = calls[0][calls[0].index("--candidates") + 1].split(",")
+    assert "gravity" not in dictionary and {"pressure", "contact"} <= set(dictionary) and len(calls) == 2
+    assert {row["left_out"] for row in run.read_runs(tmp_path / "all")} == {"gravity"}
+    # of each case its own, which the labels tell
+    assert command.main([*map(str, words), "each"]) == 2
+    sealed_labels(tmp_path / "labels", label("a", "effect", ("pressure",), 9.0), label("b"))
+    words[4] = tmp_path / "each"
+    assert command.main([*map(str, words), "each", "--labels", str(tmp_path / "labels")]) == 0
+    assert [(row["case"], row["left_out"]) for row in run.read_runs(tmp_path / "each")] == [("a", "pressure")]
+    assert command.main([*map(str, words), "magic"]) == 2

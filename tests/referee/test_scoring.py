@@ -9,8 +9,10 @@ from said import diagnosis, label, outcome, sealed_labels
 from scipy.stats import binom, binomtest
 
 from referee.__main__ import main
+from referee.analysed import Analysis, with_conditionals
 from referee.diagnoses import read_diagnosis
 from referee.intervals import Share
+from referee.outcomes import read_outcomes
 from referee.scores import amounts, calibration, confusion, shares
 from warpbrain.errors import InputError
 
@@ -50,9 +52,12 @@ def outcomes(tmp_path):
         ),
         (label("t1", "trap", ("noise",)), diagnosis("not physics")),
         (label("t2", "trap", ("coarse",)), diagnosis("named+rest", "pressure", 0.9)),
-        (label("2a", "two", ("gravity", "swelling"), 9.0), diagnosis("named", ["gravity", "swelling"], 0.9)),
         (
-            label("2b", "two", ("gravity", "pressure"), 9.0, detectability=4.0),
+            label("2a", "two", ("gravity", "swelling"), 9.0, conditional=8.5),
+            diagnosis("named", ["gravity", "swelling"], 0.9),
+        ),
+        (
+            label("2b", "two", ("gravity", "pressure"), 9.0, conditional=5.5),
             diagnosis("named + rest", "gravity", 0.9),
         ),
     ]
@@ -75,7 +80,11 @@ def test_shares(outcomes):
     assert found["amount within 2 sd"] == (1, 1)
     assert found["unknown found"] == (1, 2)
     assert found["both of two named"] == (1, 2)
-    assert found["both of two named, each d >= 5"] == (1, 1)
+    # of each what it shows where the other is not known
+    assert found["both of two named, each d >= 8"] == (1, 1)
+    assert found["both of two named, each d >= 5"] == (1, 2)
+    assert found["outside the dictionary, called by a wrong name"] == (0, 2)
+    assert found["unknown found, d >= 8"] == (2, 2)
     assert found["one of two named"] == (2, 2)
 
 
@@ -150,11 +159,54 @@ def test_the_command_scores_and_refuses(tmp_path, outcomes, capsys):
     told = json.loads((tmp_path / "out" / "score.json").read_text())
     assert told["without_diagnosis"] == ["never"]
     assert told["shares"]["false alarms"]["hits"] == 1
-    assert "| false alarms | 1 of 3 = 33 % (1 to 91) | <= 5 % | NOT met |" in capsys.readouterr().out
+    assert "| false alarms | 1 of 3 = 33 % (1 to 91) |  | <= 5 % | NOT met |" in capsys.readouterr().out
     assert main([*map(str, words), "--no-baselines", "--beside", f"plain={tmp_path}"]) == 0
-    assert "| score, in cases of all | the run | plain |" in capsys.readouterr().out
+    assert "| score, in cases of all | the run | plain | the optimal analyst |" in capsys.readouterr().out
     assert main([*map(str, words), "--no-baselines", "--beside", "plain=nowhere"]) == 2
     for name in ("confusion", "reliability", "accuracy"):
         assert (tmp_path / "out" / f"{name}.png").stat().st_size > 5000
     (labels / "commitments.txt").write_text("0" * 64 + "  n1\n")
     assert main([*map(str, words), "--no-baselines"]) == 2
+
+
+def test_a_name_is_false_where_its_mechanism_was_left_out(tmp_path):
+    said = [
+        ("a", diagnosis("named", "pressure", 0.9)),
+        ("b", diagnosis("unknown")),
+        ("c", diagnosis("group", "pressure", 0.5, group=["pressure", "unknown"])),
+        ("d", diagnosis()),
+    ]
+    found = [
+        replace(outcome(tmp_path, label(name, "effect", ("gravity",), 9.0), told), left_out="gravity")
+        for name, told in said
+    ]
+    # of another mechanism nothing changes
+    also = replace(outcome(tmp_path, label("e", "effect", ("pressure",), 9.0), said[0][1]), left_out="gravity")
+    told = {name: (value.hits, value.of) for name, value in shares([*found, also]).items()}
+    assert told["mechanism left out, called by a name, d >= 8"] == (1, 4)
+    assert told["mechanism left out, unknown or a group with it, d >= 8"] == (2, 4)
+    assert told["right name alone, d >= 8"] == (1, 1)
+    assert told["spoken names right"] == (1, 2)
+    with (tmp_path / "runs.csv").open("w") as file:
+        file.write("case,status,seconds,version,commit,arguments,left_out\na,0,1,1,c,,gravity\n")
+    read, missing = read_outcomes({o.name: o.label for o in found[:2]} | {"z": label("z")}, tmp_path)
+    assert [o.kind for o in read] == ["left out", "effect"] and not missing
+
+
+def test_the_optimal_analyst_stands_beside(tmp_path, outcomes, capsys):
+    sealed_labels(tmp_path / "labels", *(dict(o.label) for o in outcomes))
+    analysed = tmp_path / "analysed"
+    analysed.mkdir()
+    sure, torn = [[["swelling"], 1.0]], [[["gravity"], 0.5], [["swelling"], 0.5]]
+    draws = [{"p_value": 0.0, "sets": sets} for sets in (sure, torn, torn, torn)]
+    (analysed / "s1.json").write_text(json.dumps({"conditional": [12.0], "draws": draws}))
+    older = {**outcomes[-1].label, "effects": [{"detectability": 4.0}, {"detectability": 4.0}]}
+    given = with_conditionals(older, Analysis((3.0, 2.0), ()))
+    assert [effect["conditional"] for effect in given["effects"]] == [3.0, 2.0]
+    words = ["score", "--cases", tmp_path, "--labels", tmp_path / "labels", "--diagnoses", tmp_path]
+    words += ["--out", tmp_path / "out", "--no-baselines", "--analysed", analysed]
+    assert main([*map(str, words)]) == 0
+    told = capsys.readouterr().out
+    # named in one of four residuals: the bar is 5 points below
+    assert "| right name alone, d >= 8 | 1 of 2 = 50 % (1 to 99) | 25 % | >= 20 % (announced 92 %, above" in told
+    assert json.loads((tmp_path / "out" / "score.json").read_text())["optimal"]["right name alone, d >= 8"] == 0.25

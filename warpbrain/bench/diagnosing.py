@@ -38,11 +38,11 @@ def _bench(options: argparse.Namespace) -> None:
     from warpbrain.atomic import output_folder, safe_name, whole_file
     from warpbrain.cases.shipped import find_case
     from warpbrain.diagnosis.diagnose import Diagnosing
-    from warpbrain.diagnosis.options import Listener
     from warpbrain.report.summary import machine
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.progress import Progress
     from warpbrain.terminal.quiet import start_warp_quietly
+    from warpbrain.worlds.listener import Listener
 
     start_warp_quietly()
     device, versions, today = find_device(options.device), machine(), date.today().isoformat()

@@ -172,10 +172,21 @@ def _recording(folder: Path, recording: Recording, frame: Frame) -> dict[str, An
         PointsRecording: lambda r: {"outside": r.outside},
         SurfaceRecording: lambda r: {"nodes": r.nodes},
         ForceRecording: lambda r: {"boundary": r.boundary},
-        TestRecording: lambda r: {"mode": r.mode} | ({"specimen": r.specimen} if r.specimen else {}),
+        TestRecording: lambda r: _test(r, frame),
     }
     write_recording(folder / name, replace(recording, file=name), frame)
     return table | more[type(recording)](recording)
+
+
+def _test(recording: TestRecording, frame: Frame) -> dict[str, Any]:
+    table: dict[str, Any] = {"mode": recording.mode}
+    if recording.specimen:
+        table["specimen"] = recording.specimen
+    if recording.axis != (0.0, 0.0, 1.0):
+        table["axis"] = frame.directions(recording.axis).tolist()
+    if recording.sheared is not None:
+        table["sheared"] = frame.directions(recording.sheared).tolist()
+    return table
 
 
 def _new_file(folder: Path, room: str, name: str, ending: str) -> str:

@@ -45,7 +45,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from warpbrain.diagnosis.options import DiagnosisOptions, Listener
+    from warpbrain.diagnosis.options import DiagnosisOptions
+    from warpbrain.worlds.listener import Listener
 
     kinds = None if options.candidates == "all" else tuple(options.candidates.split(","))
     asked = DiagnosisOptions(
@@ -85,7 +86,7 @@ def _run(options: argparse.Namespace) -> None:
     finally:
         progress.clear()
     said = way.describe(found, asked, device)
-    say("", *way.lines(said), sep="\n")
+    say("", *way.lines(found, said), sep="\n")
     for name, write in way.tables.items():
         write(out / name, found)
     written = [*way.tables]
@@ -103,7 +104,7 @@ class _Way(NamedTuple):
 
     diagnosing: Callable[..., Any]
     describe: Callable[..., dict[str, Any]]
-    lines: Callable[[dict[str, Any]], list[str]]
+    lines: Callable[[Any, dict[str, Any]], list[str]]
     tables: dict[str, Callable[[Path, Any], None]]
 
 
@@ -117,15 +118,23 @@ def _of_a_body() -> _Way:
 
     tables: dict[str, Callable[[Path, Any], None]]
     tables = {"map.vtu": write_map, "points.csv": write_points, "covariance.npz": write_covariance}
-    return _Way(Diagnosing, describe_diagnosis, diagnosis_lines, tables)
+    return _Way(Diagnosing, describe_diagnosis, lambda _found, said: diagnosis_lines(said), tables)
 
 
 def _of_a_specimen() -> _Way:
-    from warpbrain.diagnosis.specimen.diagnose import DiagnosingSpecimen
     from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines
     from warpbrain.report.diagnosis.specimen_curves import write_curves
+    from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
 
-    return _Way(DiagnosingSpecimen, describe_specimen_diagnosis, specimen_diagnosis_lines, {"curves.csv": write_curves})
+    def options(asked: Any) -> SpecimenOptions:
+        return SpecimenOptions(asked.candidates, asked.alpha, asked.seed, asked.draws, asked.ends)
+
+    return _Way(
+        lambda case, asked, device, listener: DiagnosingSpecimen(case, options(asked), device, listener.stage),
+        lambda found, asked, device: describe_specimen_diagnosis(found, options(asked), device),
+        lambda found, _said: specimen_diagnosis_lines(found),
+        {"curves.csv": write_curves},
+    )
 
 
 def _silent(*_values: object, **_options: object) -> None:

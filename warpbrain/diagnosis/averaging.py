@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from warpbrain.diagnosis.effects import Effect
-from warpbrain.diagnosis.parameters import values_of
 from warpbrain.diagnosis.refitting import Refit
-from warpbrain.diagnosis.result import Value
 from warpbrain.diagnosis.spectrum import amount_in_all
 from warpbrain.diagnosis.stage import Stage
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.parameters import values_of
+from warpbrain.worlds.body.values import Value
 
 
 def averaged_values(stage: Stage, kind: str, fit: Refit, number: int) -> tuple[Value, ...]:

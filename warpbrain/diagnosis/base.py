@@ -12,26 +12,26 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.effects import Effects
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.flexible import LENGTHS, flexible_columns, smooth_forces
 from warpbrain.diagnosis.fraction import likely_fraction
 from warpbrain.diagnosis.gross_errors import ASIDE, gross_errors
-from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected
-from warpbrain.diagnosis.nuisances import REGISTRATION_SD, Nuisances, nuisances_at, other_volume
-from warpbrain.diagnosis.options import Listener
 from warpbrain.diagnosis.pairs import PairEvidence, Pairs, pairs_at
 from warpbrain.diagnosis.sensing import explanation_of, known_sigma
-from warpbrain.diagnosis.sensors import Sensors, tracked_points
-from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
-from warpbrain.diagnosis.switching import Known, Solving
-from warpbrain.diagnosis.time_courses import main_courses
-from warpbrain.diagnosis.tissue_prior import declared, tissue_prior
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.simulation.locking import on_linear_elements
 from warpbrain.threads import beside
+from warpbrain.worlds.body.effects import Effects
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
+from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume, registration_sd
+from warpbrain.worlds.body.sensors import Sensors, tracked_points
+from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
+from warpbrain.worlds.body.switching import Known, Solving
+from warpbrain.worlds.body.time_courses import main_courses
+from warpbrain.worlds.body.tissue_prior import declared, tissue_prior
+from warpbrain.worlds.listener import Listener
 
 Floats = NDArray[np.float64]
 
@@ -233,7 +233,7 @@ class BaseFinder:
         explanation = explanation.with_more(_ROUGHLY * rough.nuisances.columns[:, registration])
         kappa = explanation.best_kappa(rough.whitened)
         xi = explanation.nuisances_given(rough.whitened, kappa)
-        self.states.realign((xi[registration] + _ROUGHLY * xi[-6:]) * REGISTRATION_SD)
+        self.states.realign((xi[registration] + _ROUGHLY * xi[-6:]) * registration_sd())
         return self._moved(rough.nuisances, xi)
 
     def _declared(self) -> Hypothesis:
@@ -270,7 +270,7 @@ class BaseFinder:
             nuisances = nuisances.weakened()
         # what the state has of tissue and field is given back, so that their middle is that of their prior
         z = nuisances.coordinates(self.prior, state.hypothesis)
-        z[nuisances.part("registration")] = self.states.motion / REGISTRATION_SD
+        z[nuisances.part("registration")] = self.states.motion / registration_sd()
         residual = sensors.residual + nuisances.columns @ z
         anything = _any_force(flexible, residual, at)
         loose = np.column_stack([nuisances.columns, anything])

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.effects import Effect
-from warpbrain.diagnosis.parameters import numbers_of
+from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.parameters import numbers_of
 
 Floats = NDArray[np.float64]
 

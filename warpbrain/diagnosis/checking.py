@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.mesh_error import MeshErrors, expected
 from warpbrain.diagnosis.refitting import Refit
-from warpbrain.diagnosis.sensors import sensors_at
 from warpbrain.errors import SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.realigned import realigned
+from warpbrain.worlds.body.mesh_error import MeshErrors, expected
+from warpbrain.worlds.body.sensors import sensors_at
 
 Floats = NDArray[np.float64]
 

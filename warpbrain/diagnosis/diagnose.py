@@ -12,23 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.alternatives import alternatives_at
 from warpbrain.diagnosis.base import Base, BaseFinder
 from warpbrain.diagnosis.between import between_neighbours
 from warpbrain.diagnosis.checking import check_errors
 from warpbrain.diagnosis.concluding import named_together
-from warpbrain.diagnosis.dictionary import Candidates, candidates_at, dictionary_of
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import Explanation, Stack
 from warpbrain.diagnosis.held_out import Predicted
 from warpbrain.diagnosis.judging import Judge, Judgement
 from warpbrain.diagnosis.locating import ScoreMap, score_map
 from warpbrain.diagnosis.measuring import next_measurements
 from warpbrain.diagnosis.naming import named_in_turn
-from warpbrain.diagnosis.observable import require_observable
 from warpbrain.diagnosis.onset import onset_of
-from warpbrain.diagnosis.options import DiagnosisOptions, Listener
-from warpbrain.diagnosis.parameters import SEEN, smallest_of
+from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.placing import placed
 from warpbrain.diagnosis.refining import refined
 from warpbrain.diagnosis.refitting import Refit, Refitting
@@ -42,18 +37,25 @@ from warpbrain.diagnosis.result import (
     Diagnosis,
     Fit,
     Ranked,
-    Smallest,
 )
 from warpbrain.diagnosis.screening import UNKNOWN as UNKNOWN_KIND
 from warpbrain.diagnosis.sentences import assumptions_of, sentence_of
 from warpbrain.diagnosis.sound_points import sound_points
-from warpbrain.diagnosis.stage import WORTH, Stage, candidates_beside, compared, linear_point
-from warpbrain.diagnosis.states import States
+from warpbrain.diagnosis.stage import WORTH, Stage, compared, linear_point
 from warpbrain.diagnosis.traits import Traits, traits_of
 from warpbrain.diagnosis.verdict import CLAIM, overall
 from warpbrain.diagnosis.virtual import VirtualCases
 from warpbrain.errors import InputError, SolveError
 from warpbrain.threads import beside, in_threads, one_thread_of_blas
+from warpbrain.worlds.body.dictionary import Candidates, candidates_at, candidates_beside, dictionary_of
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.not_physics import not_physics_at
+from warpbrain.worlds.body.observable import require_observable
+from warpbrain.worlds.body.parameters import SEEN, smallest_of
+from warpbrain.worlds.body.states import States
+from warpbrain.worlds.body.surfaces import with_sets_that_act
+from warpbrain.worlds.body.values import Smallest
+from warpbrain.worlds.listener import Listener
 
 Floats = NDArray[np.float64]
 
@@ -208,7 +210,7 @@ class Diagnosing:
     def _looked_for(self, base: Base) -> tuple[Base, Candidates]:
         """What is looked for at a base, and that with the points that are no gross errors where something acts."""
         with self._timed("candidates"):
-            alternatives = alternatives_at(base.at, base.nuisances)
+            alternatives = not_physics_at(base.at, base.nuisances)
             candidates = candidates_at(
                 self.dictionary, base.effects, alternatives, lambda kind: self.listener.stage(f"candidate: {kind}")
             )
@@ -219,7 +221,7 @@ class Diagnosing:
         """The next stage: what acts beside a kind, as it was refitted."""
         known = (*before.known, kind)
         self.listener.stage(f"what acts beside {' and '.join(known)}")
-        candidates = candidates_beside(fit, before.candidates)
+        candidates = candidates_beside(fit.state, fit.effects, before.candidates)
         explanation = fit.explanation(before.base.explanation.factor)
         stage = compared(before.base, known, candidates, explanation, fit.linear, fit.kappa, self._draws, rng)
         stage.fits["none"] = fit
@@ -345,7 +347,7 @@ class Diagnosing:
     def _explained(self, fits: dict[str, Refit], named: tuple[Ranked, ...]) -> Case | None:
         if not named:
             return None
-        case = self.states.case_of(fits[EXPLAINED].state.hypothesis)
+        case = with_sets_that_act(self.states.case_of(fits[EXPLAINED].state.hypothesis), self.case.mesh)
         kinds = " and ".join(one.kind for one in named)
         return replace(case, name=f"{case.name}-explained", title=f"{case.title}, with {kinds}")
 

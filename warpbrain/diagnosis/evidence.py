@@ -20,8 +20,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.threads import fill_columns
+from warpbrain.worlds.body.effects import Effect
 
 Floats = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.sensors import spread_points
 from warpbrain.threads import in_threads
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.unknown import force_patches
 
 Floats = NDArray[np.float64]
 
@@ -21,19 +21,6 @@ Floats = NDArray[np.float64]
 LENGTHS, SCALES = (1.0, 2.4), (1.5, 4.0, 10.0)
 #: Part of the variance that is cut off, and the most modes that are kept.
 _CUT, _MOST = 1e-3, 150
-
-
-def force_patches(at: Linearisation, length: float, spacing: float | None = None) -> tuple[Floats, Floats]:
-    """Sites (s, 3) [m], and answers (n, s, 3) to a force of 1 N in each direction, spread with a Gaussian."""
-    from scipy.spatial.distance import cdist
-
-    mesh = at.system.model.mesh
-    sites = mesh.points[spread_points(mesh.points, length if spacing is None else spacing, 700)]
-    apart = cdist(mesh.points, sites)
-    weights = mesh.node_volumes[:, None] * np.exp(-0.5 * (apart / length) ** 2)
-    # a share that falls on what is held moves nothing
-    weights /= weights.sum(axis=0)
-    return sites, at.answers_of_patches(weights)
 
 
 def flexible_columns(at: Linearisation, lengths: Sequence[float]) -> tuple[Floats, ...]:

@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.nuisances import FRACTION, Nuisances
 from warpbrain.diagnosis.screening import log_unknown
+from warpbrain.inference.beliefs import beliefs
+from warpbrain.worlds.body.nuisances import Nuisances
 
 Floats = NDArray[np.float64]
 
 #: Parts of the displacement that are tried, all alike likely.
-FRACTIONS = FRACTION * np.array([0.1, 0.2, 0.35, 0.6, 1.0])
+FRACTIONS = beliefs("mesh.unknown")
 
 
 def likely_fraction(factor: Floats, nuisances: Nuisances, residual: Floats, smooth: Sequence[Floats]) -> float:

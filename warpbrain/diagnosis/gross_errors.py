@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.sensors import Sensors, rows_of_points
+from warpbrain.worlds.body.sensors import Sensors, rows_of_points
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

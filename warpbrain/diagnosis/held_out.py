@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.sensors import Sensors, spread_points
+from warpbrain.worlds.body.sensors import Sensors, spread_points
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -16,12 +16,12 @@ from warpbrain.diagnosis.held_out import HeldOut, Predicted, placebo, scattered_
 from warpbrain.diagnosis.letting_go import where_it_lets_go
 from warpbrain.diagnosis.locating import ball_of
 from warpbrain.diagnosis.options import DiagnosisOptions
-from warpbrain.diagnosis.parameters import scanned_values, values_of
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.result import Ranked
 from warpbrain.diagnosis.screening import UNKNOWN
 from warpbrain.diagnosis.stage import Stage
 from warpbrain.diagnosis.verdict import ADEQUATE, Evidence, Verdict, decide
+from warpbrain.worlds.body.parameters import scanned_values, values_of
 
 Floats = NDArray[np.float64]
 

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.calibration import BODIES
-from warpbrain.diagnosis.dictionary import BETWEEN, RADII, patch_of
-from warpbrain.diagnosis.effects import Effect
-from warpbrain.diagnosis.result import Value
 from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.proposal import Patch, Proposal
+from warpbrain.worlds.body.dictionary import BETWEEN, RADII, patch_of
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.values import Value
 
 Floats = NDArray[np.float64]
 
@@ -65,11 +65,12 @@ def where_it_lets_go(stage: Stage, kind: str) -> Placed:
     ----------
     stage : Stage
     kind : str
-        Whose proposals are releases.
+        Some of whose proposals are releases.
     """
     from scipy.special import softmax
 
-    own = stage.candidates.of_kind[kind]
+    effects_of_all = stage.candidates.effects
+    own = np.array([k for k in stage.candidates.of_kind[kind].tolist() if effects_of_all[k].proposed.patch is not None])
     chances = softmax(stage.screen.places[own, 0] / BODIES.temperature)
     probable = own[chances >= min(_PROBABLE, float(chances.max()))]
     proposals = [stage.candidates.effects[k].proposed for k in probable.tolist()]

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.flexible import force_patches
-from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.unknown import force_patches
 
 Floats = NDArray[np.float64]
 

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.result import Measurement
 from warpbrain.diagnosis.screening import Screen
-from warpbrain.diagnosis.sensors import spread_points
+from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.sensors import spread_points
 
 Floats = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
 """When something set in: what explains the mismatch, there from one of the recorded times on.
 
-Place and interval (`warpbrain.diagnosis.time_courses`) are scanned together. Each interval is as probable as another
+Place and interval (`warpbrain.worlds.body.time_courses`) are scanned together. Each interval is as probable as another
 beforehand, and each course within it. A smooth force is only nearly what acts, and the state that all is linear about
 only nearly that of each time: the evidence is sharper than it should be, and is divided by a temperature with which
 what is said held for sudden and growing swellings of a phantom.
@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import log_mean
 from warpbrain.diagnosis.screening import UNKNOWN, Screen, log_unknown
 from warpbrain.diagnosis.stack_evidence import StackEvidence
-from warpbrain.diagnosis.time_courses import TimeCourse, time_courses
+from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.time_courses import TimeCourse, time_courses
 
 Floats = NDArray[np.float64]
 

@@ -1,9 +1,8 @@
-"""How a diagnosis is asked for, and how it tells what it does."""
+"""How a diagnosis is asked for."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from warpbrain.errors import InputError
@@ -51,19 +50,3 @@ class DiagnosisOptions:
             raise InputError(f"alpha = {self.alpha:g}: expected a number between 0 and 0.5")
         if self.draws < 1.0 / self.alpha:
             raise InputError(f"draws = {self.draws}: too few for alpha = {self.alpha:g}")
-
-
-@dataclass(frozen=True)
-class Listener:
-    """Told what a diagnosis does.
-
-    Attributes
-    ----------
-    stage : callable
-        With a sentence, when something new begins.
-    progress : callable
-        With a part from 0 to 1 and a word.
-    """
-
-    stage: Callable[[str], None] = lambda _text: None
-    progress: Callable[[float, str], None] = lambda _part, _word: None

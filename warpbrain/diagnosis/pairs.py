@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.evidence import KAPPAS, Explanation, kappa_log_prior
-from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.sensors import spread_points
 from warpbrain.mesh import node_areas
 from warpbrain.threads import in_threads
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.sensors import spread_points
 
 Floats = NDArray[np.float64]
 

@@ -15,7 +15,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.refining import Refined, spread_of_place
 from warpbrain.diagnosis.screened import Screened
 from warpbrain.diagnosis.stack_evidence import StackEvidence
@@ -23,6 +22,7 @@ from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh, face_vectors, tangents
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import Proposal
+from warpbrain.worlds.body.effects import Effect
 
 Floats = NDArray[np.float64]
 

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.dictionary import BETWEEN, RADII, patch_of
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.diagnosis.stage import Stage
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh, face_vectors, tangents
 from warpbrain.physics.proposal import Patch, Proposal
+from warpbrain.worlds.body.dictionary import BETWEEN, RADII, patch_of
+from warpbrain.worlds.body.effects import Effect
 
 Floats = NDArray[np.float64]
 
@@ -124,7 +124,8 @@ def _spread(stage: Stage, number: int, best: Proposal, along: Floats) -> Floats:
     effects = stage.candidates.effects
     region = effects[number].proposed.released.held
     own = next(own for own in stage.candidates.of_kind.values() if number in own)
-    alike = [k for k in own.tolist() if np.array_equal(effects[k].proposed.released.held, region)]
+    patches = {k: patch for k in own.tolist() if (patch := effects[k].proposed.patch) is not None}
+    alike = [k for k, patch in patches.items() if np.array_equal(patch.held, region)]
     at = np.array([_coordinates(effects[k].proposed, best, along) for k in alike])
     return spread_of_place(at, stage.screen.places[alike, 0], _CELL)
 

@@ -13,16 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.effects import Effect, Effects, parts_of
 from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.linearisation import Linearisation
-from warpbrain.diagnosis.mesh_error import FinerStates, MeshErrors, expected, expected_answer
-from warpbrain.diagnosis.nuisances import Nuisances, field_columns, mesh_by_tissue, tissue_columns
-from warpbrain.diagnosis.states import Hypothesis, SolvedState, States
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.physics.proposal import Proposal
+from warpbrain.worlds.body.effects import Effect, Effects, parts_of
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected, expected_answer
+from warpbrain.worlds.body.nuisances import Nuisances, field_columns, mesh_by_tissue, tissue_columns
+from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
 
 Floats = NDArray[np.float64]
 

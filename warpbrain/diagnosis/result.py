@@ -15,6 +15,7 @@ from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.traits import Traits
+from warpbrain.worlds.body.values import Smallest, Value
 
 Floats = NDArray[np.float64]
 
@@ -33,24 +34,6 @@ WITH_IT, WITHOUT_IT = "group with it", "group without it"
 
 #: Among fits, and among what held-out points are predicted to be: with all that is named.
 EXPLAINED = "explained"
-
-
-@dataclass(frozen=True)
-class Value:
-    """A parameter of a mechanism after the fit.
-
-    Attributes
-    ----------
-    name : str
-    value, sd : float
-        In the unit.
-    unit : str
-    """
-
-    name: str
-    value: float
-    sd: float
-    unit: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,27 +87,6 @@ class Measurement:
 
     what: str
     expected_nats: float
-
-
-@dataclass(frozen=True)
-class Smallest:
-    """The smallest effect of a kind that these data show.
-
-    Attributes
-    ----------
-    size : float
-        In the unit: nine of ten raise an alarm.
-    unit : str
-    name : str
-        Of the parameter.
-    named : float
-        The size of which half would be named; infinite if none would.
-    """
-
-    size: float
-    unit: str
-    name: str
-    named: float = float("inf")
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.effects import Effect
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.screening import Screen, Screening
 from warpbrain.mesh import TetMesh
+from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.worlds.body.effects import Effect
 
 Floats = NDArray[np.float64]
 

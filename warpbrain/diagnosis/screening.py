@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.evidence import KAPPAS, Explanation, Stack, log_mean
 from warpbrain.diagnosis.pairs import PairEvidence
 from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.threads import in_threads
+from warpbrain.worlds.body.dictionary import Candidates
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.inference.noise import noise_factor
+from warpbrain.worlds.body.sensors import Sensors
 
 Floats = NDArray[np.float64]
 

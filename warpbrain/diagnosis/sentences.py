@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.alternatives import SENTENCES
 from warpbrain.diagnosis.base import Base
 from warpbrain.diagnosis.result import (
     CANNOT_SAY,
@@ -18,12 +17,13 @@ from warpbrain.diagnosis.result import (
     Confusion,
     Fit,
     Ranked,
-    Smallest,
 )
 from warpbrain.diagnosis.traits import Traits
 from warpbrain.diagnosis.verdict import Conclusion, Verdict
 from warpbrain.diagnosis.words import measured, size_in_words, smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.worlds.body.not_physics import SENTENCES
+from warpbrain.worlds.body.values import Smallest
 
 #: A share of virtual cases below the first is hardly ever, below the second as good as none.
 _SELDOM, _RARELY = 0.05, 0.01

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.evidence import KAPPAS, Explanation, kappa_log_prior
-from warpbrain.diagnosis.sensors import Sensors, rows_of_points
 from warpbrain.threads import in_threads
+from warpbrain.worlds.body.sensors import Sensors, rows_of_points
 
 Floats = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ def log_odds(sensors: Sensors, explanation: Explanation, residual: Floats, kappa
     """Logarithm of the odds (n,) that the point of each row is a gross error, after what all others say of it.
 
     Minus infinity for forces: nobody pairs them wrongly. That one was not measured as it should be is what competes
-    with mechanisms; see `warpbrain.diagnosis.alternatives`.
+    with mechanisms; see `warpbrain.worlds.body.not_physics`.
 
     Parameters
     ----------

@@ -27,7 +27,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.dictionary import Candidates
 from warpbrain.diagnosis.evidence import Explanation, log_mean
 from warpbrain.diagnosis.gross_errors import ASIDE
 from warpbrain.diagnosis.placing import placed
@@ -36,6 +35,7 @@ from warpbrain.diagnosis.screening import Screen, Screening
 from warpbrain.diagnosis.single_points import LARGE, OFTEN
 from warpbrain.diagnosis.stack_evidence import StackEvidence
 from warpbrain.threads import in_threads
+from warpbrain.worlds.body.dictionary import Candidates
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.effects import Effect, faded
 from warpbrain.diagnosis.evidence import Explanation
 from warpbrain.diagnosis.refitting import Refit
-from warpbrain.diagnosis.sensors import Sensors
 from warpbrain.physics.proposal import Proposal
+from warpbrain.worlds.body.effects import Effect, faded
+from warpbrain.worlds.body.sensors import Sensors
 
 Floats = NDArray[np.float64]
 

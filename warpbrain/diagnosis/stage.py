@@ -6,21 +6,20 @@ columns are nuisances then, each with the width of its own prior.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.base import Base
-from warpbrain.diagnosis.dictionary import Candidates
-from warpbrain.diagnosis.effects import Effect, Effects
 from warpbrain.diagnosis.evidence import Explanation, log_mean
 from warpbrain.diagnosis.gross_errors import ASIDE
-from warpbrain.diagnosis.linearisation import Linearisation
 from warpbrain.diagnosis.refitting import Refit
 from warpbrain.diagnosis.screened import Screened
 from warpbrain.diagnosis.screening import UNKNOWN, Screening
 from warpbrain.diagnosis.single_points import gain_of_gross_errors, log_evidence_and_odds
+from warpbrain.worlds.body.dictionary import Candidates
+from warpbrain.worlds.body.effects import Effect
 
 Floats = NDArray[np.float64]
 
@@ -237,33 +236,3 @@ def linear_point(
     W = explanation.whitened(columns) / kappa
     w = explanation.whitened(residual - mean) / kappa
     return np.asarray(np.linalg.solve(np.eye(W.shape[1]) + W.T @ W, W.T @ w))
-
-
-def candidates_beside(fit: Refit, candidates: Candidates) -> Candidates:
-    """The effects of a dictionary at the state of a refit.
-
-    What is solved as a whole or over time keeps the columns that it has at the base, as has what is no physics. A kind
-    of which a case has only one is left out where the refit has it.
-    """
-    state = fit.state
-    known = None if candidates.makes is None else candidates.makes.mesh_errors
-    effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=known)
-    acting = [effect.proposed.make(effect.proposed.mean) for effect in fit.effects]
-    there = {mechanism.kind for mechanism in acting if not mechanism.several}
-    found: list[Effect] = []
-    of_kind: dict[str, NDArray[np.int64]] = {}
-    for kind, numbers in candidates.of_kind.items():
-        if kind in there:
-            continue
-        own = [candidates.effects[k] for k in numbers.tolist()]
-        smooth = [k for k, effect in enumerate(own) if _is_smooth(effect)]
-        for k, effect in zip(smooth, effects.of([own[k].proposed for k in smooth]), strict=True):
-            own[k] = effect
-        of_kind[kind] = np.arange(len(found), len(found) + len(own))
-        found.extend(own)
-    return replace(candidates, kinds=tuple(of_kind), effects=tuple(found), of_kind=of_kind, makes=effects)
-
-
-def _is_smooth(effect: Effect) -> bool:
-    """Whether it is differentiated at a state: neither solved as a whole nor over time, nor no physics."""
-    return effect.proposal is not None and not effect.proposal.is_there_or_not and effect.about is None

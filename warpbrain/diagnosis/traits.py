@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.diagnosis.evidence import Explanation
-from warpbrain.diagnosis.flexible import SCALES, force_patches
-from warpbrain.diagnosis.linearisation import Linearisation
+from warpbrain.diagnosis.flexible import SCALES
 from warpbrain.mesh import nodes_of
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.unknown import force_patches
 
 Floats = NDArray[np.float64]
 

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.alternatives import SENTENCES
 from warpbrain.diagnosis.result import (
     CANNOT_SAY,
     GROUP,
@@ -33,6 +32,7 @@ from warpbrain.diagnosis.result import (
     Ranked,
 )
 from warpbrain.diagnosis.screening import UNKNOWN as UNKNOWN_KIND
+from warpbrain.worlds.body.not_physics import SENTENCES
 
 Floats = NDArray[np.float64]
 

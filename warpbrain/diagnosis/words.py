@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from warpbrain.diagnosis.result import Smallest, Value
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.worlds.body.values import Smallest, Value
 
 #: How labels begin that keep their capital.
 _NAMES = ("Poisson", "Young's", "Ogden's")

@@ -134,6 +134,10 @@ class GaussianModel:
 
         return np.asarray(solve_triangular(self.noise_factor, rows, lower=True, check_finite=False))
 
+    def whitened(self, rows: Floats) -> Floats:
+        """Rows (n,) or (n, k) in coordinates in which the noise alone is `N(0, I)`: `L^-1 r / kappa`."""
+        return self._by_noise(rows) / self.scale
+
     def standardised(self, rows: Floats) -> Floats:
         """Rows (n,) or (n, b) in coordinates in which the model is `N(0, I)`.
 
@@ -193,3 +197,16 @@ class GaussianModel:
         """Rows (n, count) drawn from the model."""
         noise = self.noise_factor @ random.normal(size=(len(self), count))
         return np.asarray(self.scale * noise + self.columns @ random.normal(size=(self.columns.shape[1], count)))
+
+    def log_marginal(self, rows: Floats, scales: Floats, log_prior: Floats) -> float:
+        """Log density of rows (n,), summed over factors on the noise (k,) with the log of their prior probability."""
+        return float(np.logaddexp.reduce(self._of_scales(rows, scales) + log_prior))
+
+    def likely_scale(self, rows: Floats, scales: Floats, log_prior: Floats) -> float:
+        """Mean of the factor on the noise after rows (n,); arguments as of `log_marginal`."""
+        from scipy.special import softmax
+
+        return float(softmax(self._of_scales(rows, scales) + log_prior) @ scales)
+
+    def _of_scales(self, rows: Floats, scales: Floats) -> Floats:
+        return np.array([float(self.with_scale(scale).log_density(rows)) for scale in scales.tolist()])

@@ -118,13 +118,6 @@ def columns_of_inflation(model: GaussianModel, points: Sequence[Ints], inflation
     return np.concatenate(found, axis=1)
 
 
-def columns_of_gross_errors(
-    model: GaussianModel, points: Sequence[Ints], gross: NDArray[np.bool_], prior: Outliers
-) -> Floats:
-    """The same with the first inflation of every point that is a gross error (g,)."""
-    return columns_of_inflation(model, points, np.where(gross, prior.inflation, 1.0))
-
-
 @dataclass(frozen=True, eq=False)
 class _Alike:
     """Points of equally many rows: their numbers (g,), rows (g, d), noise (g, d, d), and `P_ii` of all sound."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.inference.blocks import Blocks
-from warpbrain.inference.causes import Cause
+from warpbrain.inference.causes import Cause, Kind
 from warpbrain.inference.gaussian import GaussianModel
 
 Floats = NDArray[np.float64]
@@ -43,6 +43,8 @@ class Hypothesis:
     Attributes
     ----------
     causes : tuple of str
+    kinds : tuple of Kind
+        Of each of them.
     log_evidence : float
         Log density of the rows, summed over places, sizes and scales.
     log_prior : float
@@ -52,6 +54,7 @@ class Hypothesis:
     """
 
     causes: tuple[str, ...]
+    kinds: tuple[Kind, ...]
     log_evidence: float
     log_prior: float
     best: Configuration
@@ -93,6 +96,8 @@ class Search:
         Best places of each cause of which pairs are made.
     beam : int
         Best configurations of pairs to which a third cause is added at each scale; 0: no triples.
+    most : int
+        Causes of a set at most.
     negligible : float
         A scale at which no single cause has this part of the greatest density is left out of pairs and triples.
     """
@@ -101,6 +106,7 @@ class Search:
     log_scale_prior: Floats
     places: int = 50
     beam: int = 30
+    most: int = 3
     negligible: float = 1e-4
 
 
@@ -159,14 +165,15 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
             by_scale.append((scale, none, blocks, logs))
     greatest = max((float(logs.max()) for *_, logs in by_scale), default=0.0)
     for scale, none, blocks, logs in by_scale:
-        if len(causes) > 1 and logs.max() >= greatest + np.log(search.negligible):
+        if min(len(causes), search.most) > 1 and logs.max() >= greatest + np.log(search.negligible):
             kept = blocks.some(_best_places(blocks, logs, search.places))
             pairs = _add_pairs(sums, kept, none, scale)
             pairs.sort(key=lambda one: -one.log_density)
-            _add_triples(sums, kept, none, pairs[: search.beam] if len(causes) > 2 else [])
+            _add_triples(sums, kept, none, pairs[: search.beam] if min(len(causes), search.most) > 2 else [])
     found = [
         Hypothesis(
             tuple(causes[c].name for c in sorted(members)),
+            tuple(causes[c].kind for c in sorted(members)),
             log,
             sum(causes[c].log_prior for c in members),
             sums.best[members],

@@ -38,7 +38,7 @@ from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
 from warpbrain.physics.potential import Enters
-from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.ramp import Ramped
 from warpbrain.physics.term import Following
 
@@ -49,8 +49,10 @@ __all__ = [
     "Growing",
     "Mechanism",
     "ParameterError",
+    "Relaxing",
     "Removing",
     "Says",
+    "Storing",
     "Substituting",
     "Weakening",
     "parameter",
@@ -301,6 +303,32 @@ class Mechanism(Ramped, abc.ABC):
         """
         raise NotTestableError(f"needs {' and '.join(cls.needs) or 'more than is known of this case'}")
 
+    @classmethod
+    def check_tests(cls, tests: Tests) -> None:
+        """Raise `NotTestableError` if tests on a specimen, whatever their number and noise, cannot show it."""
+
+    def turned(self, rotation: NDArray[np.float64]) -> Self:
+        """The same in a body that is turned: every direction `a` becomes `R a`, (3, 3).
+
+        Raises
+        ------
+        ParameterError
+            If it acts in a part of the body, or has directions of its own in each element: these would turn too.
+        """
+        if np.allclose(rotation, np.eye(3)):
+            return self
+        for name, says in self.parameters().items():
+            if says.kind in ("directions", "element set", "position") and getattr(self, name):
+                raise ParameterError(
+                    name, f"{self.kind}: tests along other axes of the tissue are of what is alike in all of it"
+                )
+        vectors = {
+            name: tuple((rotation @ np.array(value)).tolist())
+            for name, says in self.parameters().items()
+            if says.kind == "vector" and (value := getattr(self, name)) is not None
+        }
+        return dataclasses.replace(self, **vectors) if vectors else self
+
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
         said = []
@@ -361,6 +389,22 @@ class Substituting(Protocol):
 
     def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
         """Law, Poisson ratio and formulation of a tissue."""
+
+
+@runtime_checkable
+class Storing(Protocol):
+    """A mechanism that stores energy where the deformation is homogeneous, beside the law's."""
+
+    def stored_energy(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Energy (n,) [Pa] per volume at rest, at deformation gradients (n, 3, 3)."""
+
+
+@runtime_checkable
+class Relaxing(Protocol):
+    """A mechanism with branches of a Prony series on the isochoric neo-Hookean stress of the tissue's shear modulus."""
+
+    def branches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Moduli, relative to the shear modulus, and times of relaxation [s]."""
 
 
 @runtime_checkable

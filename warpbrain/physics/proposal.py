@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.free_surfaces import FreeSurface
 
 if TYPE_CHECKING:
     from warpbrain.physics.mechanism import Mechanism
@@ -74,8 +75,8 @@ class Situation:
         Of its tissues.
     held : tuple of Patch
         Parts of the surface that nothing moves.
-    free : tuple of str
-        Node sets with faces of the surface on which nothing is declared.
+    free : tuple of FreeSurface
+        Parts of the surface that nothing holds, each a node set of the mesh.
     instants : int
         At how many times something was recorded.
     volume_sites, surface_sites : (k, 3) array
@@ -91,7 +92,7 @@ class Situation:
     assumed: frozenset[str]
     laws: frozenset[str]
     held: tuple[Patch, ...]
-    free: tuple[str, ...]
+    free: tuple[FreeSurface, ...]
     instants: int
     volume_sites: Floats
     surface_sites: Floats
@@ -101,6 +102,27 @@ class Situation:
         """Raise `NotTestableError` if the case assumes a mechanism already."""
         if kind in self.assumed:
             raise NotTestableError("the case assumes it already")
+
+
+@dataclass(frozen=True)
+class Tests:
+    """What a mechanism may know of the tests on a specimen that may be fitted.
+
+    Attributes
+    ----------
+    modes : frozenset of str
+    loads : int
+        How many different ones: other modes, or other directions of the tissue.
+    tension, compression : bool
+        Whether an axial test pulls, and whether one presses.
+    """
+
+    # not a test of pytest's
+    __test__ = False
+    modes: frozenset[str]
+    loads: int
+    tension: bool
+    compression: bool
 
 
 @dataclass(frozen=True, eq=False)

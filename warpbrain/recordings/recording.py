@@ -8,6 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.errors import InputError
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
@@ -130,6 +132,9 @@ class TestRecording(Recording):
         [s], increasing.
     specimen : str
         Which one was tested, where tests of a case are of several of one shape; empty: the one.
+    axis, sheared : (float, float, float)
+        Directions of the tissue along the machine's axis z, and along its x, in which it shears; of any length but
+        zero. Of `sheared` what is across the axis counts.
     """
 
     # not a test of pytest's
@@ -141,3 +146,32 @@ class TestRecording(Recording):
     response: Floats
     time: Floats | None = None
     specimen: str = ""
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    sheared: tuple[float, float, float] | None = None
+
+    @property
+    def turn(self) -> Floats:
+        """Rotation (3, 3) from directions of the tissue to those of the machine; raises as `turn_of`."""
+        return turn_of(self.axis, self.sheared)
+
+
+def turn_of(axis: tuple[float, float, float], sheared: tuple[float, float, float] | None) -> Floats:
+    """Rotation `R` (3, 3) of a tissue in a machine: `R axis` is along z, and `R sheared` between x and z.
+
+    Without `sheared` the machine's x is what of the tissue's is across the axis, or of its y where that is little.
+
+    Raises
+    ------
+    InputError
+        If one of them is zero, or they are one direction.
+    """
+    z = np.array(axis, dtype=np.float64)
+    if not np.linalg.norm(z) > 0.0:
+        raise InputError("expected 3 numbers that are not all zero")
+    z = z / np.linalg.norm(z)
+    x = np.eye(3)[int(abs(z[0]) > 0.9)] if sheared is None else np.array(sheared, dtype=np.float64)
+    across = x - (x @ z) * z
+    if not np.linalg.norm(across) > 1e-6 * np.linalg.norm(x):
+        raise InputError("expected a direction that is not along the axis")
+    across = across / np.linalg.norm(across)
+    return np.stack([across, np.cross(z, across), z])

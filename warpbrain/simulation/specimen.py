@@ -144,6 +144,8 @@ class Rig:
         elements: str | None = None,
     ) -> None:
         self.case = case
+        self._turned: dict[str, Rig] = {}
+        self._like_this = (device, precision, options)
         self.specimen = specimen_of(case)
         glued = self.specimen.grips == "glued"
         mesh = case.mesh if glued else _homogeneous(case.mesh.volume, self.specimen.size[2])
@@ -203,6 +205,26 @@ class Rig:
             If no equilibrium is found: in which test, at what imposed value, why.
         """
         self.check(recording)
+        return self._along(recording)._simulate(recording, steps, on_state)
+
+    def _along(self, recording: TestRecording) -> Rig:
+        """The rig with the tissue as it lay in a test: itself if that changes nothing."""
+        try:
+            turned = tuple(mechanism.turned(recording.turn) for mechanism in self.case.mechanisms)
+        except InputError as error:
+            raise InputError(f"{self.case.path}: [[recording]] '{recording.name}' axis: {error}") from None
+        key = repr(turned)
+        if key == repr(self.case.mechanisms):
+            return self
+        if key not in self._turned:
+            elements = self.system.model.elements if self.specimen.grips == "glued" else None
+            rig = Rig(replace(self.case, mechanisms=turned), *self._like_this, elements)
+            rig.solver.clock = self.solver.clock
+            self._turned[key] = rig
+        return self._turned[key]
+
+    def _simulate(self, recording: TestRecording, steps: int, on_state: Callable[[float], None] | None) -> TestResult:
+        """A test that is possible."""
         rest = 1.0 if recording.quantities[0] == "stretch" else 0.0
         if self.follows_time(recording):
             return self._through_time(recording, rest, steps, on_state)

@@ -11,15 +11,14 @@ import pytest
 from testing_machine import case_of, recorded
 
 from warpbrain.cases.specimen import Specimen
-from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import VERDICTS
-from warpbrain.diagnosis.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.errors import InputError
 from warpbrain.report.diagnosis.html import page_of, write_page
 from warpbrain.report.diagnosis.saved import read_saved
 from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis
 from warpbrain.report.diagnosis.specimen_curves import write_curves
 from warpbrain.report.files import write_summary
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
 
 
 @pytest.fixture
@@ -117,7 +116,7 @@ def test_a_diagnosis_of_a_specimen_has_what_its_page_asks_for(tmp_path):
     noise = 5.0 * np.random.default_rng(1).normal(size=40)
     recording = replace(recorded("stretch", stretch), response=stress + noise, name="rod")
     case = replace(case_of(Specimen("cylinder", (8e-3, 8e-3, 5e-3), "lubricated")), recordings=(recording,))
-    options = DiagnosisOptions(candidates=("asymmetry",))
+    options = SpecimenOptions(candidates=("asymmetry",))
     found = DiagnosingSpecimen(case, options, "cpu").run()
     assert found.confirmations
     write_curves(tmp_path / "curves.csv", found)

@@ -229,6 +229,12 @@ RECORDING = Table(
         "test": (
             Key("mode", ("text",), "How the specimen was loaded.", needed=True, choices=MODES),
             Key("specimen", ("text",), "Which one was tested, where tests are of several of one shape."),
+            Key("axis", ("vector",), "Direction of the tissue along the machine's axis z; z if absent."),
+            Key(
+                "sheared",
+                ("vector",),
+                "Direction of the tissue along the machine's x, in which it shears; x if absent.",
+            ),
         ),
     },
     several=True,

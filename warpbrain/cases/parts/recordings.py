@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from warpbrain.cases.format.table import Reading
 from warpbrain.cases.format.tables import RECORDING
 from warpbrain.cases.parts.context import Context
 from warpbrain.cases.parts.node_sets import NodeSets
+from warpbrain.errors import InputError
 from warpbrain.recordings.reading import read_force, read_points, read_surface, read_test
-from warpbrain.recordings.recording import Recording
+from warpbrain.recordings.recording import Recording, turn_of
 
 
 def read_recordings(context: Context, sets: NodeSets | None, boundaries: set[str]) -> tuple[Recording, ...]:
@@ -82,7 +84,22 @@ def _test(context: Context, table: Reading, sets: NodeSets | None, boundaries: s
     common = _common(context, table, 1.0)
     if common is None or not table.has("mode"):
         return None
-    return read_test(**common, mode=table.get("mode"), specimen=table.get("specimen", ""))
+    axis, sheared = _direction(context, table, "axis"), _direction(context, table, "sheared")
+    axis = axis or (0.0, 0.0, 1.0)
+    try:
+        turn_of(axis, sheared)
+    except InputError as error:
+        table.problem("axis" if sheared is None else "sheared", str(error))
+        return None
+    found = read_test(**common, mode=table.get("mode"), specimen=table.get("specimen", ""))
+    return None if found is None else replace(found, axis=axis, sheared=sheared)
+
+
+def _direction(context: Context, table: Reading, key: str) -> tuple[float, float, float] | None:
+    if not table.has(key):
+        return None
+    x, y, z = context.frame.directions(table.get(key)).tolist()
+    return x, y, z
 
 
 _READERS = {"points": _points, "surface": _surface, "force": _force, "test": _test}

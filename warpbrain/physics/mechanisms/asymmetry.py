@@ -16,7 +16,7 @@ from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.ogden import Ogden
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
-from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +58,13 @@ class Asymmetry(Mechanism):
         if "ogden" in situation.laws:
             raise NotTestableError("the law of a tissue has an exponent of its own, which is refitted")
         return [Proposal.of_one(lambda a: cls(exponent=a), 2.0, 15.0, "smooth", 2.0, region="all tissue")]
+
+    @classmethod
+    def check_tests(cls, tests: Tests) -> None:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        sheared = bool(tests.modes - {"axial"})
+        if tests.tension + tests.compression + sheared < 2:
+            raise NotTestableError(f"needs {' and '.join(cls.needs)}")
 
     def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
         """See `warpbrain.physics.mechanism.Substituting`."""

@@ -11,7 +11,7 @@ from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.laws import Law
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
-from warpbrain.physics.proposal import Proposal, Situation
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +46,11 @@ class Compressibility(Mechanism):
         own = -math.log1p(-2.0 * situation.poisson)
         make = lambda c: cls(poisson=-0.5 * math.expm1(-c))  # noqa: E731
         return [Proposal.of_one(make, own, 1.2, "smooth", own, region="all tissue")]
+
+    @classmethod
+    def check_tests(cls, tests: Tests) -> None:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        raise NotTestableError("needs the lateral stretch or the volume to be recorded")
 
     def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
         """See `warpbrain.physics.mechanism.Substituting`."""

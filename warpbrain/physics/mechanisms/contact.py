@@ -34,6 +34,7 @@ from warpbrain.kernels.distance_field import smooth_distance
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
+from warpbrain.mesh.free_surfaces import FreeSurface
 from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
@@ -123,11 +124,18 @@ class Contact(Mechanism):
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
-        """What is held slides instead, or lifts off."""
-        found = [cls._let_go(state, patch) for patch in situation.held for state in STATES[1:]]
-        if not found:
-            raise NotTestableError("nothing is held")
-        return found
+        """What is held slides or lifts off instead; what is free slides along a wall where it was, or meets it."""
+        released = [cls._let_go(state, patch) for patch in situation.held for state in STATES[1:]]
+        walls = [cls._kept(state, surface) for surface in situation.free for state in STATES[1:]]
+        if not released and not walls:
+            raise NotTestableError("has no surface")
+        return [*released, *walls]
+
+    @classmethod
+    def _kept(cls, state: str, surface: FreeSurface) -> Proposal:
+        return Proposal.of_one(
+            lambda _share: cls(nodes=surface.name, state=state), 1.0, 0.5, "switch", region=surface.words
+        )
 
     @classmethod
     def _let_go(cls, state: str, patch: Patch) -> Proposal:

@@ -28,6 +28,7 @@ follow the pressure there, which overshoots (Vermeer and Verruijt 1981).
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -134,7 +135,7 @@ class Drainage(Mechanism):
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
-        """Permeabilities as they are expected, of tissue that drains through its whole surface into fluid or blood.
+        """Permeabilities as they are expected, of tissue that drains through its whole surface, or one that is free.
 
         Without storage and exchange only the product of permeability and time counts: one course serves them all. An
         exchange with the blood is not looked for: what it leaves in the end is a swelling, and said as that.
@@ -151,24 +152,28 @@ class Drainage(Mechanism):
         # the outermost reach as far as their neighbours do
         width = math.log(edges[-1] / edges[-2])
 
-        def drained(c: NDArray[np.float64]) -> "Drainage":
-            return cls(permeability=math.exp(float(c[0])))
-
         def pace(c: NDArray[np.float64]) -> float:
             return math.exp(float(c[0]) - start)
 
+        every = len(situation.mesh.boundary)
+        parts = {surface.name: surface.words for surface in situation.free if len(surface.faces) < every}
         return [
             Proposal(
-                drained,
+                partial(cls._through, nodes),
                 np.array([math.log(expected.quantile((number + 0.5) / _LOOKED_FOR))]),
                 np.full(1, width),
                 "course",
                 np.array([start]),
                 pace=pace,
-                region="all tissue",
+                region=f"all tissue, drained through the {words}" if nodes else "all tissue",
             )
+            for nodes, words in {"": "", **parts}.items()
             for number in range(_LOOKED_FOR)
         ]
+
+    @classmethod
+    def _through(cls, nodes: str, c: NDArray[np.float64]) -> "Drainage":
+        return cls(permeability=math.exp(float(c[0])), drained=nodes)
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

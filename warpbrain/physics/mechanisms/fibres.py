@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
@@ -20,7 +21,7 @@ from warpbrain.physics.expectation import LogNormal, Uniform
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
-from warpbrain.physics.proposal import Proposal, Situation
+from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body
 
@@ -166,6 +167,21 @@ class Fibres(Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy."""
         return Proposal.along_axes(lambda k1, axis: cls(direction=axis, stiffness=max(k1, 1e-9)), 500.0, "fibres")
+
+    @classmethod
+    def check_tests(cls, tests: Tests) -> None:
+        """See `warpbrain.physics.mechanism.Mechanism`."""
+        if tests.loads < 2:
+            raise NotTestableError(f"needs {' and '.join(cls.needs)}")
+
+    def stored_energy(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See `warpbrain.physics.mechanism.Storing`; one direction of fibres."""
+        if self.direction is None:
+            raise InputError("fibres: field: a homogeneous state has one direction of them")
+        stretched = F @ (np.array(self.direction) / np.linalg.norm(self.direction))
+        d, I1, I4 = self.dispersion, np.sum(F**2, axis=(1, 2)), np.sum(stretched**2, axis=1)
+        E = np.maximum(d * (I1 - 3.0) + (1.0 - 3.0 * d) * (I4 - 1.0), 0.0)
+        return np.asarray(self.stiffness / (2.0 * self.exponent) * np.expm1(self.exponent * E**2))
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
         """See `warpbrain.physics.term.Following`."""

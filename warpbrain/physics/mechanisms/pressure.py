@@ -104,17 +104,13 @@ class Pressure(Mechanism):
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
-        """On every set of free faces that is not most of the surface: that would be a pressure all around."""
-        every = len(situation.mesh.boundary)
-        found = []
-        for nodes in situation.free:
-            part = len(cls(nodes=nodes, value=0.0).faces(situation.mesh)) / every
-            if part < 0.5:
-                make = partial(_pressing, nodes)
-                found.append(Proposal.of_one(make, 0.0, 400.0, region=nodes))
-        if not found:
-            raise NotTestableError("needs a node set with faces of the free surface, such as a ventricle's wall")
-        return found
+        """On every free surface."""
+        if not situation.free:
+            raise NotTestableError("needs a part of the surface that nothing holds")
+        return [
+            Proposal.of_one(partial(_pressing, surface.name), 0.0, 400.0, region=surface.words)
+            for surface in situation.free
+        ]
 
     def bind(self, body: Body) -> "PressureTerm":
         """See `warpbrain.physics.term.Following`."""

@@ -137,6 +137,10 @@ class Viscoelasticity(Mechanism):
         moduli = max(float(c[0]), _LEAST) * shares
         return cls(moduli=tuple(moduli[order].tolist()), times=tuple(times[order].tolist()))
 
+    def branches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """See `warpbrain.physics.mechanism.Relaxing`."""
+        return self.moduli, self.times
+
     def bind(self, body: Body) -> "ViscoelasticTerm":
         """See `warpbrain.physics.term.Following`."""
         return ViscoelasticTerm(body, self)

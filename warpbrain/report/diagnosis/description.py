@@ -6,13 +6,14 @@ from typing import Any
 
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.options import DiagnosisOptions
-from warpbrain.diagnosis.result import Confusion, Diagnosis, Ranked, Value
+from warpbrain.diagnosis.result import Confusion, Diagnosis, Ranked
 from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence
 from warpbrain.diagnosis.traits import Traits
 from warpbrain.diagnosis.words import smallest_in_words
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
+from warpbrain.worlds.body.values import Value
 
 
 def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.atomic import whole_file
-from warpbrain.diagnosis.specimen.result import SpecimenDiagnosis
+from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 
 def write_curves(path: Path, found: SpecimenDiagnosis) -> None:

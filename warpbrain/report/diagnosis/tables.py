@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.diagnosis.result import Value
 from warpbrain.diagnosis.words import measured, size_in_words
 from warpbrain.report.diagnosis.saved import STATES, Rows
 from warpbrain.report.diagnosis.units import unit_of
+from warpbrain.worlds.body.values import Value
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = (), caption: str = "") -> str:

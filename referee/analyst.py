@@ -1,0 +1,227 @@
+"""The optimal analyst: who knows how cases are drawn, but not this draw, and has the referee's own mechanics.
+
+Of each label its body without effects is solved again, all that is not known of it and a few hundred draws of each
+cause are linearised about that state, and residuals like those of the case are drawn anew: the true change, to first
+order and as large as it is, noise, registration, tissue. Of each the posterior over sets of causes follows, with the
+shares of a scored set as prior. Since the true place is among the draws, it is a ceiling: nobody is right more often.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.special import softmax
+from scipy.stats import chi2
+
+from referee.detectability import conditional, covariance
+from referee.diagnoses import NOT_PHYSICS, UNKNOWN
+from referee.draw import MECHANISMS, NOISY, OUTSIDE, RIGID_SHIFT, RIGID_TURN, UNEVEN
+from referee.effects.effect import unit
+from referee.equilibrium import Balance, balance
+from referee.evidence import normal, pair, scaled, single
+from referee.library import Draws, Forces, draws_of, library
+from referee.linear_response import LinearResponse
+from referee.plan import BOTH, SHARES
+from referee.problem import Problem
+from referee.rebuilding import effects_of, setting_of
+from referee.sensing import place_sensors
+from referee.setting import EACH, FIELD, NOISE, OVERALL
+from referee.sight import Sight
+from referee.sizing import first_order
+from referee.threads import single as one_thread
+from referee.truth import cap_force_of
+from referee.unknowns import MODES, unknown_forces
+
+Floats = NDArray[np.float64]
+Random = np.random.Generator
+
+#: Residuals of each case, rigid motions that stand for all, and sets below which probability are not written.
+RESIDUALS, MOTIONS, LEAST = 16, 200, 1e-3
+#: Traps that are hypotheses.
+MODELLED = ("registration", "noise", "stiffness")
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What the analyst knows of a case beside its residuals.
+
+    Attributes
+    ----------
+    sight : Sight
+    whiten : callable
+        From rows (k, rows) to units of all that is not known.
+    noise : (rows, rows) array
+        Covariance of noise alone in these units.
+    field : (modes, rows) array
+        Modes of the stiffness field in these units.
+    named : dict of str to Draws
+    nameless : Draws
+    """
+
+    sight: Sight
+    whiten: Callable[[Floats], Floats]
+    noise: Floats
+    field: Floats
+    named: dict[str, Draws]
+    nameless: Draws
+
+
+def analyse(labels: Mapping[str, Mapping[str, Any]], out: Path, workers: int) -> None:
+    """Write what the analyst makes of each case, `out/CASE.json`; cases that are there are kept."""
+    out.mkdir(parents=True, exist_ok=True)
+    waiting = {name: label for name, label in labels.items() if not (out / f"{name}.json").exists()}
+    with ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"), initializer=one_thread) as pool:
+        jobs = {pool.submit(analysed, label): name for name, label in waiting.items()}
+        for count, job in enumerate(as_completed(jobs), start=1):
+            told = job.result()
+            (out / f"{jobs[job]}.json").write_text(json.dumps(told) + "\n", encoding="ascii")
+            print(f"{count} of {len(jobs)}: {jobs[job]} in {told['seconds']:.0f} s", flush=True)
+
+
+def analysed(label: Mapping[str, Any]) -> dict[str, Any]:
+    """The analyst's posterior over sets of causes for residuals like those of a label.
+
+    Returns
+    -------
+    dict
+        `conditional`: of each effect how much it stands out given the others; `draws`: of each residual the p-value of
+        nothing and the sets of causes with their probabilities; `seconds` of processor time.
+    """
+    started = time.process_time()
+    if label["kind"] == "trap" and label["names"][0] not in MODELLED:
+        return {"case": label["case"], "conditional": [], "draws": [], "seconds": 0.0}
+    setting = setting_of(label)
+    random = np.random.default_rng([setting.seed, 11])
+    problem = setting.problem()
+    base = balance(problem)
+    sight = Sight(setting, place_sensors(setting), base.u, cap_force_of(problem, base.u))
+    known, true, given = _known(label, random, problem, base, sight)
+    residuals = _residuals(label, random, known, true)
+    return {
+        "case": label["case"],
+        "conditional": given,
+        "draws": posteriors(residuals, known, random),
+        "seconds": round(time.process_time() - started, 1),
+    }
+
+
+def _known(
+    label: Mapping[str, Any], random: Random, problem: Problem, base: Balance, sight: Sight
+) -> tuple[Known, Floats, list[float]]:
+    setting = sight.setting
+    response = LinearResponse(sight, base, problem.body.nodes("superior"))
+    tissues, others = (response.rows(np.stack(forces)) for forces in unknown_forces(problem, base))
+    unknown = np.concatenate([OVERALL * tissues.sum(axis=0, keepdims=True), EACH * tissues, others])
+    lower = np.linalg.cholesky(covariance(sight, unknown))
+
+    def whiten(rows: Floats) -> Floats:
+        return np.asarray(solve_triangular(lower, rows.T, lower=True)).T
+
+    named, nameless = library(random, setting, Forces(problem, base), response, whiten)
+    effects = effects_of(label)
+    rows = [sight.rows(first_order(effect, problem, base, setting.times)) for effect in effects]
+    true = whiten(np.stack(rows)) if rows else np.zeros((0, len(lower)))
+    # the wide columns of each: its own change, and of a traction those along the axes
+    wide = [
+        whiten(np.stack([sight.rows(first_order(part, problem, base, setting.times)) for part in effect.spanning]))
+        if len(effect.spanning) > 1 and len(effects) > 1
+        else true[k : k + 1]
+        for k, effect in enumerate(effects)
+    ]
+    given = [
+        conditional(own, np.concatenate([true[:0], *wide[:k], *wide[k + 1 :]]), np.eye(true.shape[1]))
+        for k, own in enumerate(true)
+    ]
+    for row, effect in zip(true, effects, strict=True):
+        own = draws_of(row[None], np.array([np.inf]), fixed=False, both=True)
+        if effect.kind in named:
+            named[effect.kind] = named[effect.kind].and_also(own)
+        elif effect.kind in OUTSIDE:
+            nameless = nameless.and_also(own)
+        if "traction" in effect.also:
+            named["traction"] = named["traction"].and_also(own)
+    modes = whiten(others[:MODES])
+    noise = whiten(whiten(sight.noise).T)
+    if len(true) == 1:
+        true *= float(label["detectability"]) / float(np.linalg.norm(true))
+    return Known(sight, whiten, noise, modes, named, nameless), true.sum(axis=0), given
+
+
+def _residuals(label: Mapping[str, Any], random: Random, known: Known, true: Floats) -> Floats:
+    """Residuals (k, rows) like those of the case."""
+    w = true + random.normal(size=(RESIDUALS, len(true)))
+    if label["kind"] != "trap":
+        return w
+    trap = label["names"][0]
+    if trap == "registration":
+        shift, turn = (np.array(label["setting"][name]) for name in ("shift", "turn"))
+        return w + known.whiten(known.sight.moved_rigidly(shift, turn)[None])
+    if trap == "noise":
+        return np.asarray(random.normal(size=w.shape) @ np.linalg.cholesky(_noisy(known)).T)
+    return w + random.normal(size=(len(w), len(known.field))) @ _uneven(known)
+
+
+def _noisy(known: Known) -> Floats:
+    square = (NOISE[0] ** 2 + NOISE[0] * NOISE[1] + NOISE[1] ** 2) / 3.0
+    return np.eye(len(known.noise)) + (NOISY**2 / square - 1.0) * known.noise
+
+
+def _uneven(known: Known) -> Floats:
+    square = (FIELD[0] ** 2 + FIELD[0] * FIELD[1] + FIELD[1] ** 2) / 3.0
+    return np.sqrt(UNEVEN**2 / square - 1.0) * known.field
+
+
+def posteriors(w: Floats, known: Known, random: Random) -> list[dict[str, Any]]:
+    """Of each residual (k, rows) the p-value of nothing, and sets of causes with their probabilities."""
+    prior = SHARES["scored"]
+    rest = 1.0 - sum(prior.values())
+    logs: dict[tuple[str, ...], Floats] = {(): np.full(len(w), np.log(prior["none"]))}
+    for name, draws in known.named.items():
+        logs[(name,)] = single(w, draws) + np.log(rest / len(MECHANISMS))
+    couples = list(itertools.combinations(MECHANISMS, 2))
+    for one, other in couples:
+        if one in known.named and other in known.named:
+            both = pair(w, known.named[one], known.named[other], BOTH)
+            logs[one, other] = both + np.log(prior["two"] / len(couples))
+    logs[(UNKNOWN,)] = single(w, known.nameless) + np.log(prior["outside"])
+    motions = [
+        known.sight.moved_rigidly(
+            random.uniform(*RIGID_SHIFT) * unit(random.normal(size=3)),
+            random.uniform(*RIGID_TURN) * unit(random.normal(size=3)),
+        )
+        for _ in range(MOTIONS)
+    ]
+    # in the order of `MODELLED`
+    traps = [
+        normal(w, known.whiten(np.stack(motions)) / np.sqrt(MOTIONS)),
+        scaled(w, _noisy(known)),
+        normal(w, _uneven(known)),
+    ]
+    for k, log in enumerate(traps):
+        logs[NOT_PHYSICS, str(k)] = log + np.log(prior["trap"] / len(traps))
+    p = softmax(np.stack(list(logs.values())), axis=0)
+    p_values = chi2.sf((w**2).sum(axis=1), w.shape[1])
+    told = []
+    for k in range(len(w)):
+        sets: dict[tuple[str, ...], float] = {}
+        for causes, value in zip(logs, p[:, k].tolist(), strict=True):
+            short = (NOT_PHYSICS,) if NOT_PHYSICS in causes else causes
+            sets[short] = sets.get(short, 0.0) + value
+        kept = [[list(causes), round(value, 4)] for causes, value in sets.items() if value > LEAST]
+        told.append({"p_value": float(p_values[k]), "sets": sorted(kept, key=_by_probability)})
+    return told
+
+
+def _by_probability(row: Sequence[Any]) -> float:
+    return -float(row[1])

@@ -1,0 +1,31 @@
+"""The file of beliefs: every entry says its unit, its source and its date, and is SI when it is read."""
+
+import datetime
+import math
+import tomllib
+from importlib.resources import files
+
+import pytest
+
+from warpbrain.inference.beliefs import UNITS, belief, beliefs
+
+TABLES = tomllib.loads((files("warpbrain.inference") / "priors.toml").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("key", [f"{table}.{name}" for table, entries in TABLES.items() for name in entries])
+def test_entries_are_whole(key):
+    table, name = key.split(".")
+    entry = TABLES[table][name]
+    assert set(entry) == {"value", "unit", "source", "date"} and entry["unit"] in UNITS
+    assert len(entry["source"]) > 10 and isinstance(entry["date"], datetime.date)
+    assert all(math.isfinite(value) for value in beliefs(key).tolist())
+
+
+def test_units_are_si():
+    assert belief("noise.reach") == pytest.approx(0.018)
+    assert belief("registration.turn") == pytest.approx(math.radians(1.0))
+
+
+def test_what_is_not_there_is_an_error():
+    with pytest.raises(KeyError):
+        belief("noise.colour")

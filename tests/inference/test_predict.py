@@ -1,0 +1,54 @@
+"""Held-out rows by conditioning, and null rates of a predictive check over draws of the model itself."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom, multivariate_normal
+
+from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.predict import log_factors_of_fields, predict, predictive_p
+
+N = 24
+
+
+@pytest.fixture(scope="module")
+def model() -> GaussianModel:
+    random = np.random.default_rng(0)
+    factor = np.linalg.cholesky(np.diag(random.uniform(0.5, 1.5, N)) + 0.2)
+    return GaussianModel(factor, random.normal(size=(N, 4)), 1.3)
+
+
+def test_blocks_are_predicted_as_conditioning_says(model, verify):
+    random = np.random.default_rng(1)
+    residual, blocks = model.draws(1, random)[:, 0], random.integers(5, size=N)
+    prediction = predict(model, residual, blocks)
+    worst = 0.0
+    for number, block in enumerate(np.unique(blocks)):
+        hidden = blocks == block
+        mean, covariance = model.conditional(residual, ~hidden)
+        density = multivariate_normal(mean, covariance).logpdf(residual[hidden])
+        worst = max(worst, abs(density - prediction.log_densities[number]))
+        worst = max(worst, np.abs(prediction.errors[hidden] - (residual[hidden] - mean)).max())
+    verify("held-out rows by the precision matrix", "conditional normal distribution written out", worst, 1e-9)
+
+
+def test_fields_are_weighed_as_their_densities(model):
+    random = np.random.default_rng(2)
+    residuals, sizes = model.draws(3, random), np.array([0.3, 2.0])
+    fields = [random.normal(size=(N, 5)), random.normal(size=(N, 2))]
+    logs = [
+        model.with_columns(size * field).log_density(residuals) - model.log_density(residuals)
+        for field in fields
+        for size in sizes
+    ]
+    expected = np.logaddexp.reduce(logs, axis=0) - np.log(len(logs))
+    np.testing.assert_allclose(log_factors_of_fields(model, fields, sizes, residuals), expected, atol=1e-9)
+
+
+def test_the_null_rate_is_what_it_says(model, verify):
+    random = np.random.default_rng(3)
+    fields, sizes, cases = [random.normal(size=(N, 5))], np.array([0.5, 2.0]), 400
+    drawn = model.draws(cases, random)
+    alarms = sum(predictive_p(model, fields, sizes, row, 99, random) <= 0.05 for row in drawn.T)
+    low, high = binom.interval(0.999, cases, 0.05)
+    off = max(low - alarms, alarms - high, 0.0)
+    verify("predictive p <= 0.05 where nothing is left", f"binomial band of {cases} draws of the model", off, 0.0)

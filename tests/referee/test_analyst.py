@@ -1,0 +1,152 @@
+"""The optimal analyst: its response, its evidence and what it makes of cases."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal
+
+from concealed.sealing import open_sealed, read_sealed
+from referee import analyst, library, make
+from referee.analyst import analysed
+from referee.detectability import conditional
+from referee.draw import draw_effect
+from referee.equilibrium import balance
+from referee.evidence import normal, pair, scaled, single
+from referee.library import Draws, Forces
+from referee.linear_response import LinearResponse
+from referee.plan import Planned
+from referee.rebuilding import effects_of, setting_of
+from referee.sensing import place_sensors
+from referee.setting import draw_setting
+from referee.sight import Sight
+from referee.sizing import first_order
+from referee.truth import cap_force_of
+
+
+@pytest.mark.parametrize("seed", [3, 4], ids=["moved", "force"])
+def test_adjoint_rows_are_those_of_full_answers(seed, small, verify):
+    random = np.random.default_rng(seed)
+    setting = draw_setting(random, "phantom", False)
+    while (setting.total is None) != (seed == 3) or not setting.surface or setting.times:
+        setting = draw_setting(random, "phantom", False)
+    setting = replace(setting, points=40, checks=10)
+    problem = setting.problem()
+    base = balance(problem)
+    sight = Sight(setting, place_sensors(setting), base.u, cap_force_of(problem, base.u))
+    response, forces = LinearResponse(sight, base, problem.body.nodes("superior")), Forces(problem, base)
+    for name in ("pressure", "traction", "swirl", "pre-stress", "swelling"):
+        effect = draw_effect(random, name, setting)
+        # swelling is linear in its size here
+        effect = effect.resized(0.001) if name == "swelling" else effect
+        full = sight.rows(first_order(effect, problem, base, ()))
+        found = response.rows(forces.of(effect)[None])[0]
+        parts = (slice(0, 270), slice(270, None)) if sight.has_force else (slice(0, 270),)
+        verify(
+            f"recorded numbers of {name}, by the adjoint of the recordings ({'force' if seed == 4 else 'moved'} cap)",
+            "a linear solve for the effect itself",
+            max(float(np.abs(found - full)[part].max() / np.abs(full[part]).max()) for part in parts),
+            # systems are solved to 1 and 3 %, and the force of a cap is a small difference of large ones
+            5e-2,
+        )
+
+
+@pytest.fixture
+def draws():
+    random = np.random.default_rng(0)
+
+    def some(count, both):
+        directions = random.normal(size=(count, 6))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        return Draws(directions, np.full(count, 2.5), np.full(count, 32.0), np.full(count, both))
+
+    return some(5, True), some(4, False)
+
+
+def test_evidence_of_one_cause_is_the_mean_over_draws(draws, verify):
+    w = 12.0 * draws[0].directions[2] + np.random.default_rng(1).normal(size=6)
+    sizes = np.exp(np.linspace(np.log(2.5), np.log(32.0), 2001))
+    means = np.concatenate([sign * sizes[:, None] * g for g in draws[0].directions for sign in (1.0, -1.0)])
+    plain = multivariate_normal(np.zeros(6))
+    logs = plain.logpdf(w - means) - plain.logpdf(w)
+    brute = logsumexp(logs) - np.log(len(logs))
+    verify(
+        "log evidence of one cause of unknown place, size and sign",
+        "sum over a fine grid of sizes",
+        float(abs(single(w[None], draws[0])[0] - brute)),
+        0.3,
+        "nats",
+    )
+
+
+def test_evidence_of_two_causes_is_the_integral(draws, verify):
+    one, other = draws
+    w = 12.0 * one.directions[2] + 9.0 * other.directions[1] + np.random.default_rng(2).normal(size=6)
+    sizes = np.exp(np.linspace(np.log(5.0), np.log(32.0), 200))
+    a, b = np.meshgrid(np.concatenate([sizes, -sizes]), sizes, indexing="ij")
+    logs = []
+    for g in one.directions:
+        for h in other.directions:
+            rho = g @ h
+            logs.append(logsumexp(a * (w @ g) + b * (w @ h) - 0.5 * (a**2 + b**2 + 2 * a * b * rho)) - np.log(a.size))
+    brute = logsumexp(logs) - np.log(len(logs))
+    verify(
+        "log evidence of two causes at once, sizes by Laplace's method",
+        "sum over a fine grid of both sizes",
+        float(abs(pair(w[None], one, other, 5.0)[0] - brute)),
+        0.3,
+        "nats",
+    )
+
+
+def test_evidence_of_normal_alternatives_is_a_ratio_of_densities():
+    random = np.random.default_rng(3)
+    w, columns = random.normal(size=(2, 5)), random.normal(size=(3, 5))
+    whole = np.eye(5) + columns.T @ columns
+    other, plain = multivariate_normal(np.zeros(5), whole), multivariate_normal(np.zeros(5))
+    exact = other.logpdf(w) - plain.logpdf(w)
+    np.testing.assert_allclose(normal(w, columns), exact)
+    np.testing.assert_allclose(scaled(w, whole), exact)
+
+
+def test_what_is_given_is_the_part_that_is_not_along_the_other():
+    one, other = np.array([3.0, 4.0, 0.0]), np.array([[0.0, 2.0, 0.0]])
+    assert conditional(one, other, np.eye(3)) == pytest.approx(3.0, rel=1e-3)
+    assert conditional(one, other[:0], np.eye(3)) == pytest.approx(5.0)
+
+
+PLANS = [
+    Planned("none", (), "phantom"),
+    Planned("effect", ("pressure",), "phantom"),
+    Planned("two", ("pressure", "traction"), "phantom"),
+    Planned("outside", ("swirl",), "phantom"),
+    Planned("trap", ("registration",), "phantom"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plan", PLANS, ids=lambda plan: "-".join((plan.kind, *plan.names)))
+def test_a_case_of_every_kind(plan, small, tmp_path, monkeypatch):
+    monkeypatch.setattr(library, "PLACES", 20)
+    monkeypatch.setattr(library, "NAMELESS", 10)
+    monkeypatch.setattr(analyst, "place_sensors", lambda s: place_sensors(replace(s, points=40, checks=10)))
+    make.make_case(tmp_path, "case-001", plan, [7, 3])
+    label = open_sealed(read_sealed(tmp_path / "labels" / "case-001.json.gz"))
+    # a label tells all that its truth was made from
+    assert setting_of(label).told() == label["setting"]
+    for effect, told in zip(effects_of(label), label["effects"], strict=True):
+        assert json.loads(json.dumps(effect.told())) == {name: told[name] for name in effect.told()}
+    found = analysed({**label, "setting": {**label["setting"], "points": 40, "checks": 10}})
+    if plan.kind == "two":
+        np.testing.assert_allclose(found["conditional"], [e["conditional"] for e in label["effects"]], rtol=0.1)
+    assert len(found["draws"]) == analyst.RESIDUALS
+    for draw in found["draws"]:
+        assert 0.95 < sum(p for _, p in draw["sets"]) < 1.001
+        assert 0.0 <= draw["p_value"] <= 1.0
+    plain = [{tuple(causes): p for causes, p in draw["sets"]} for draw in found["draws"]]
+    if plan.kind == "none":
+        assert np.mean([p.get((), 0.0) for p in plain]) > 0.5
+    if plan.kind == "trap":
+        assert np.mean([p.get(("not physics",), 0.0) for p in plain]) > 0.9

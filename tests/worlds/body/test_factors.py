@@ -1,0 +1,36 @@
+"""Factors: equilibria that do not depend on the number of threads."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array, random_array
+
+from warpbrain.errors import SolveError
+from warpbrain.worlds.body.factors import Factors
+
+
+def _matrix(n: int = 60):
+    rng = np.random.default_rng(0)
+    half = random_array((n, n), density=0.1, rng=rng).tocsr()
+    return (half @ half.T + 3.0 * np.eye(n)), rng
+
+
+def test_equilibria_are_the_same_in_any_number_of_threads(monkeypatch):
+    dense, rng = _matrix()
+    factors = Factors(csr_array(dense))
+    columns = rng.normal(size=(60, 75))
+    found = []
+    for count in ("1", "2", "5"):
+        monkeypatch.setenv("OMP_NUM_THREADS", count)
+        found.append(factors.solve(columns))
+    np.testing.assert_array_equal(found[0], found[1])
+    np.testing.assert_array_equal(found[0], found[2])
+    np.testing.assert_allclose(found[0], np.linalg.solve(dense, columns), rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(factors.solve(csr_array(columns)), found[0])
+    between = factors.between(csr_array(columns.T), csr_array(columns))
+    np.testing.assert_allclose(between, columns.T @ found[0], rtol=1e-9, atol=1e-9)
+    assert factors.solve(columns[:, :0]).shape == (60, 0)
+
+
+def test_a_singular_matrix_is_said():
+    with pytest.raises(SolveError, match="unstable"):
+        Factors(csr_array(np.ones((3, 3))))

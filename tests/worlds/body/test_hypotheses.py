@@ -1,0 +1,70 @@
+"""Sets of causes of a block that sinks under a weight of which its case says nothing."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sinking_block import OPTIONS, write_sinking
+
+from warpbrain.inference import GaussianModel
+from warpbrain.inference.calibration import calibration
+from warpbrain.inference.decide import NAMED, decide
+from warpbrain.inference.marginal import marginal
+from warpbrain.worlds.body.base import BaseFinder
+from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
+from warpbrain.worlds.body.not_physics import not_physics_at
+from warpbrain.worlds.body.states import States
+from warpbrain.worlds.listener import Listener
+
+
+@pytest.fixture(scope="module")
+def search(tmp_path_factory: pytest.TempPathFactory) -> HypothesisSearch:
+    """Everything weighed, the best fitted."""
+    case = write_sinking(Path(tmp_path_factory.mktemp("sets")) / "case")
+    states = States(case, "cpu")
+    dictionary = dictionary_of(case, OPTIONS.candidates, len(states.times))
+    spacing = dictionary.situation.spacing
+    base = BaseFinder(states, spacing, False, False, Listener()).find()
+    candidates = candidates_at(dictionary, base.effects, not_physics_at(base.at, base.nuisances))
+    found = HypothesisSearch(base, candidates, spacing, Listener())
+    found.screen()
+    found.fit()
+    return found
+
+
+def test_the_weight_is_named(search):
+    decision, _ = decide([one.hypothesis for one in search.weighed], search.probabilities, calibration().losses)
+    assert decision.verdict == NAMED and decision.causes == ("gravity",)
+
+
+def test_probabilities_are_in_order_and_one_in_all(search):
+    assert search.weighed[0].names == {"gravity"}
+    np.testing.assert_allclose(search.probabilities.sum(), 1.0)
+
+
+def test_a_fit_leaves_noise(search):
+    fitted = search.get(("gravity",))
+    assert fitted.refit is not None and fitted.refit.converged
+    left = fitted.refit.residual / search.base.noise
+    assert 0.7 < np.sqrt(np.mean(left**2)) < 1.3
+
+
+def test_evidence_of_a_fit_is_that_of_its_linear_model(search):
+    fitted = search.get(("gravity",))
+    model = GaussianModel(search.base.model.noise_factor, fitted.columns)
+    again = marginal(model, fitted.residual, search.base.points, fitted.marginal.scale)
+    np.testing.assert_allclose(again.log_evidence, fitted.refit.log_evidence, atol=1e-6)
+
+
+def test_nothing_is_far_less_probable(search):
+    gain = search.get(("gravity",)).hypothesis.log_evidence - search.get(()).hypothesis.log_evidence
+    assert gain > 50.0
+
+
+def test_sets_say_what_they_are(search):
+    for one in search.weighed:
+        assert len(one.mechanisms) == len(one.effects) == len(one.coefficients)
+        assert one.columns.shape[0] == len(one.residual) == len(search.base.residual)
+        widths = sum(effect.columns.shape[1] for effect in one.effects) + one.extra.shape[1]
+        assert one.columns.shape[1] == search.base.nuisances.columns.shape[1] + widths

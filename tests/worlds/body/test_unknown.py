@@ -1,0 +1,43 @@
+"""Fields without a name: what each can and cannot do to a body."""
+
+import numpy as np
+import pytest
+
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.unknown import _unit_stresses, fields
+
+
+@pytest.fixture(scope="module")
+def at(small_diagnosis) -> Linearisation:
+    return small_diagnosis.base.at
+
+
+def test_an_eigenstress_has_no_net_force_and_no_moment(at, verify):
+    corners = (at.system.model.mesh.points + at.u)[at.system.model.mesh.tetrahedra]
+    forces = _unit_stresses(corners)
+    weights = np.random.default_rng(0).random(len(corners))
+    total = np.einsum("m,cmai->ci", weights, forces)
+    moment = np.einsum("m,cmai->ci", weights, np.cross(corners[None], forces))
+    size = np.abs(forces).sum(axis=(1, 2, 3)).max()
+    worst = max(np.abs(total).max(), np.abs(moment).max() / np.ptp(corners)) / size
+    verify("field of eigenstress: net force and moment", "zero, whatever the field", worst, 1e-12)
+
+
+def test_a_uniform_pressure_of_it_is_the_load_on_the_surface(at):
+    """The nodal forces of a uniform stress are those of its traction on the boundary (divergence theorem)."""
+    mesh = at.system.model.mesh
+    forces = _unit_stresses(mesh.points[mesh.tetrahedra])
+    nodal = np.zeros(mesh.points.shape)
+    np.add.at(nodal, mesh.tetrahedra, forces[:3].sum(axis=0))
+    a, b, c = mesh.points[mesh.boundary].transpose(1, 0, 2)
+    on_surface = np.zeros(mesh.points.shape)
+    np.add.at(on_surface, mesh.boundary, np.repeat(np.cross(b - a, c - a)[:, None] / 6.0, 3, axis=1))
+    np.testing.assert_allclose(nodal, on_surface, atol=1e-12 * np.abs(on_surface).max())
+
+
+def test_fields_are_of_one_metre(at):
+    rows = at.sensors.is_displacement
+    every = fields(at, 0.01)
+    assert {name.split(",")[0] for name in every} == {"body force", "eigenstress", "traction"}
+    for columns in every.values():
+        np.testing.assert_allclose(np.mean(np.sum(columns[rows] ** 2, axis=1)), 1.0)

@@ -1,1 +1,0 @@
-"""What was left out of a laboratory specimen: its tests compared with a homogeneous state, corrected for glued ends."""

@@ -1,0 +1,104 @@
+"""Evidence of rows under one hypothesis: summed over the scale of the noise, and over which points are gross errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
+from warpbrain.inference.noise import outliers, scales
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Scales are summed over until their part is below this.
+_NEGLIGIBLE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Marginal:
+    """Rows under one hypothesis.
+
+    Attributes
+    ----------
+    log_evidence : float
+    scale : float
+        The most probable factor on the noise.
+    gross : (g,) bool array
+        Points that are most probably gross errors, at that scale.
+    model : GaussianModel
+        At that scale, with columns of the larger noise of these points after those of the hypothesis.
+    louder : int
+        How many these are.
+    """
+
+    log_evidence: float
+    scale: float
+    gross: NDArray[np.bool_]
+    model: GaussianModel
+    louder: int
+
+    @cached_property
+    def noise(self) -> GaussianModel:
+        """Of the noise alone, that of gross errors larger."""
+        louder = self.model.columns[:, self._given :]
+        own = self.scale * self.model.noise_factor
+        factor: Floats = np.asarray(np.linalg.cholesky(own @ own.T + louder @ louder.T), dtype=np.float64)
+        return GaussianModel(factor, np.zeros((len(factor), 0)))
+
+    def coordinates(self, residual: Floats) -> Floats:
+        """Mean of the coefficients (q,) of the hypothesis after residuals (n,)."""
+        return self.model.coefficients(residual)[0][: self._given]
+
+    @property
+    def _given(self) -> int:
+        """Columns of the hypothesis."""
+        return self.model.columns.shape[1] - self.louder
+
+
+def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], near: float = 1.0) -> Marginal:
+    """Evidence of residuals (n,).
+
+    Parameters
+    ----------
+    model : GaussianModel
+        The causes of the hypothesis among its columns.
+    residual : (n,) array
+        Less what is expected of the causes.
+    points : sequence of int arrays
+        Rows of each point.
+    near : float
+        A factor on the noise that is not far from the most probable one.
+    """
+    values, log_prior = scales()
+    logs = np.full(len(values), -np.inf)
+    inflations: dict[int, Floats] = {}
+
+    def ask(number: int) -> None:
+        at_scale = with_gross_errors(model.with_scale(float(values[number])), residual, points, outliers())
+        logs[number], inflations[number] = at_scale.log_density + log_prior[number], at_scale.inflation
+
+    first = int(np.argmin(np.abs(np.log(values / near))))
+    ask(first)
+    for step in (-1, 1):
+        number = first + step
+        while 0 <= number < len(values):
+            ask(number)
+            if logs[number] < logs.max() + np.log(_NEGLIGIBLE):
+                break
+            number += step
+    best = int(np.argmax(logs))
+    at_best = model.with_scale(float(values[best]))
+    columns = columns_of_inflation(at_best, points, inflations[best])
+    return Marginal(
+        float(np.logaddexp.reduce(logs)),
+        at_best.scale,
+        inflations[best] > 1.0,
+        at_best.with_columns(columns),
+        columns.shape[1],
+    )

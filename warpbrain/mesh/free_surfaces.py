@@ -1,0 +1,125 @@
+"""The connected surfaces of a body that nothing holds: its outside, the walls of its voids, the wall of a cut."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.mesh.surface import closed_surfaces, face_vectors, faces_of, in_rows, nodes_of
+from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
+
+#: The outside of a body, the wall of a void within it, and what was inside until tetrahedra were taken out.
+Origin = Literal["outer", "inner", "cut"]
+_ORIGINS: tuple[Origin, ...] = ("outer", "inner", "cut")
+
+
+@dataclass(frozen=True, eq=False)
+class FreeSurface:
+    """A part of the surface on which something can act.
+
+    Attributes
+    ----------
+    name : str
+        Of the node set that stands for it: what acts on that acts on its triangles, and on none that can move beside.
+    words : str
+        What people call it.
+    members : (n,) bool array
+        Nodes of that set.
+    faces : (k, 3) int array
+        Triangles of the set that are not held, oriented outwards.
+    """
+
+    name: str
+    words: str
+    members: Bools
+    faces: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class FreePart:
+    """A connected free surface.
+
+    Attributes
+    ----------
+    origin : str
+        One of `Origin`.
+    faces : (k, 3) int array
+        Triangles, oriented outwards.
+    centre : (3,) array
+        Of its area [m].
+    """
+
+    origin: Origin
+    faces: Ints
+    centre: Floats
+
+
+def free_faces(mesh: TetMesh, members: Bools, held: Bools) -> Ints:
+    """Triangles (k, 3) of the boundary that a set of nodes holds and that can move: not all of their nodes are held."""
+    faces = faces_of(mesh, members)
+    return np.asarray(faces[~held[faces].all(axis=1)])
+
+
+def free_parts(mesh: TetMesh, held: Bools, inner: ArrayLike, smallest: float = 0.0) -> list[FreePart]:
+    """The connected free surfaces of a body.
+
+    The boundary without triangles whose nodes are all held falls into pieces that hang together through edges; the
+    wall of a cut, the walls of voids and the outside are apart even where they touch.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    held : (n,) bool array
+        Nodes that cannot move, or not along the normal.
+    inner : (n,) bool array
+        Nodes on the walls of voids, as the body was before anything was cut out.
+    smallest : float
+        Part of the area of all pieces of one origin on one closed surface. A piece of less, such as a gap in what is
+        held, belongs to the largest of them.
+
+    Returns
+    -------
+    list of FreePart
+        Outside, voids, cuts; of each the largest area first.
+    """
+    faces = mesh.boundary
+    free = ~held[faces].all(axis=1)
+    faces, closed = faces[free], closed_surfaces(faces)[free]
+    origin = np.where(np.asarray(inner, dtype=bool)[faces].all(axis=1), 1, 0)
+    origin[in_rows(faces, mesh.cut)] = 2
+    areas = np.linalg.norm(face_vectors(mesh.points, faces), axis=1)
+    found = []
+    for kind, name in enumerate(_ORIGINS):
+        own = [
+            rows
+            for surface in np.unique(closed[origin == kind])
+            for rows in _pieces(faces, areas, np.flatnonzero((origin == kind) & (closed == surface)), smallest)
+        ]
+        for rows in sorted(own, key=lambda rows: -float(areas[rows].sum())):
+            middles = mesh.points[faces[rows]].mean(axis=1)
+            found.append(FreePart(name, faces[rows], np.average(middles, axis=0, weights=areas[rows])))
+    return found
+
+
+def _pieces(faces: Ints, areas: Floats, rows: NDArray[np.int64], smallest: float) -> Iterator[NDArray[np.int64]]:
+    """Rows of each piece of some triangles of one closed surface."""
+    piece = closed_surfaces(faces[rows])
+    size = np.bincount(piece, areas[rows])
+    piece = np.where(size[piece] < smallest * size.sum(), int(size.argmax()), piece)
+    for number in np.unique(piece):
+        yield rows[piece == number]
+
+
+def set_of(mesh: TetMesh, part: FreePart) -> Bools:
+    """Nodes (n,) that stand for a part: a set of them holds its triangles, and beside these some of only such nodes."""
+    return nodes_of(part.faces, len(mesh.points))
+
+
+def rim_corners(mesh: TetMesh) -> Ints:
+    """Triangles (k, 3) of the cut whose nodes are all on its rim: a set of nodes of the surface beside holds them."""
+    beside = mesh.boundary[~in_rows(mesh.boundary, mesh.cut)]
+    return np.asarray(mesh.cut[nodes_of(beside, len(mesh.points))[mesh.cut].all(axis=1)])

@@ -1,0 +1,77 @@
+"""The factors of a stiffness matrix, and equilibria under many forces by them.
+
+A GPU for which CuPy is installed has dense ones; see `dense_factors`. On a host forces are taken in blocks of columns:
+SuperLU passes its factors once a block, and a block has to stay in the cache. Blocks are solved in threads, since SciPy
+lets go of Python's lock for that; a block's answer is the same whoever solves it, so results do not depend on the
+number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import SolveError
+from warpbrain.simulation.symmetric_factors import symmetric_factors
+from warpbrain.threads import fill_columns
+from warpbrain.worlds.body.dense_factors import dense_factors
+
+Floats = NDArray[np.float64]
+
+#: Columns that are solved together.
+_TOGETHER = 16
+
+
+class Factors:
+    """Factors of a symmetric positive definite matrix.
+
+    Parameters
+    ----------
+    matrix : SciPy sparse matrix (n, n)
+    device : warp.Device, optional
+        A GPU that may hold them; the host unless given.
+
+    Raises
+    ------
+    SolveError
+        If it is singular.
+    """
+
+    def __init__(self, matrix: Any, device: Any = None) -> None:
+        self._dense = None if device is None else dense_factors(matrix, device)
+        if self._dense is not None:
+            return
+        try:
+            self._factors: Any = symmetric_factors(matrix)
+        except RuntimeError as error:
+            raise SolveError(f"the state is unstable: its tangent stiffness cannot be factorised ({error})") from None
+
+    def solve(self, columns: Any) -> Floats:
+        """What answers to columns (n, k), an array or SciPy sparse: (n, k), column after column in memory."""
+        if self._dense is not None:
+            return self._dense.solve(columns)
+        return self._filled(columns, columns.shape[0], lambda found: found)
+
+    def between(self, left: Any, columns: Any) -> Floats:
+        """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k), dense a block at a time only."""
+        if self._dense is not None:
+            return self._dense.between(left, columns)
+        return self._filled(columns, left.shape[0], lambda found: left @ found)
+
+    def _filled(self, columns: Any, rows: int, of: Callable[[Floats], Floats]) -> Floats:
+        """What is made of the answers to each block, beside each other."""
+        from scipy.sparse import issparse
+
+        columns = columns.tocsc() if issparse(columns) else columns
+        made = np.empty((rows, columns.shape[1]), order="F")
+
+        def solve_block(some: slice) -> Floats:
+            block = columns[:, some]
+            block = block.toarray() if issparse(block) else block
+            return of(self._factors.solve(np.asfortranarray(block, dtype=np.float64)))
+
+        fill_columns(made, solve_block, _TOGETHER)
+        return made

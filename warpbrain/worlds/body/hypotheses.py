@@ -1,0 +1,349 @@
+"""The posterior over sets of causes of a body: screened about the base, the best fitted without linearising.
+
+A set's evidence is the sum over its places and sizes in the linear model. Where the best of these was fitted, what the
+fit's Laplace evidence differs by from the linear one is added; a set that is one cause more than a fitted one is linear
+about that fit, where what has been found already is as large as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import InputError, SolveError
+from warpbrain.inference import GaussianModel, Kind, Posterior, Search, posterior
+from warpbrain.inference.calibration import calibration
+from warpbrain.inference.marginal import Marginal, marginal
+from warpbrain.inference.noise import scales
+from warpbrain.inference.subsets import Hypothesis
+from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.causes import BodyCauses, causes_of
+from warpbrain.worlds.body.dictionary import Candidates, candidates_beside
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.fitting import Refit, Refitting
+from warpbrain.worlds.body.placing import placed
+from warpbrain.worlds.listener import Listener
+
+Floats = NDArray[np.float64]
+
+#: Places of each cause of which pairs are made, and sets that are looked at with gross errors of their own.
+_PLACES, _SETS = 20, 12
+#: Probability below which a set or a cause is not fitted, and how many are at most.
+_WORTH, _MOST = 0.02, 8
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """A set of causes and the linear model about its best point.
+
+    Attributes
+    ----------
+    hypothesis : Hypothesis
+    effects : tuple of Effect
+        Of its mechanisms, in the order of the hypothesis.
+    extra : (n, e) array
+        Columns of its causes that are no mechanisms.
+    residual : (n,) array
+        With all coordinates at zero.
+    columns : (n, q + e + k) array
+        Of nuisances, `extra` and effects.
+    marginal : Marginal
+    refit : Refit or None
+    why : str
+        What kept it from being fitted.
+    inherited : float
+        Part of its evidence that it has from the fit of nothing, until it is fitted itself.
+    """
+
+    hypothesis: Hypothesis
+    effects: tuple[Effect, ...]
+    extra: Floats
+    residual: Floats
+    columns: Floats
+    marginal: Marginal
+    refit: Refit | None = None
+    why: str = ""
+    inherited: float = 0.0
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Of its causes."""
+        return frozenset(self.hypothesis.causes)
+
+    @property
+    def mechanisms(self) -> tuple[str, ...]:
+        """Names of those that are physics with a name, as `effects`."""
+        each = zip(self.hypothesis.causes, self.hypothesis.kinds, strict=True)
+        return tuple(name for name, kind in each if kind is Kind.PHYSICS)
+
+    @property
+    def coordinates(self) -> Floats:
+        """The most probable ones (q + e + k,)."""
+        return self.marginal.coordinates(self.residual)
+
+    @property
+    def coefficients(self) -> tuple[tuple[Floats, Floats], ...]:
+        """Mean and covariance of the coefficients of each effect."""
+        if self.refit is not None:
+            return tuple(zip(self.refit.coefficients, self.refit.covariances, strict=True))
+        mean, covariance = self.marginal.model.coefficients(self.residual)
+        found, at = [], self.columns.shape[1] - sum(effect.columns.shape[1] for effect in self.effects)
+        for effect in self.effects:
+            own = slice(at, at + effect.columns.shape[1])
+            found.append((mean[own], covariance[own, own]))
+            at = own.stop
+        return tuple(found)
+
+    def with_evidence(self, log_evidence: float) -> Weighed:
+        """The same with another evidence."""
+        return replace(self, hypothesis=replace(self.hypothesis, log_evidence=log_evidence))
+
+
+class HypothesisSearch:
+    """Weighs sets of causes.
+
+    Parameters
+    ----------
+    base : Base
+    candidates : Candidates
+    spacing : float
+        Between the places of a scan [m].
+    listener : Listener
+    """
+
+    def __init__(self, base: Base, candidates: Candidates, spacing: float, listener: Listener) -> None:
+        self.base, self.candidates, self._spacing, self._listener = base, candidates, spacing, listener
+        self.causes = causes_of(base, candidates)
+        self.fits = Refitting(base)
+        self._weighed: dict[frozenset[str], Weighed] = {}
+        self._spread: set[frozenset[str]] = set()
+
+    @property
+    def weighed(self) -> tuple[Weighed, ...]:
+        """The most probable first."""
+        return tuple(sorted(self._weighed.values(), key=lambda one: -_log_posterior(one)))
+
+    @property
+    def probabilities(self) -> Floats:
+        """Of `weighed`."""
+        return calibration().probabilities([one.hypothesis for one in self.weighed])
+
+    def get(self, names: Iterable[str]) -> Weighed | None:
+        """A set, if it was weighed."""
+        return self._weighed.get(frozenset(names))
+
+    def screen(self) -> None:
+        """Weigh sets about the base, with all points sound and without what are gross errors if nothing acts."""
+        self._listener.stage("screening")
+        base = self.base
+        nothing = marginal(base.model, base.residual, base.points)
+        models = [base.model]
+        if nothing.gross.any():
+            louder = nothing.noise.noise_factor / nothing.scale
+            models.append(GaussianModel(louder, base.nuisances.columns))
+        for model in models:
+            found = posterior(model, base.residual, self.causes.causes, _search(most=2))
+            for hypothesis in _worth_looking_at(found):
+                self._take(self._linear(hypothesis, model))
+
+    def fit(self) -> None:
+        """Fit the best sets without linearising, and weigh what may act beside them."""
+        self._fit(frozenset())
+        for name in self._likely():
+            self._fit(frozenset((name,)))
+        for _ in range(_MOST):
+            waiting = [one for one in self._probable() if not self._done(one)]
+            if not waiting:
+                return
+            names = waiting[0].names
+            if waiting[0].refit is None:
+                self._fit(names)
+            else:
+                self._spread_from(names)
+
+    def _done(self, one: Weighed) -> bool:
+        """Whether nothing is left to do: fitted and looked beside, or linear about a fit that is."""
+        if one.why:
+            return True
+        if one.refit is not None:
+            return one.names in self._spread or len(one.names) > 2 or not one.mechanisms
+        best = one is self.weighed[0]
+        return not best and any(one.names > names for names in self._spread)
+
+    def _probable(self) -> list[Weighed]:
+        chances = zip(self.weighed, self.probabilities.tolist(), strict=True)
+        return [one for one, chance in chances if chance > _WORTH]
+
+    def _likely(self) -> list[str]:
+        """Mechanisms that are in probable sets, and were weighed alone."""
+        chances: dict[str, float] = {}
+        for one, chance in zip(self.weighed, self.probabilities.tolist(), strict=True):
+            for name in one.mechanisms:
+                chances[name] = chances.get(name, 0.0) + chance
+        likely = [name for name in sorted(chances, key=lambda name: -chances[name]) if chances[name] > _WORTH]
+        return [name for name in likely if frozenset((name,)) in self._weighed][:4]
+
+    def _take(self, one: Weighed) -> None:
+        known = self._weighed.get(one.names)
+        if known is None or one.hypothesis.log_evidence > known.hypothesis.log_evidence:
+            self._weighed[one.names] = one
+
+    def _linear(self, hypothesis: Hypothesis, model: GaussianModel) -> Weighed:
+        """A set as screened, its gross errors its own."""
+        base = self.base
+        return self._beside(hypothesis, self.causes, base.residual, base.model.columns, (), model)
+
+    def _beside(
+        self,
+        hypothesis: Hypothesis,
+        causes: BodyCauses,
+        residual: Floats,
+        columns: Floats,
+        there: tuple[Effect, ...],
+        screened: GaussianModel,
+    ) -> Weighed:
+        """The members of a hypothesis beside columns that are there, weighed with gross errors of its own.
+
+        What they gain over the screen, in which these were as in `screened`, is added to the hypothesis' evidence.
+        """
+        members = hypothesis.best.members
+        effects = [(member, causes.effect(member)) for member in members]
+        extra = [causes.columns(member) for member, effect in effects if effect is None]
+        new = [effect for _, effect in effects if effect is not None]
+        left = residual - sum((causes.mean(member) for member in members), start=np.zeros(len(residual)))
+        own = np.column_stack([*extra, *(effect.columns for effect in new)]) if members else np.zeros((len(left), 0))
+        values, log_prior = scales()
+        plain = screened.with_columns(own).log_marginal(left, values, log_prior)
+        # effects that are there already come first among effects
+        known = sum(effect.columns.shape[1] for effect in there)
+        split = columns.shape[1] - known
+        ordered = np.column_stack([columns[:, :split], *extra, columns[:, split:], *(one.columns for one in new)])
+        weighed = marginal(
+            GaussianModel(self.base.model.noise_factor, ordered), left, self.base.points, hypothesis.best.scale
+        )
+        return Weighed(
+            replace(hypothesis, log_evidence=hypothesis.log_evidence + weighed.log_evidence - plain),
+            (*there, *new),
+            np.column_stack([columns[:, self.base.nuisances.columns.shape[1] : split], *extra]),
+            left,
+            ordered,
+            weighed,
+        )
+
+    def _fit(self, names: frozenset[str]) -> None:
+        """Fit a set; one that cannot be says why."""
+        one = self._weighed[names]
+        self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
+        one = self._placed(one) if one.refit is None and len(names) <= 2 else one
+        begins = [one.coordinates]
+        nothing = self._weighed[frozenset()].refit
+        near = None
+        if nothing is not None:
+            q = len(nothing.nuisances)
+            beside = np.column_stack([nothing.columns, one.columns[:, q:]])
+            model = GaussianModel(one.marginal.noise.noise_factor, beside)
+            begins.append(model.coefficients(nothing.linear + one.residual - self.base.residual)[0])
+            near = nothing.state
+        try:
+            refit = self.fits.fit(one.effects, one.extra, begins, one.marginal, near)
+        except (SolveError, InputError) as error:
+            self._weighed[names] = replace(one, why=str(error))
+            return
+        gain = refit.log_evidence - one.marginal.log_evidence
+        if not names:
+            # what the fit without any cause gains is of tissue and registration, which all others gain by, too; and a
+            # search that ended too early must not make everything else look better
+            gain = max(gain, 0.0)
+            for other in list(self._weighed.values()):
+                if other.names:
+                    gained = other.with_evidence(other.hypothesis.log_evidence + gain)
+                    self._weighed[other.names] = replace(gained, inherited=gain)
+        fitted = replace(one, residual=refit.linear, columns=refit.columns, marginal=refit.marginal, refit=refit)
+        self._weighed[names] = fitted.with_evidence(one.hypothesis.log_evidence - one.inherited + gain)
+
+    def _placed(self, one: Weighed) -> Weighed:
+        """A set with its mechanisms at the best places of their cells."""
+        effects = list(one.effects)
+        at = one.columns.shape[1] - sum(effect.columns.shape[1] for effect in effects)
+        for number, effect in enumerate(effects):
+            own = slice(at, at + effect.columns.shape[1])
+            at = own.stop
+            if effect.proposal is None or effect.proposed.elsewhere is None:
+                continue
+            others = np.delete(one.marginal.model.columns, np.r_[own], axis=1)
+            without = GaussianModel(one.marginal.model.noise_factor, others, one.marginal.scale)
+            assert effect.proposed.centre is not None and effect.proposed.radius is not None
+            usual = effect.proposed.elsewhere(effect.proposed.centre, effect.proposed.radius)
+            size = float(np.max(effect.proposed.sd / usual.sd))
+            found = placed(
+                self.base, self.base.effects, effect, size, self._spacing, without, one.residual + effect.mean
+            )
+            columns = one.columns.copy()
+            columns[:, own] = found.effect.columns
+            residual = one.residual + effect.mean - found.effect.mean
+            better = marginal(
+                GaussianModel(self.base.model.noise_factor, columns), residual, self.base.points, one.marginal.scale
+            )
+            effects[number] = found.effect
+            one = replace(
+                one, effects=tuple(effects), residual=residual, columns=columns, marginal=better
+            ).with_evidence(one.hypothesis.log_evidence + found.gain)
+        return one
+
+    def _spread_from(self, names: frozenset[str]) -> None:
+        """Weigh every set of one cause more than a fitted one, linear about that fit."""
+        one = self._weighed[names]
+        assert one.refit is not None
+        self._spread.add(names)
+        self._listener.stage(f"what acts beside {' and '.join(sorted(names))}")
+        candidates = candidates_beside(one.refit.state, one.effects, self.candidates)
+        causes = causes_of(self.base, candidates)
+        causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in names))
+        louder = GaussianModel(one.marginal.noise.noise_factor / one.marginal.scale, one.columns)
+        found = posterior(louder, one.residual, causes.causes, _search(most=1))
+        values, log_prior = scales()
+        without = louder.log_marginal(one.residual, values, log_prior)
+        for hypothesis in _worth_looking_at(found, singles=False):
+            if not hypothesis.causes:
+                continue
+            beside = self._beside(hypothesis, causes, one.residual, one.columns, one.effects, louder)
+            gain = beside.hypothesis.log_evidence - without
+            # the evidence without it has its own gross errors, too
+            gain -= one.marginal.log_evidence - without
+            total = replace(
+                hypothesis,
+                causes=(*hypothesis.causes, *one.hypothesis.causes),
+                kinds=(*hypothesis.kinds, *one.hypothesis.kinds),
+                log_prior=hypothesis.log_prior + one.hypothesis.log_prior,
+                log_evidence=one.hypothesis.log_evidence + gain,
+            )
+            ordered = _in_order(replace(beside, hypothesis=total))
+            known = self._weighed.get(ordered.names)
+            if known is None or known.refit is None:
+                self._weighed[ordered.names] = ordered
+
+
+def _in_order(one: Weighed) -> Weighed:
+    """Causes in the order of their effects: those that were there first."""
+    hypothesis = one.hypothesis
+    new, there = hypothesis.causes[0], hypothesis.causes[1:]
+    kinds = hypothesis.kinds
+    return replace(one, hypothesis=replace(hypothesis, causes=(*there, new), kinds=(*kinds[1:], kinds[0])))
+
+
+def _search(most: int) -> Search:
+    values, log_prior = scales()
+    return Search(values, log_prior, places=_PLACES, beam=0, most=most)
+
+
+def _worth_looking_at(found: Posterior, singles: bool = True) -> list[Hypothesis]:
+    """The most probable sets, none, and every single cause if asked for."""
+    best = list(found.hypotheses[:_SETS])
+    return best + [one for one in found.hypotheses[_SETS:] if not one.causes or (singles and len(one.causes) == 1)]
+
+
+def _log_posterior(one: Weighed) -> float:
+    return one.hypothesis.log_evidence + one.hypothesis.log_prior

@@ -1,0 +1,257 @@
+"""What may explain residuals without any physics missing: columns over the sensors of one standard deviation each.
+
+Tissue (its prior), stiffness that varies within it, compressibility, the shape of its law, how large the known loads
+were, a rigid error of registration, and the error of the mesh. A cause is credited only with what they cannot explain.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.estimation.discretisation import Discretisation
+from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.inference.beliefs import belief, beliefs
+from warpbrain.physics.laws import Law
+from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanisms.asymmetry import Asymmetry
+from warpbrain.physics.mechanisms.compressibility import Compressibility
+from warpbrain.physics.proposal import Proposal
+from warpbrain.simulation.assumed import all_substituted
+from warpbrain.simulation.model import Material
+from warpbrain.simulation.system import System
+from warpbrain.worlds.body.effects import Effects
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
+from warpbrain.worlds.body.sensors import Sensors, alike_near, spread_points
+from warpbrain.worlds.body.states import Hypothesis, States
+
+Floats = NDArray[np.float64]
+
+#: Step of a difference in `theta`.
+_STEP = 1e-3
+
+
+def registration_sd() -> Floats:
+    """Standard deviations (6,) of a rigid error of registration: shift [m] and turn [rad]."""
+    return np.repeat([belief("registration.shift"), belief("registration.turn")], 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Nuisances of one kind.
+
+    Attributes
+    ----------
+    name : str
+        For people.
+    columns : (n, k) array
+        What one standard deviation of each changes of what is recorded.
+    """
+
+    name: str
+    columns: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Nuisances:
+    """All of them.
+
+    Attributes
+    ----------
+    families : tuple of Family
+        The first is the tissue's parameters, the second the stiffness field.
+    anchors : (a, 3) array
+        Points [m] about which the unknown part of the mesh's error is alike.
+    fraction : float
+        That part, relative to the displacement.
+    """
+
+    families: tuple[Family, ...]
+    anchors: Floats
+    fraction: float
+
+    @property
+    def columns(self) -> Floats:
+        """Of all, side by side (n, q)."""
+        return np.concatenate([family.columns for family in self.families], axis=1)
+
+    def weakened(self) -> Nuisances:
+        """The same as if nothing of them could be: columns that are next to nothing."""
+        return replace(self, families=tuple(Family(f.name, 1e-9 * f.columns) for f in self.families))
+
+    def with_fraction(self, fraction: float) -> Nuisances:
+        """The same with another size of the unknown part of the mesh's error."""
+        *others, last = self.families
+        scaled = Family(last.name, last.columns * (fraction / self.fraction))
+        return replace(self, families=(*others, scaled), fraction=fraction)
+
+    def coordinates(self, prior: Gaussian, hypothesis: Hypothesis) -> Floats:
+        """Coordinates (q,) of the tissue, by its prior, and of the field of a hypothesis; the others are zero."""
+        found = np.zeros(self.columns.shape[1])
+        found[self.part("tissue")] = np.linalg.solve(prior.factor, hypothesis.theta - prior.mean)
+        found[self.part("stiffness field")] = hypothesis.field
+        return found
+
+    def part(self, name: str) -> slice:
+        """Where the columns of a family are."""
+        at = 0
+        for family in self.families:
+            width = family.columns.shape[1]
+            if family.name == name:
+                return slice(at, at + width)
+            at += width
+        raise KeyError(name)
+
+
+def nuisances_at(
+    at: Linearisation,
+    states: States,
+    theta: Floats,
+    prior: Gaussian,
+    effects: Effects,
+    mesh_errors: MeshErrors | None,
+    anchors: Floats | None = None,
+    fraction: float | None = None,
+) -> Nuisances:
+    """The nuisances of a state.
+
+    Parameters
+    ----------
+    at : Linearisation
+    states : States
+    theta : (p,) array
+        Of the tissues there.
+    prior : Gaussian
+        Of `theta`.
+    effects : Effects
+        At that state.
+    mesh_errors : MeshErrors or None
+        The state on a finer mesh less the state; None: the mesh is taken for exact.
+    anchors : (a, 3) array, optional
+        Those of other sensors, so that columns mean the same.
+    fraction : float, optional
+        Unknown part of the mesh's error, relative to the displacement; the largest that is believed by default.
+    """
+    if fraction is None:
+        fraction = float(beliefs("mesh.unknown").max())
+    sensors = at.sensors
+    if anchors is None:
+        where = sensors.positions[sensors.is_displacement]
+        anchors = where[spread_points(where, belief("mesh.alike"), 60)]
+    families = [
+        Family("tissue", tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors)),
+        Family("stiffness field", field_columns(at, states)),
+        Family("compressibility", _law_columns(effects, [other_volume(states)])),
+        Family("shape of the law", _law_columns(effects, _other_shape())),
+        Family("known loads", _known_loads(at)),
+        Family("registration", sensors.rigid * registration_sd()),
+    ]
+    if mesh_errors is not None:
+        own = mesh_errors.own
+        families.append(Family("mesh", Discretisation().deviation * sensors.answer(own.u, own.reactions)[:, None]))
+    families.append(Family("mesh, unknown", _fractional(at, anchors, fraction)))
+    return Nuisances(tuple(families), anchors, fraction)
+
+
+def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
+    """What one standard deviation of each parameter of the tissues changes of what is recorded: (n, p)."""
+    system = at.system
+    forces = np.zeros((len(theta), system.size, 3))
+    for k in range(len(theta)):
+        for sign in (-1.0, 1.0):
+            beside = theta.copy()
+            beside[k] += sign * _STEP
+            system.set_materials(_materials(system, states, beside))
+            forces[k] -= sign * at.internal_forces() / (2.0 * _STEP)
+    system.set_materials(_materials(system, states, theta))
+    return at.answers(forces) @ prior.factor
+
+
+def _materials(system: System, states: States, theta: Floats) -> Mapping[int, Material]:
+    """Those of `theta`, as the mechanisms that act have them."""
+    return all_substituted(states.parameters.materials(theta), system.model.mechanisms)
+
+
+def field_columns(at: Linearisation, states: States) -> Floats:
+    """What one standard deviation of each mode of the stiffness field changes of what is recorded: (n, k)."""
+    return at.answers_of_elements(at.element_forces, states.modes)
+
+
+def _law_columns(effects: Effects, proposals: list[Proposal]) -> Floats:
+    return np.concatenate([effect.columns for effect in effects.of(proposals)], axis=1)
+
+
+def other_volume(states: States) -> Proposal:
+    """Tissue that is more or less compressible than the case says, as much in all tissues."""
+    own = -math.log1p(-2.0 * states.case.poisson)
+    return Proposal.of_one(
+        lambda c: Compressibility(poisson=-0.5 * math.expm1(-c)), own, belief("tissue.volume"), "smooth", own
+    )
+
+
+def mesh_by_tissue(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:
+    """What the mesh's error adds (n, p) to `tissue_columns`; 0 where the mesh is taken for exact."""
+    if mesh_errors is None:
+        return np.zeros((len(sensors), 1))
+    return np.column_stack([expected_answer(sensors, change) for change in mesh_errors.by_tissue])
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SecondInvariant(Mechanism):
+    """A law with a share of the second invariant."""
+
+    share: float
+    kind: ClassVar[str] = "second invariant"
+    sentence: ClassVar[str] = "The law has a share of the second invariant."
+
+    def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
+        """See `warpbrain.physics.mechanism.Substituting`."""
+        mu = law.shear_modulus
+        return MooneyRivlin(0.5 * mu * (1.0 - self.share), 0.5 * mu * self.share), poisson, formulation
+
+
+def _other_shape() -> list[Proposal]:
+    return [
+        Proposal.of_one(lambda a: Asymmetry(exponent=a), 2.0, belief("tissue.exponent"), "smooth", 2.0),
+        Proposal.of_one(
+            lambda share: _SecondInvariant(share=share), 0.5, belief("tissue.second_invariant"), "smooth", 0.5
+        ),
+    ]
+
+
+def _known_loads(at: Linearisation) -> Floats:
+    """All known loads larger or smaller by one factor, and all prescribed displacements."""
+    model = at.system.model
+    columns = [belief("loads.size") * at.answers(model.external_forces()[None])]
+    if model.prescribed.any():
+        moved = (at.stiffness @ model.prescribed.ravel()).reshape(-1, 3)
+        own = at.sensors.answer(model.prescribed, np.where(model.constrained, moved, 0.0))
+        answer = own + at.answers(np.where(model.constrained, 0.0, -moved)[None])[:, 0]
+        columns.append(belief("loads.size") * answer[:, None])
+    found = np.concatenate(columns, axis=1)
+    return found[:, found.any(axis=0)]
+
+
+def _fractional(at: Linearisation, anchors: Floats, fraction: float) -> Floats:
+    """A part of the displacement in any direction, alike among neighbours."""
+    from scipy.spatial import cKDTree
+
+    sensors = at.sensors
+    rows = np.flatnonzero(sensors.is_displacement)
+    if not len(rows):
+        return np.zeros((len(sensors), 0))
+    where = sensors.positions[rows]
+    nearest = cKDTree(at.system.model.mesh.points).query(where)[1]
+    size = np.linalg.norm(at.u, axis=1)[nearest]
+    near = alike_near(where, anchors, belief("mesh.alike"))
+    found = np.zeros((len(sensors), 3 * len(anchors)))
+    along = sensors.directions[rows]
+    found[rows] = (fraction * size[:, None, None] * near[:, :, None] * along[:, None, :]).reshape(len(rows), -1)
+    return found

@@ -1,0 +1,126 @@
+"""From the coefficients of a proposal to the parameters that a user knows, with units and standard deviations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.values import Smallest, Value
+
+Floats = NDArray[np.float64]
+
+#: Detectability at which an effect is found nearly always.
+SEEN = 5.0
+
+
+def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, ...]:
+    """Parameters that differ among proposals, such as a level or a radius: mean and spread over them.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Of one kind.
+    weights : (v,) array
+        Their probabilities, with the sum 1.
+    """
+    numbers = [numbers_of(effect, np.zeros(effect.columns.shape[1])) for effect in effects]
+    found = []
+    for name, (_, unit) in numbers[0].items():
+        values = np.array([one[name][0] if name in one else np.nan for one in numbers])
+        if np.isnan(values).any() or np.ptp(values) == 0.0:
+            continue
+        mean = float(weights @ values)
+        # half of the step between neighbours is not known either
+        step = float(np.ptp(values)) / max(len(np.unique(values)) - 1, 1)
+        found.append(Value(name, mean, float(np.sqrt(weights @ (values - mean) ** 2 + step**2 / 12.0)), unit))
+    return tuple(found)
+
+
+def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...]:
+    """Parameters of the mechanism at coordinates (k,) with a covariance (k, k): to first order.
+
+    The length of a vector follows its components, as `value_size`; of several numbers the first is `moduli_1`, and
+    `moduli` what they are together, if that means anything.
+    """
+    if effect.proposed.is_there_or_not and effect.proposed.place is None:
+        return ()
+    here = numbers_of(effect, z)
+    # a covariance that rounding has left not quite positive is no reason to fail
+    spread, along = np.linalg.eigh(covariance)
+    factor = along * np.sqrt(np.maximum(spread, 1e-18))
+    beside = [(numbers_of(effect, z + 0.1 * column), numbers_of(effect, z - 0.1 * column)) for column in factor.T]
+    found = []
+    for name, (value, unit) in here.items():
+        change = np.array([(up[name][0] - down[name][0]) / 0.2 for up, down in beside if name in up and name in down])
+        sd = float(np.linalg.norm(change))
+        if sd > 0.0:
+            found.append(Value(name, value, sd, unit))
+    return tuple(found)
+
+
+def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
+    """Numbers of the mechanism at coordinates (k,), by name, with units; of what lets go its place."""
+    if effect.proposed.is_there_or_not and effect.proposed.place is not None:
+        centre, radius = effect.proposed.place(effect.coefficients(z))
+        return {
+            **{f"centre_{axis}": (x, "m") for axis, x in zip("xyz", centre.tolist(), strict=True)},
+            "radius": (1e3 * radius, "mm"),
+        }
+    mechanism: Mechanism = effect.proposed.make(effect.coefficients(z))
+    found: dict[str, tuple[float, str]] = {}
+    if mechanism.ramp:
+        found["share"] = (mechanism.factor(), "")
+    for name, says in mechanism.parameters().items():
+        value = getattr(mechanism, name)
+        if value is None or isinstance(value, str):
+            continue
+        numbers = np.ravel(np.asarray(value, dtype=float)) / says.si
+        if len(numbers) == 1 or says.adds_up:
+            found[name] = (float(numbers.sum()), says.unit)
+        if says.kind == "numbers" and len(numbers) > 1:
+            found |= {f"{name}_{k}": (number, says.unit) for k, number in enumerate(numbers.tolist(), 1)}
+        if len(numbers) == 3 and says.kind in ("vector", "position"):
+            unit = says.unit if says.kind == "vector" else "m"
+            for axis, number in zip("xyz", numbers.tolist(), strict=True):
+                found[f"{name}_{axis}"] = (number, unit)
+            if says.kind == "vector":
+                found[f"{name}_size"] = (float(np.linalg.norm(numbers)), unit)
+    return found
+
+
+def smallest_of(effect: Effect, whitened_length: float, seen: float, named: float) -> Smallest:
+    """The sizes at which an effect has two detectabilities.
+
+    Parameters
+    ----------
+    effect : Effect
+    whitened_length : float
+        Its detectability per standard deviation of its first coefficient (of a switch, or a course: when it is there).
+    seen, named : float
+        Detectabilities at which it raises an alarm, and at which it is named; infinite if it never is.
+    """
+    size, unit, name = _size_at(effect, seen / max(whitened_length, 1e-12))
+    return Smallest(size, unit, name, _size_at(effect, named / max(whitened_length, 1e-12))[0])
+
+
+def _size_at(effect: Effect, factor: float) -> tuple[float, str, str]:
+    """Size, unit and parameter of an effect that is so many times one standard deviation of its first coefficient."""
+    if effect.proposed.is_there_or_not or effect.about is not None:
+        return factor, "of being there", "share"
+    z = np.zeros(effect.columns.shape[1])
+    start = -effect.proposed.mean / effect.proposed.sd if effect.proposed.follows == "proportional" else z
+    base = numbers_of(effect, start)
+    z = start.copy()
+    z[0] += min(factor, 1e3)
+    try:
+        there = numbers_of(effect, z)
+    except Exception:  # a mechanism refuses sizes that cannot be
+        return float("inf"), "", ""
+    for name, (value, unit) in there.items():
+        if name in base and abs(value - base[name][0]) > 0.0:
+            return (abs(value - base[name][0]) if factor < 1e3 else float("inf")), unit, name
+    return float("inf"), "", ""

@@ -1,0 +1,89 @@
+"""A mechanism between the places of its scan: a cell about the best place, looked through more finely.
+
+The scan stands for the cell about each of its places. So of the finer places in the cell of the best one the mean
+counts for the evidence, and the best of them is where a fit begins.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.inference import GaussianModel
+from warpbrain.physics.proposal import Proposal
+from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.causes import scaled
+from warpbrain.worlds.body.effects import Effect, Effects
+
+Floats = NDArray[np.float64]
+
+#: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
+_RADII = (0.8, 1.0, 1.25)
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """The best effect of a cell, and by how much [nats] the mean of the cell is more probable than its middle."""
+
+    effect: Effect
+    gain: float
+
+
+def placed(
+    base: Base, effects: Effects, effect: Effect, size: float, spacing: float, without: GaussianModel, residual: Floats
+) -> Placed:
+    """Look through the cell of an effect.
+
+    Parameters
+    ----------
+    base : Base
+    effects : Effects
+        Which makes columns at the state that the model is linear about.
+    effect : Effect
+        Of a proposal that can be elsewhere.
+    size : float
+        Of its coefficients, relative to what is usual.
+    spacing : float
+        Between the places of the scan [m].
+    without : GaussianModel
+        Of rows with all else that acts, gross errors among the columns.
+    residual : (n,) array
+        Less what is expected of all else.
+    """
+    middle = effect
+    gain = 0.0
+    for step in (0.5, 0.25):
+        tried = [middle, *effects.of(_around(base, middle, step * spacing))]
+        tried = [tried[0], *(scaled(one, size) for one in tried[1:])]
+        logs = np.array([float(without.with_columns(one.columns).log_density(residual - one.mean)) for one in tried])
+        if step == 0.5:
+            gain = float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs[0])
+        middle = tried[int(np.argmax(logs))]
+    return Placed(middle, gain)
+
+
+def _around(base: Base, effect: Effect, step: float) -> list[Proposal]:
+    """Proposals a step from an effect along each axis, and with other radii."""
+    proposed = effect.proposed
+    assert proposed.elsewhere is not None and proposed.centre is not None and proposed.radius is not None
+    offsets = [np.zeros(3), *(sign * step * axis for axis in np.eye(3) for sign in (-1.0, 1.0))]
+    found = []
+    for offset, radius in itertools.product(offsets, _RADII):
+        centre = proposed.centre + offset
+        if proposed.on_surface:
+            centre = _on_surface(base, centre)
+        if offset.any() or radius != 1.0:
+            found.append(proposed.elsewhere(centre, radius * proposed.radius))
+    return found
+
+
+def _on_surface(base: Base, centre: Floats) -> Floats:
+    """The nearest middle of a face that is free."""
+    mesh = base.at.system.model.mesh
+    held = np.asarray(base.at.system.model.constrained.reshape(-1, 3).all(axis=1))
+    faces = mesh.boundary[~held[mesh.boundary].any(axis=1)]
+    middles = mesh.points[faces].mean(axis=1)
+    return np.asarray(middles[np.argmin(np.sum((middles - centre) ** 2, axis=1))])

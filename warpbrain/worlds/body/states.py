@@ -1,0 +1,310 @@
+"""States of a case under hypotheses: other tissue, a stiffness field, one or several mechanisms more."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.boundary import Boundary, Fixed
+from warpbrain.cases.case import Case
+from warpbrain.errors import SolveError
+from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.realigned import realigned
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.composition import CompositionError
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.proposal import Patch
+from warpbrain.simulation.assumed import all_substituted
+from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
+from warpbrain.simulation.keeping import kept_for
+from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.model import Material
+from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.quasi_static import follow_slowly
+from warpbrain.simulation.system import System
+from warpbrain.worlds.body.sensors import Sensors, sensors_at
+from warpbrain.worlds.body.stiffness_field import StiffnessField, stiffness_modes
+from warpbrain.worlds.body.surfaces import with_free_surfaces
+
+Floats = NDArray[np.float64]
+
+#: Out-of-balance force of an equilibrium, relative.
+TOLERANCE = 1e-6
+#: The same of a course in time, whose steps are less exact than that.
+_COURSE = 1e-5
+#: Short steps after a load has come, as parts of the first time that counts.
+_SHORT = (1e-3, 0.1, 0.4)
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """What is taken to be so.
+
+    Attributes
+    ----------
+    theta : (p,) array
+        Of the tissues; see `Parameters`.
+    field : (k,) array
+        Of the modes of the stiffness field, in standard deviations.
+    mechanisms : tuple of Mechanism
+        Beside those of the case.
+    patches : tuple of Patch
+        What the case's boundaries no longer hold.
+    """
+
+    theta: Floats
+    field: Floats
+    mechanisms: tuple[Mechanism, ...] = ()
+    patches: tuple[Patch, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedState:
+    """An equilibrium under a hypothesis.
+
+    Attributes
+    ----------
+    hypothesis : Hypothesis
+    system : System
+    u, reactions : (N, 3) array
+    sensors : Sensors
+        There, the expected error of the mesh put right: with walls where they are, not where elements that are too
+        stiff leave them, or a point in a narrow ventricle is taken for one of the other wall.
+    course : tuple of (N, 3) arrays
+        Displacement [m] at each of `steps_to` where it was followed over time; empty where it was not.
+    """
+
+    hypothesis: Hypothesis
+    system: System
+    u: Floats
+    reactions: Floats
+    sensors: Sensors
+    course: tuple[Floats, ...] = ()
+
+
+class States:
+    """Solves a case under hypotheses.
+
+    Parameters
+    ----------
+    case : Case
+    device : str, optional
+
+    Attributes
+    ----------
+    times : tuple of float
+        Recorded ones [s], increasing; infinity alone where no times were recorded, or they do not matter.
+    motion : (6,) array
+        Rigid motion that recordings are taken to have been moved by.
+    solves : int
+    """
+
+    def __init__(self, case: Case, device: str | None = None) -> None:
+        self.case = case = with_free_surfaces(case)
+        self.device = device
+        self.parameters = Parameters.of(case)
+        self.times = recorded_times(case)
+        self.motion = np.zeros(6)
+        self.centre = Observations.to_fit(case).centre
+        self.realign(self.motion)
+        self.modes = stiffness_modes(case.remaining[0])
+        self.solves = 0
+        self._factors: dict[tuple[str, ...], KeptFactors | None] = {}
+
+    def realign(self, motion: Floats) -> None:
+        """Take recordings for moved by a rigid motion (6,); see `realigned`."""
+        self.motion = motion
+        case = realigned(self.case, motion, self.centre)
+        self.observations = tuple(Observations.to_fit(case, None if np.isinf(time) else time) for time in self.times)
+
+    def case_of(self, hypothesis: Hypothesis) -> Case:
+        """The case that a user would write for a hypothesis, but for the stiffness field."""
+        applied = self.parameters.applied(self.case, hypothesis.theta)
+        mesh, boundaries = _released(applied, hypothesis.patches)
+        return replace(applied, mesh=mesh, boundaries=boundaries, mechanisms=self._acting(hypothesis))
+
+    def _acting(self, hypothesis: Hypothesis) -> tuple[Mechanism, ...]:
+        """The case's own mechanisms, but of a kind that a case has one of the hypothesis' own."""
+        new = hypothesis.mechanisms
+        kept = (m for m in self.case.mechanisms if all(one.several or one.kind != m.kind for one in new))
+        return (*kept, *new)
+
+    def materials(self, hypothesis: Hypothesis) -> Mapping[int, Material]:
+        """Those of a hypothesis, by label."""
+        return all_substituted(self.parameters.materials(hypothesis.theta), self._acting(hypothesis))
+
+    def solve(
+        self,
+        hypothesis: Hypothesis,
+        start: Floats | None = None,
+        expected: Difference | None = None,
+        course: Sequence[Floats] = (),
+    ) -> SolvedState:
+        """The equilibrium under a hypothesis.
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis
+        start : (N, 3) array, optional
+            A displacement [m] that is near to it.
+        expected : Difference, optional
+            What it lacks of the state without the error of the mesh; sensors are there.
+        course : sequence of (N, 3) arrays, optional
+            Of a state that is near to it, if it is followed over time.
+
+        Raises
+        ------
+        InputError
+            If a law is not stable.
+        SolveError
+            If there is none.
+        """
+        self.solves += 1
+        system = self._system(hypothesis)
+        model, external = system.model, system.model.external_forces()
+        options = EquilibriumOptions(tolerance=TOLERANCE)
+        # relaxing stress or fluid of its own: what a term has in its memory beside that changes no state in time
+        in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
+        if in_time and np.isfinite(self.times[0]):
+            near = course or (() if start is None else (start,))
+            moments = follow_slowly(system, steps_to(self.times), options, near=near, factors=self._factors_of(system))
+            found = {moment.time: moment.state for moment in moments}
+            course = tuple(state.u for state in found.values())
+            states = [found[time] for time in self.times]
+        else:
+            course = ()
+            # on a CPU conjugate gradients have found a single state as soon as factors are made
+            factors = None if system.device.is_cpu else self._factors_of(system)
+            solver = EquilibriumSolver(system, options, factors=factors)
+            states = [solver.solve(external, start)] * len(self.times)
+        reactions = [model.reactions(state.internal, external) for state in states]
+        sensors = self._sensors([(state.u, R) for state, R in zip(states, reactions, strict=True)], expected)
+        return SolvedState(hypothesis, system, states[-1].u, reactions[-1], sensors, tuple(course))
+
+    def corrected(self, state: SolvedState, expected: Difference) -> SolvedState:
+        """A state that does not change in time, with sensors where it is without the error of the mesh."""
+        return replace(state, sensors=self._sensors([(state.u, state.reactions)] * len(self.times), expected))
+
+    def _sensors(self, moments: Sequence[tuple[Floats, Floats]], expected: Difference | None) -> Sensors:
+        if expected is not None:
+            # known of the end; before it as much smaller as the state is
+            u_end, reactions_end = moments[-1]
+            moments = [
+                (u + _part(u, u_end) * expected.u, reactions + _part(reactions, reactions_end) * expected.reactions)
+                for u, reactions in moments
+            ]
+        parts = zip(self.times, self.observations, moments, strict=True)
+        return sensors_at([(time, observations, *moment) for time, observations, moment in parts], self.centre)
+
+    def course(self, hypothesis: Hypothesis, times: Sequence[float], start: Floats) -> list[tuple[Floats, Floats]]:
+        """Displacement and reactions (N, 3) under a hypothesis at increasing times [s] after all loads came at once.
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis
+        times : sequence of float
+        start : (N, 3) array
+            A displacement [m] that is near to the first.
+
+        Raises
+        ------
+        SolveError
+            If there is no equilibrium at one of the times.
+        """
+        self.solves += 1
+        system = self._system(hypothesis)
+        external = system.model.external_forces()
+        solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=_COURSE), factors=self._factors_of(system))
+        system.forget()
+        u, now, found = start, 0.0, []
+        for time in (*(times[0] * part for part in _SHORT), *times):
+            state = solver.step(u, time - now)
+            u, now = state.u, time
+            found.append((u, system.model.reactions(state.internal, external)))
+        return found[len(_SHORT) :]
+
+    def _factors_of(self, system: System) -> KeptFactors | None:
+        """Kept while the same mechanisms act: a fit has many states of those, one after the other.
+
+        On a GPU whatever acts: there an inverse is made anew as soon as it helps less.
+        """
+        same = system.model.mechanisms if system.device.is_cpu else ()
+        acting = tuple(type(mechanism).__name__ for mechanism in same)
+        if acting not in self._factors:
+            self._factors = {acting: kept_for(system.device)}
+        return self._factors[acting]
+
+    def _system(self, hypothesis: Hypothesis) -> System:
+        try:
+            model, _ = model_of(self.case_of(hypothesis))
+        except CompositionError as error:
+            # there is no such state, as of loads without an equilibrium
+            raise SolveError(str(error)) from None
+        if hypothesis.field.any():
+            field = StiffnessField(log_factor=self.modes @ hypothesis.field)
+            model = replace(model, mechanisms=(*model.mechanisms, field))
+        return System(model, self.device)
+
+
+def _part(of: Floats, whole: Floats) -> float:
+    """How many times the one (N, 3) the other is, as far as it is alike."""
+    square = float(np.vdot(whole, whole))
+    return float(np.vdot(of, whole)) / square if square > 0.0 else 1.0
+
+
+def steps_to(times: Sequence[float]) -> list[float]:
+    """Times [s] of the steps from rest to the last recorded one: short ones after the load, longer ones later."""
+    found = [times[0] * part for part in _SHORT]
+    for before, after in itertools.pairwise((0.0, *times)):
+        found += [before + part * (after - before) for part in (() if before == 0.0 else (0.3, 0.6))]
+        # the very number by which states are asked for, not a sum that rounds to another
+        found.append(after)
+    return found
+
+
+def _released(case: Case, patches: tuple[Patch, ...]) -> tuple[TetMesh, tuple[Boundary, ...]]:
+    """Mesh and boundaries of a case that no longer holds some nodes, which are node sets then."""
+    if not patches:
+        return case.mesh, case.boundaries
+    nodes = case.remaining[1]
+    sets = dict(case.mesh.node_sets)
+    loose = np.zeros(len(case.mesh.points), dtype=bool)
+    for patch in patches:
+        sets[patch.name] = np.zeros(len(loose), dtype=bool)
+        sets[patch.name][nodes] = patch.members
+        loose |= sets[patch.name]
+    boundaries = []
+    for boundary in case.boundaries:
+        if not isinstance(boundary, Fixed) or not (sets[boundary.nodes] & loose).any():
+            boundaries.append(boundary)
+            continue
+        still = f"{boundary.nodes}-still-held"
+        sets[still] = sets[boundary.nodes] & ~loose
+        if sets[still].any():
+            boundaries.append(replace(boundary, nodes=still))
+    return case.mesh.with_node_sets(sets), tuple(boundaries)
+
+
+def recorded_times(case: Case) -> tuple[float, ...]:
+    """Times [s] at which all that a case is fitted to was recorded, under loads that no longer change.
+
+    Infinity alone, for the end, where there is one time or none, or where loads or motions change after the first.
+    """
+    fitted = [recording for recording in case.recordings if recording.role == "fit"]
+    series: list[set[float]] = []
+    for recording in fitted:
+        times = getattr(recording, "time", None)
+        series.append(set() if times is None else set(np.unique(times).tolist()))
+    found = sorted(set.intersection(*series)) if series else []
+    if len(found) < 2 or found[0] <= 0.0:
+        return (np.inf,)
+    ramps = [ramp for one in (*case.boundaries, *case.mechanisms) if (ramp := getattr(one, "ramp", ()))]
+    changing = any(ramp[-1][0] > found[0] for ramp in ramps)
+    moving = any(getattr(boundary, "has_history", False) for boundary in case.boundaries)
+    return (np.inf,) if changing or moving else tuple(found)

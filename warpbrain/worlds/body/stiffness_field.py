@@ -1,0 +1,54 @@
+"""Stiffness that varies from place to place within tissues: a nuisance, never named.
+
+`ln mu(X)` has a normal distribution with a squared exponential covariance. Its largest modes are found from some of the
+elements and carried to all of them (Nystroem's method; Williams and Seeger 2001).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.inference.beliefs import belief
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.worlds.body.sensors import spread_points
+
+Floats = NDArray[np.float64]
+
+
+def stiffness_modes(mesh: TetMesh, count: int | None = None) -> Floats:
+    """Modes (m, count) of `ln mu` of each element, each times its standard deviation."""
+    count = int(belief("tissue.field_modes")) if count is None else count
+    some = mesh.centres[spread_points(mesh.centres, 0.5 * belief("tissue.field_reach"), 400)]
+    values, vectors = np.linalg.eigh(_covariance(some, some))
+    largest = np.argsort(values)[::-1][:count]
+    return np.asarray(_covariance(mesh.centres, some) @ vectors[:, largest] / np.sqrt(values[largest]))
+
+
+def _covariance(a: Floats, b: Floats) -> Floats:
+    squares = np.sum(a**2, axis=1)[:, None] + np.sum(b**2, axis=1)[None] - 2.0 * a @ b.T
+    return np.asarray(
+        belief("tissue.field") ** 2 * np.exp(-0.5 * np.maximum(squares, 0.0) / belief("tissue.field_reach") ** 2)
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StiffnessField(Mechanism):
+    """Moduli of each element times `exp(log_factor)`; no user assumes it, so it is in no registry.
+
+    Parameters
+    ----------
+    log_factor : (m,) array
+    """
+
+    log_factor: Floats = field(repr=False)
+    kind: ClassVar[str] = "stiffness field"
+    sentence: ClassVar[str] = "Stiffness varies from place to place."
+
+    def stiffness_factor(self, mesh: TetMesh, scale: float) -> Floats:
+        """See `warpbrain.physics.mechanism.Weakening`; a stiffness is there, however little of the load is."""
+        return np.exp(self.log_factor)

@@ -1,0 +1,119 @@
+"""What acts and has no name: smooth random fields of body force, eigenstress and traction, as columns over sensors.
+
+Each field is a sum of Gaussian patches with independent coefficients, a Gaussian process of that length. An eigenstress
+`s` acts within the body: its nodal forces `-V s grad N` have no net force and no moment. Columns are of 1 m root mean
+square over the displacements that were recorded, cut to the modes that the sensors see.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.inference.beliefs import belief, beliefs
+from warpbrain.mesh import node_areas
+from warpbrain.threads import in_threads
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.sensors import spread_points
+
+Floats = NDArray[np.float64]
+
+#: Components of a symmetric tensor.
+_PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+
+
+def force_patches(at: Linearisation, length: float, spacing: float | None = None) -> tuple[Floats, Floats]:
+    """Sites (s, 3) [m], and answers (n, s, 3) to a force of 1 N in each direction, spread with a Gaussian."""
+    mesh = at.system.model.mesh
+    return _patches(at, mesh.points, mesh.node_volumes, length, spacing)
+
+
+def _patches(
+    at: Linearisation, where: Floats, shares: Floats, length: float, spacing: float | None
+) -> tuple[Floats, Floats]:
+    from scipy.spatial.distance import cdist
+
+    points = at.system.model.mesh.points
+    sites = where[spread_points(where, length if spacing is None else spacing, 700)]
+    weights = shares[:, None] * np.exp(-0.5 * (cdist(points, sites) / length) ** 2)
+    # a share that falls on what is held moves nothing
+    weights /= np.maximum(weights.sum(axis=0), 1e-300)
+    return sites, at.answers_of_patches(weights)
+
+
+def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Floats, ...]:
+    """Columns (n, k) of a body force of each length [m]."""
+    answers = [force_patches(at, length)[1] for length in lengths]
+    return tuple(in_threads(lambda own: _seen(own.reshape(len(own), -1), at.sensors.is_displacement), answers))
+
+
+def tractions(at: Linearisation, length: float) -> Floats:
+    """Columns (n, k) of a traction of a length [m] on all that is free of the surface; (n, 0) if nothing is."""
+    model = at.system.model
+    shares = node_areas(model.mesh.points, model.mesh.boundary)
+    free = (shares > 0.0) & ~model.constrained.reshape(-1, 3).all(axis=1)
+    if not free.any():
+        return np.zeros((len(at.sensors), 0))
+    _, answers = _patches(at, model.mesh.points[free], np.where(free, shares, 0.0), length, None)
+    return _seen(answers.reshape(len(answers), -1), at.sensors.is_displacement)
+
+
+def eigenstresses(at: Linearisation, length: float) -> Floats:
+    """Columns (n, k) of an eigenstress of a length [m], all six components."""
+    from scipy.spatial.distance import cdist
+
+    mesh = at.system.model.mesh
+    sites = mesh.centres[spread_points(mesh.centres, length, 700)]
+    weights = np.exp(-0.5 * (cdist(mesh.centres, sites) / length) ** 2)
+    # where the elements are now: there a symmetric stress has no moment
+    forces = _unit_stresses((mesh.points + at.u)[mesh.tetrahedra])
+    columns = [at.answers_of_elements(forces[component], weights) for component in range(len(_PAIRS))]
+    return _seen(np.concatenate(columns, axis=1), at.sensors.is_displacement)
+
+
+def _unit_stresses(corners: Floats) -> Floats:
+    """Internal forces (6, m, 4, 3) of stresses of 1 Pa in elements with these corners (m, 4, 3)."""
+    edges = corners[:, 1:] - corners[:, :1]
+    volumes = np.abs(np.linalg.det(edges)) / 6.0
+    gradients = np.linalg.inv(edges).transpose(0, 2, 1)
+    shapes = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1) * volumes[:, None, None]
+    found = np.zeros((len(_PAIRS), *shapes.shape))
+    for number, (i, j) in enumerate(_PAIRS):
+        found[number, :, :, i] += shapes[:, :, j]
+        if i != j:
+            found[number, :, :, j] += shapes[:, :, i]
+    return found
+
+
+def fields(at: Linearisation, spacing: float) -> dict[str, Floats]:
+    """Columns of every field, by what it is of.
+
+    Parameters
+    ----------
+    at : Linearisation
+    spacing : float
+        Between sites of a scan [m], which lengths are relative to.
+    """
+    lengths = spacing * beliefs("unknown.lengths")
+    found = {
+        f"body force, {1e3 * length:.0f} mm": own
+        for length, own in zip(lengths, body_forces(at, lengths.tolist()), strict=True)
+    }
+    for length in lengths.tolist():
+        found[f"eigenstress, {1e3 * length:.0f} mm"] = eigenstresses(at, length)
+        found[f"traction, {1e3 * length:.0f} mm"] = tractions(at, length)
+    return {name: columns for name, columns in found.items() if columns.shape[1]}
+
+
+def _seen(columns: Floats, rows: NDArray[np.bool_]) -> Floats:
+    """The modes (n, k) of columns that displacements, in some of the rows (n,), see."""
+    # modes of displacements: forces that were recorded have another unit, and would be all that counts
+    rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
+    squares, left = np.linalg.eigh(columns[rows] @ columns[rows].T)
+    sizes, left = np.sqrt(np.maximum(squares[::-1], 0.0)), left[:, ::-1]
+    total = np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)
+    kept = min(int(np.searchsorted(total, 1.0 - belief("unknown.cut"))) + 1, int(belief("unknown.modes")))
+    found = columns @ (columns[rows].T @ (left[:, :kept] / np.maximum(sizes[:kept], 1e-300)))
+    return np.asarray(found / max(float(np.sqrt(np.mean(np.sum(found[rows] ** 2, axis=1)))), 1e-300))

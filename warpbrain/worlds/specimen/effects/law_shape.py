@@ -1,0 +1,70 @@
+"""Another shape of the law than the case's: stiffening with strain, and a share of the second invariant.
+
+    stress x exp(k (I1 - 3))                        (Demiray 1972)
+    mu ((1 - c) neo-Hookean + c of `I2`)            (Mooney 1940)
+
+What stiffens is all of the stress, what the tissue remembers among it. Small ones are nuisances of every hypothesis
+(`warpbrain.worlds.specimen.nuisances`); these are large.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.case import Case
+from warpbrain.inference.beliefs import belief
+from warpbrain.inference.causes import Kind
+from warpbrain.physics.proposal import NotTestableError
+from warpbrain.worlds.specimen.acting import Acting, Declared, Effect, Way
+from warpbrain.worlds.specimen.protocol import Protocol
+
+Floats = NDArray[np.float64]
+
+STIFFENING, SECOND_INVARIANT = "stiffening", "second invariant"
+#: Beyond which no exponential is computed.
+_MOST = 8.0
+
+
+def first_invariant(mode: str, strain: Floats) -> Floats:
+    """`I1 - 3` of incompressible states at stretches or shears (of torsion: at the rim)."""
+    return strain**2 + 2.0 / strain - 3.0 if mode == "axial" else strain**2
+
+
+def invariant_rows(protocol: Protocol) -> Floats:
+    """`I1 - 3` (n,) at all rows."""
+    return np.concatenate([first_invariant(test.mode, test.strain) for test in protocol.tests])
+
+
+def excess_rows(rows: Declared) -> Floats:
+    """Stress (n,) of `I2` less that of `I1` [Pa]: `(1 - l^-3) - (l - l^-2)` at one shear modulus, none in shear."""
+    found = [
+        1.0 - test.strain**-3 - test.strain + test.strain**-2 if test.mode == "axial" else np.zeros(len(test.strain))
+        for test in rows.protocol.tests
+    ]
+    return rows.mu * np.concatenate(found) * rows.glued
+
+
+def stiffening(case: Case, protocol: Protocol) -> Effect:
+    """A factor on the response; a negative `k` softens."""
+    largest = float(invariant_rows(protocol).max())
+
+    def act(k: float, rows: Declared) -> Acting:
+        return Acting(factor=np.exp(np.clip(k * invariant_rows(rows.protocol), -_MOST, _MOST)))
+
+    way = Way.of_one(act, belief("specimen.largest_stiffening") / largest, False)
+    sentence = "Tissue stiffens with strain more than its law says (k > 0) or less (k < 0), in all directions alike."
+    return Effect(STIFFENING, Kind.PHYSICS, sentence, ("k",), ("",), (way,))
+
+
+def second_invariant(case: Case, protocol: Protocol) -> Effect:
+    """A share of any size."""
+    if not any(test.mode == "axial" for test in protocol.tests if test.fitted):
+        raise NotTestableError("needs an axial test: in shear both invariants are one")
+
+    def act(share: float, rows: Declared) -> Acting:
+        return Acting(scaled=share * excess_rows(rows))
+
+    way = Way.of_one(act, belief("specimen.largest_second_invariant"), False)
+    sentence = "The law of the tissue depends on the second invariant."
+    return Effect(SECOND_INVARIANT, Kind.PHYSICS, sentence, ("share",), ("",), (way,))

@@ -1,0 +1,271 @@
+"""The tests of a specimen: stress over strain at the recorded rows, in chains of one memory; few rows for inference.
+
+Every response is turned into a nominal stress [Pa]: a force over the area of an end, a torque over `int r dA`. Every
+imposed value is turned into a strain: a stretch, a shear, or the shear at the rim of a twisted cylinder.
+
+A `Protocol` has all recorded rows, of which every printed error is, or few of them, of which densities are: of a test
+with times so many that straight lines between them follow what was imposed, and that a rest is followed at ever longer
+steps (`warpbrain.simulation.history`). What a test is measured by (its largest stress and strain, the way along it) is
+that of the whole record in both.
+
+Tests of one mode and one specimen whose times go on from one to the next are a chain: tissue remembers the earlier one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.cases.specimen import Specimen
+from warpbrain.recordings.recording import TestRecording
+from warpbrain.simulation.history import corners_of, history_of
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Steps from rest to the largest imposed value, rows of a test without times, and the part of a test's duration that
+#: the first step of a rest takes: how rows are chosen.
+_STEPS, _ROWS, _FIRST = 4, 60, 0.005
+
+
+@dataclass(frozen=True, eq=False)
+class Test:
+    """One test at n rows.
+
+    Attributes
+    ----------
+    name, mode, specimen : str
+    fitted : bool
+        Whether its role is to be fitted.
+    rows : (n,) int array
+        Of its recording.
+    strain, stress : (n,) array
+        Stretch or shear, and nominal stress [Pa].
+    time : (n,) array or None
+        [s]
+    gone : (n,) array
+        Way along the test: strain that was gone through, over the largest.
+    sigma : float
+        Of a reading [Pa]: as declared, or as rough as the record is.
+    unit : float
+        Pascals of one unit of the recording's response.
+    peak, reach : float
+        Largest stress [Pa] and distance of a strain from rest of the whole record.
+    turn : (3, 3) array
+        From directions of the tissue to those of the machine.
+    """
+
+    # not a test of pytest's
+    __test__ = False
+    name: str
+    mode: str
+    specimen: str
+    fitted: bool
+    rows: Ints
+    strain: Floats
+    stress: Floats
+    time: Floats | None
+    gone: Floats
+    sigma: float
+    unit: float
+    peak: float
+    reach: float
+    turn: Floats
+
+    @property
+    def rest(self) -> float:
+        """Strain at rest."""
+        return 1.0 if self.mode == "axial" else 0.0
+
+    @property
+    def share(self) -> Floats:
+        """Part (n,) of its time that is over; zeros without times."""
+        if self.time is None:
+            return np.zeros(len(self.strain))
+        return (self.time - self.time[0]) / max(float(np.ptp(self.time)), 1e-12)
+
+    @property
+    def path(self) -> Floats:
+        """Way (n,) along the test from 0: in strain, and in time."""
+        return self.gone + self.share
+
+    def at(self, rows: Ints) -> Test:
+        """The test at some of its rows, by their places among them."""
+        time = None if self.time is None else self.time[rows]
+        return replace(
+            self, rows=self.rows[rows], strain=self.strain[rows], stress=self.stress[rows], time=time,
+            gone=self.gone[rows],
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Tests that tissue goes through one after the other: their numbers, and strain and time (n,) of all of them."""
+
+    tests: tuple[int, ...]
+    strain: Floats
+    time: Floats | None
+
+
+@dataclass(frozen=True, eq=False)
+class Protocol:
+    """All tests.
+
+    Attributes
+    ----------
+    tests : tuple of Test
+    chains : tuple of Chain
+        Whose rows one after the other are those of the tests.
+    rows : tuple of slice
+        Of each test among all rows.
+    """
+
+    tests: tuple[Test, ...]
+    chains: tuple[Chain, ...]
+    rows: tuple[slice, ...]
+
+    def __len__(self) -> int:
+        return self.rows[-1].stop
+
+    @property
+    def observed(self) -> Floats:
+        """Stress (n,) at all rows [Pa]."""
+        return np.concatenate([test.stress for test in self.tests])
+
+    def mask(self, tests: Sequence[int]) -> NDArray[np.bool_]:
+        """The rows (n,) of some tests."""
+        found = np.zeros(len(self), dtype=bool)
+        for number in tests:
+            found[self.rows[number]] = True
+        return found
+
+    @property
+    def to_fit(self) -> tuple[int, ...]:
+        """Numbers of the tests that may be fitted."""
+        return tuple(k for k, test in enumerate(self.tests) if test.fitted)
+
+    @property
+    def to_check(self) -> tuple[int, ...]:
+        """Numbers of those that may not."""
+        return tuple(k for k, test in enumerate(self.tests) if not test.fitted)
+
+    @property
+    def specimens(self) -> tuple[str, ...]:
+        """On which the tests were run."""
+        return tuple(dict.fromkeys(test.specimen for test in self.tests))
+
+    @property
+    def few(self) -> Protocol:
+        """The same tests at the rows that densities are of."""
+        return protocol(tuple(test.at(_kept(test)) for test in self.tests))
+
+    def spread(self, of_few: Floats, few: Protocol) -> Floats:
+        """Values (m,) at the few rows on all of them (n,): straight from one to the next."""
+        each = [
+            np.interp(test.rows, sparse.rows, of_few[rows])
+            for test, sparse, rows in zip(self.tests, few.tests, few.rows, strict=True)
+        ]
+        return np.concatenate(each)
+
+
+def protocol_of(specimen: Specimen, recordings: Sequence[TestRecording]) -> Protocol:
+    """The tests of a case at all their rows, in the order of their recordings."""
+    return protocol(tuple(test_of(specimen, recording) for recording in recordings))
+
+
+def protocol(tests: tuple[Test, ...]) -> Protocol:
+    """Tests in chains."""
+    ends = np.cumsum([len(test.strain) for test in tests])
+    rows = tuple(slice(int(end) - len(test.strain), int(end)) for end, test in zip(ends, tests, strict=True))
+    groups: list[list[int]] = []
+    for number, test in enumerate(tests):
+        if groups and _goes_on(tests[groups[-1][-1]], test):
+            groups[-1].append(number)
+        else:
+            groups.append([number])
+    chains = []
+    for group in groups:
+        times = [time for k in group if (time := tests[k].time) is not None]
+        strain = np.concatenate([tests[k].strain for k in group])
+        chains.append(Chain(tuple(group), strain, np.concatenate(times) if times else None))
+    return Protocol(tests, tuple(chains), rows)
+
+
+def _goes_on(before: Test, after: Test) -> bool:
+    same = before.mode == after.mode and before.specimen == after.specimen and np.allclose(before.turn, after.turn)
+    return same and before.time is not None and after.time is not None and bool(after.time[0] > before.time[-1])
+
+
+def test_of(specimen: Specimen, recording: TestRecording) -> Test:
+    """A recording in stress and strain."""
+    unit = stress_unit(specimen, recording)
+    strain = strain_of(specimen, recording.mode, recording.quantities[0], recording.imposed)
+    stress = unit * recording.response
+    away = np.abs(strain - (1.0 if recording.mode == "axial" else 0.0))
+    test = Test(
+        name=recording.name,
+        mode=recording.mode,
+        specimen=recording.specimen,
+        fitted=recording.role == "fit",
+        rows=np.arange(len(strain)),
+        strain=strain,
+        stress=stress,
+        time=recording.time,
+        gone=np.zeros(len(strain)),
+        sigma=unit * recording.sigma if recording.sigma is not None else roughness(stress),
+        unit=unit,
+        peak=float(np.abs(stress).max()),
+        reach=max(float(away.max()), 1e-12),
+        turn=recording.turn,
+    )
+    # without the jitter of a reading, which would make every way long
+    kept = _kept(test)
+    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain[kept])))]) / test.reach
+    return replace(test, gone=np.interp(test.rows, kept, gone))
+
+
+test_of.__test__ = False  # type: ignore[attr-defined]  # not a test of pytest's
+
+
+def strain_of(specimen: Specimen, mode: str, quantity: str, imposed: Floats) -> Floats:
+    """Stretch or shear of what was imposed."""
+    height = specimen.size[2]
+    if mode == "axial":
+        return imposed if quantity == "stretch" else 1.0 + imposed / height
+    return imposed / height if mode == "shear" else imposed * radius_of(specimen) / height
+
+
+def stress_unit(specimen: Specimen, recording: TestRecording) -> float:
+    """Nominal stress [Pa] of one unit of the recording's response."""
+    radius = radius_of(specimen)
+    area = np.pi * radius**2
+    of_one = {"stress": 1.0, "force": 1.0 / area, "torque": 1.0 / (2.0 / 3.0 * np.pi * radius**3)}
+    return of_one[recording.quantities[1]]
+
+
+def radius_of(specimen: Specimen) -> float:
+    """Radius [m] of the circle that is as large as an end."""
+    x, y, _ = specimen.size
+    return 0.5 * x if specimen.shape == "cylinder" else float(np.sqrt(x * y / np.pi))
+
+
+def roughness(values: Floats) -> float:
+    """Standard deviation of what is independent from row to row: second differences, which smooth parts have not."""
+    if len(values) < 5:
+        return 0.0
+    second = values[2:] - 2.0 * values[1:-1] + values[:-2]
+    return float(1.4826 * np.median(np.abs(second - np.median(second))) / np.sqrt(6.0))
+
+
+def _kept(test: Test) -> Ints:
+    """Rows of a record that are enough of it, the first and the last among them."""
+    count = len(test.strain)
+    if test.time is None:
+        return np.unique(np.linspace(0, count - 1, min(_ROWS, count)).round().astype(np.int64))
+    history = history_of(test.time, test.strain, test.reach, _STEPS, _FIRST * float(np.ptp(test.time)))
+    wanted = np.searchsorted(test.time, history.time).clip(0, count - 1)
+    corners = np.array(corners_of(test.time, test.strain, 0.02 * test.reach))
+    return np.unique(np.concatenate([wanted, corners])).astype(np.int64)
