@@ -9,12 +9,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
     from warpbrain.estimation.options import EstimationOptions
+    from warpbrain.estimation.posterior import Posterior
+    from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
 #: Steps of Gauss-Newton, as printed.
 _HEADER = "  step    objective   to go [sd]    taken   Newton"
@@ -59,6 +61,11 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="inf: no point is a gross error; any other number: those that are are found (default: 4)",
     )
     add("--no-discretisation", action="store_true", help="take the mesh for exact")
+    add(
+        "--causes",
+        action="store_true",
+        help="also say how probable it is that nothing acts but what the case says, and tissue averaged over what may",
+    )
     add("--samples", type=int, default=40, metavar="N", help="equilibria that check the posterior (default: 40)")
     add("--seed", type=int, default=0, metavar="S", help="of these draws (default: 0)")
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
@@ -148,13 +155,29 @@ def _estimate(
         posterior = Estimation(case, model, asked, options.device, listener).run()
     finally:
         progress.clear()
-    say("", *estimate_lines(posterior), sep="\n")
+    averaged = _averaged(posterior, options.device, on_stage) if options.causes else None
+    say("", *estimate_lines(posterior, averaged), sep="\n")
     write_predictions(out / "predictions.csv", posterior)
     estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)
     estimate_picture.write_observed_against_predicted(out / "predicted.png", posterior)
     estimate_picture.write_residuals(out / "residuals.png", posterior)
-    write_summary(out / "estimate.json", describe_estimate(posterior, find_device(options.device).alias))
+    write_summary(out / "estimate.json", describe_estimate(posterior, find_device(options.device).alias, averaged))
     say("", f"written to {out}: estimate.json, predictions.csv, posterior.png, predicted.png, residuals.png", sep="\n")
+
+
+def _averaged(posterior: Posterior, device: str | None, on_stage: Callable[[str], None]) -> AveragedTissue | None:
+    """Tissue averaged over what may act; None if that cannot be known of this case, which is said."""
+    from numpy.linalg import LinAlgError
+
+    from warpbrain.worlds.body.averaged_tissue import averaged_tissue, screened
+    from warpbrain.worlds.listener import Listener
+
+    prior, mesh_error = posterior.best.estimate.problem.mode.gaussian, posterior.options.discretisation is not None
+    try:
+        return averaged_tissue(screened(posterior.case, device, Listener(on_stage), prior, mesh_error=mesh_error))
+    except (InputError, SolveError, LinAlgError) as error:
+        on_stage(f"what else may act is not known: {error}")
+        return None
 
 
 def _sweep(options: argparse.Namespace, case: Case, out: Path, say: Callable[..., None]) -> None:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from warpbrain.estimation.laplace import Laplace
+from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.estimation.prediction import INTERVALS, Prediction, Together
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
+from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
 #: Units as people read them: of a recording, the factor and the name.
 SHOWN = {"m": (MILLIMETRES, "mm"), "N": (1.0, "N")}
@@ -20,7 +23,7 @@ SHOWN = {"m": (MILLIMETRES, "mm"), "N": (1.0, "N")}
 _UNEXPLAINED = 0.3
 
 
-def describe_estimate(posterior: Posterior, device: str) -> dict[str, Any]:
+def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissue | None = None) -> dict[str, Any]:
     """Everything that is known of an estimate, with units in keys or beside the values; docs/estimation.md."""
     prior, parameters, case, options = posterior.prior, posterior.parameters, posterior.case, posterior.options
     said = posterior.identifiability
@@ -38,6 +41,7 @@ def describe_estimate(posterior: Posterior, device: str) -> dict[str, Any]:
             "directions": _directions(posterior.best.laplace),
         },
         "parameters": [_describe(marginal, posterior) for marginal in posterior.marginals],
+        "nothing_else": None if averaged is None else _describe_nothing_else(averaged),
         "correlation": {"names": list(parameters.names), "matrix": posterior.correlation},
         "covariance": {"names": list(parameters.names), "matrix": posterior.covariance},
         "method": posterior.method,
@@ -91,19 +95,10 @@ def describe_estimate(posterior: Posterior, device: str) -> dict[str, Any]:
 
 def _describe(marginal: Marginal, posterior: Posterior) -> dict[str, Any]:
     parameter = marginal.parameter
-    tissue = posterior.parameters.tissues.index(parameter.tissue)
-
-    def shown(value: float) -> float:
-        return math.exp(value) if parameter.is_modulus else value
-
-    estimate, unit = shown(marginal.estimate), "Pa" if parameter.is_modulus else "1"
+    shown = _shown(parameter)
+    estimate = shown(marginal.estimate)
     return {
-        "tissue": parameter.tissue,
-        "labels": list(posterior.parameters.labels[tissue]),
-        "group": posterior.parameters.groups[tissue],
-        "law": posterior.parameters.laws_of[tissue],
-        "name": "shear modulus" if parameter.is_modulus else parameter.coordinate.name,
-        "unit": unit,
+        **_parameter(parameter, posterior.parameters),
         "estimate": estimate,
         "standard_deviation": (estimate if parameter.is_modulus else 1.0) * marginal.deviation,
         "interval_95": [shown(value) for value in marginal.interval],
@@ -121,6 +116,45 @@ def _describe(marginal: Marginal, posterior: Posterior) -> dict[str, Any]:
             "prior_mean": marginal.prior_mean,
             "prior_standard_deviation": marginal.prior_deviation,
         },
+    }
+
+
+def _parameter(parameter: Parameter, parameters: Parameters) -> dict[str, Any]:
+    """What a parameter is."""
+    tissue = parameters.tissues.index(parameter.tissue)
+    return {
+        "tissue": parameter.tissue,
+        "labels": list(parameters.labels[tissue]),
+        "group": parameters.groups[tissue],
+        "law": parameters.laws_of[tissue],
+        "name": "shear modulus" if parameter.is_modulus else parameter.coordinate.name,
+        "unit": "Pa" if parameter.is_modulus else "1",
+    }
+
+
+def _shown(parameter: Parameter) -> Callable[[float], float]:
+    """From the coordinate of a parameter to what people read."""
+    return math.exp if parameter.is_modulus else float
+
+
+def _describe_nothing_else(averaged: AveragedTissue) -> dict[str, Any]:
+    deviations = np.sqrt(np.diag(averaged.covariance)).tolist()
+    each = zip(averaged.parameters.each, averaged.mean.tolist(), deviations, averaged.interval(0.95), strict=True)
+    return {
+        "probability": averaged.nothing,
+        "causes": [
+            {"name": one.name, "kind": one.kind.value, "probability": one.probability} for one in averaged.causes
+        ],
+        "tissue": [
+            {
+                **_parameter(parameter, averaged.parameters),
+                "middle": _shown(parameter)(mean),
+                "interval_95": [_shown(parameter)(end) for end in ends],
+                "coordinate": {"name": parameter.coordinate.name, "mean": mean, "standard_deviation": deviation},
+            }
+            for parameter, mean, deviation, ends in each
+        ],
+        "covariance": {"names": list(averaged.parameters.names), "matrix": averaged.covariance},
     }
 
 

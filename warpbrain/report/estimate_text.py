@@ -4,32 +4,35 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from warpbrain.estimation.parameters import Parameter
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.prediction import Prediction
 from warpbrain.report.estimate import SHOWN, describe_discretisation, describe_registration, noise_of, remarks_of
 from warpbrain.report.files import MILLIMETRES
+from warpbrain.worlds.body.averaged_tissue import AveragedTissue
+from warpbrain.worlds.specimen.sentences import chance
+
+#: Tissue averaged over what may act is printed where nothing acts with less than this probability.
+_RATHER = 0.5
+#: Causes that are less probable are not printed.
+_LIKELY = 0.05
 
 
-def estimate_lines(posterior: Posterior) -> list[str]:
-    """The tables, as printed."""
+def estimate_lines(posterior: Posterior, averaged: AveragedTissue | None = None) -> list[str]:
+    """The tables, as printed; with tissue averaged over what may act, if that is known."""
     lines = [*posterior.identifiability.sentences, ""]
     lines.append(
         "tissue             parameter         estimate       sd   95 % interval         prior 95 %         shrinkage"
     )
-    for marginal in posterior.marginals:
-        modulus, tissue = marginal.parameter.is_modulus, marginal.parameter.tissue
-        ends = [
-            [math.exp(value) if modulus else value for value in pair]
-            for pair in (marginal.interval, marginal.prior_interval)
-        ]
-        interval, prior = (f"{_number(low)} to {_number(high)}" for low, high in ends)
-        estimate = math.exp(marginal.estimate) if modulus else marginal.estimate
-        deviation = (estimate if modulus else 1.0) * marginal.deviation
-        lines.append(
-            f"  {tissue:<16.16} {'shear modulus' if modulus else marginal.parameter.coordinate.name:<15} "
-            f"{_number(estimate):>9} {_number(deviation):>8}   {interval:<19}   {prior:<16} "
-            f"{100 * marginal.shrinkage:>7.0f} %  {'Pa' if modulus else ''}"
-        )
+    for one in posterior.marginals:
+        row = _row(one.parameter, one.estimate, one.deviation, one.interval)
+        prior = _interval(one.parameter, one.prior_interval)
+        unit = "Pa" if one.parameter.is_modulus else ""
+        lines.append(f"{row}   {prior:<16} {100 * one.shrinkage:>7.0f} %  {unit}")
+    if averaged is not None:
+        lines += _averaged_lines(averaged)
     lines += _check_lines(posterior)
     lines += ["", "RMSE at recordings      count   before    after    noise   in 50 %   in 95 %   gross errors"]
     lines += [_prediction_line(one) for one in posterior.predictions]
@@ -44,6 +47,35 @@ def estimate_lines(posterior: Posterior) -> list[str]:
     lines += ["", "time [s]   " + ", ".join(f"{stage} {spent:.1f}" for stage, spent in posterior.seconds.items())]
     lines.append("equilibria " + ", ".join(f"{stage} {count}" for stage, count in posterior.solves.items()))
     return lines
+
+
+def _row(parameter: Parameter, estimate: float, deviation: float, interval: tuple[float, float]) -> str:
+    """Of a parameter by its coordinate, as people read it."""
+    if parameter.is_modulus:
+        estimate = math.exp(estimate)
+        deviation *= estimate
+    return (
+        f"  {parameter.tissue:<16.16} {'shear modulus' if parameter.is_modulus else parameter.coordinate.name:<15} "
+        f"{_number(estimate):>9} {_number(deviation):>8}   {_interval(parameter, interval):<19}"
+    )
+
+
+def _interval(parameter: Parameter, interval: tuple[float, float]) -> str:
+    low, high = (math.exp(end) if parameter.is_modulus else end for end in interval)
+    return f"{_number(low)} to {_number(high)}"
+
+
+def _averaged_lines(averaged: AveragedTissue) -> list[str]:
+    likely = [f"{one.name} {chance(one.probability)}" for one in averaged.causes if one.probability >= _LIKELY]
+    lines = [f"  probability that nothing acts but what the case says: {chance(averaged.nothing)}"]
+    if averaged.nothing < _RATHER and likely:
+        lines += [f"  what may act: {', '.join(likely)}", "  tissue averaged over what may act, to first order:"]
+        deviations = np.sqrt(np.diag(averaged.covariance)).tolist()
+        each = zip(averaged.parameters.each, averaged.mean, deviations, averaged.interval(0.95), strict=True)
+        for parameter, mean, deviation, (low, high) in each:
+            row = _row(parameter, mean, deviation, (low, high))
+            lines.append(f"{row} {'':<29}  {'Pa' if parameter.is_modulus else ''}")
+    return [line.rstrip() for line in lines]
 
 
 def _prediction_line(one: Prediction) -> str:

@@ -119,14 +119,22 @@ class BaseFinder:
     mesh_error : bool
     without_nuisances : bool
     listener : Listener
+    prior : Gaussian, optional
+        Of the tissues' parameters, if it is not `tissue_prior`.
     """
 
     def __init__(
-        self, states: States, spacing: float, mesh_error: bool, without_nuisances: bool, listener: Listener
+        self,
+        states: States,
+        spacing: float,
+        mesh_error: bool,
+        without_nuisances: bool,
+        listener: Listener,
+        prior: Gaussian | None = None,
     ) -> None:
         self.states = states
         # a second of drawing from the generative model, while the first state is solved
-        self._prior = beside(lambda: tissue_prior(states.case, states.parameters))
+        self._prior = beside(lambda: prior or tissue_prior(states.case, states.parameters))
         self._spacing, self._mesh_error, self._bare = spacing, mesh_error, without_nuisances
         self._listener = listener
         self._remarks = on_linear_elements(states.case.poisson, "a diagnosis")

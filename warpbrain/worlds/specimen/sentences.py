@@ -17,7 +17,9 @@ _MOST = 0.99
 
 def chance(probability: float) -> str:
     """A probability for people."""
-    return f"above {_MOST:g}" if probability > _MOST else f"{probability:.2f}"
+    if probability > _MOST:
+        return f"above {_MOST:g}"
+    return f"{probability:.2f}" if probability > 1.0 - _MOST else f"below {1.0 - _MOST:g}"
 
 
 def sentence_of(found: SpecimenDiagnosis) -> str:
