@@ -14,8 +14,6 @@ from warpbrain.report.files import MILLIMETRES
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 from warpbrain.worlds.specimen.sentences import chance
 
-#: Tissue averaged over what may act is printed where nothing acts with less than this probability.
-_RATHER = 0.5
 #: Causes that are less probable are not printed.
 _LIKELY = 0.05
 
@@ -26,13 +24,13 @@ def estimate_lines(posterior: Posterior, averaged: AveragedTissue | None = None)
     lines.append(
         "tissue             parameter         estimate       sd   95 % interval         prior 95 %         shrinkage"
     )
-    for one in posterior.marginals:
-        row = _row(one.parameter, one.estimate, one.deviation, one.interval)
-        prior = _interval(one.parameter, one.prior_interval)
-        unit = "Pa" if one.parameter.is_modulus else ""
-        lines.append(f"{row}   {prior:<16} {100 * one.shrinkage:>7.0f} %  {unit}")
+    for marginal in posterior.marginals:
+        parameter = marginal.parameter
+        row = _row(parameter, marginal.estimate, marginal.deviation, marginal.interval)
+        prior = _interval(parameter, marginal.prior_interval)
+        lines.append(f"{row}   {prior:<16} {100 * marginal.shrinkage:>7.0f} %  {'Pa' if parameter.is_modulus else ''}")
     if averaged is not None:
-        lines += _averaged_lines(averaged)
+        lines += averaged_lines(averaged)
     lines += _check_lines(posterior)
     lines += ["", "RMSE at recordings      count   before    after    noise   in 50 %   in 95 %   gross errors"]
     lines += [_prediction_line(one) for one in posterior.predictions]
@@ -65,10 +63,12 @@ def _interval(parameter: Parameter, interval: tuple[float, float]) -> str:
     return f"{_number(low)} to {_number(high)}"
 
 
-def _averaged_lines(averaged: AveragedTissue) -> list[str]:
+def averaged_lines(averaged: AveragedTissue) -> list[str]:
+    """How probable it is that nothing else acts; tissue averaged where anything else is more probable than that."""
     likely = [f"{one.name} {chance(one.probability)}" for one in averaged.causes if one.probability >= _LIKELY]
     lines = [f"  probability that nothing acts but what the case says: {chance(averaged.nothing)}"]
-    if averaged.nothing < _RATHER and likely:
+    # a probability of nothing has no bar of its own: how many sets it shares one with depends on the case
+    if averaged.nothing < averaged.probabilities.max():
         lines += [f"  what may act: {', '.join(likely)}", "  tissue averaged over what may act, to first order:"]
         deviations = np.sqrt(np.diag(averaged.covariance)).tolist()
         each = zip(averaged.parameters.each, averaged.mean, deviations, averaged.interval(0.95), strict=True)
