@@ -24,10 +24,11 @@ from phantom_truth import FORCE, RESULTS
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
-from warpbrain.estimation.estimate import Estimation, EstimationOptions
+from warpbrain.estimation.estimate import Estimation
 from warpbrain.estimation.gauss_newton import GaussNewton, GaussNewtonOptions
 from warpbrain.estimation.laplace import Laplace
 from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.problem import Problem
 from warpbrain.recordings.recording import PointsRecording
@@ -68,7 +69,7 @@ def error(case: Case, points: Floats, u: Floats, displacement: Floats) -> float:
 
 def experiment(tissue: str, repetitions: int, options: EstimationOptions | None = None) -> dict[str, Any]:
     """One tissue mode."""
-    options = options or EstimationOptions()
+    options = options or EstimationOptions(registration=None)
     with (RESULTS / f"phantom_truth_{tissue}.csv").open(encoding="utf-8") as file:
         table = np.array([[float(value) for value in row] for row in list(csv.reader(file))[1:]])
     points, u, case = 0.001 * table[:, :3], 0.001 * table[:, 3:], pressed(tissue)
@@ -144,7 +145,7 @@ def same_mesh(tissue: str) -> dict[str, Any]:
     seen = observed(case, points, moved, 0, sigma=0.0)
     # a prior pulls a little where noise is stated that there is none of: stated small
     recording = replace(seen.recordings[0], sigma=1e-5)  # type: ignore[type-var]
-    options = EstimationOptions(discretisation=None)
+    options = EstimationOptions(discretisation=None, registration=None)
     found = Estimation(replace(seen, recordings=(recording,)), None, options, "cpu").run()
     return {
         "tissue": tissue,

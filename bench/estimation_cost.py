@@ -17,9 +17,10 @@ from phantom_truth import RESULTS
 
 from warpbrain.cases.shipped import find_case
 from warpbrain.errors import SolveError
-from warpbrain.estimation.estimate import Estimation, EstimationOptions
+from warpbrain.estimation.estimate import Estimation
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.nuisances import Nuisances
+from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.prior_modes import prior_of
 from warpbrain.estimation.sweep import sweep
 from warpbrain.gp.trained import trained
@@ -27,8 +28,7 @@ from warpbrain.gp.trained import trained
 
 def error(found: Any) -> float:
     """Root mean square error at all fitted recordings [mm]."""
-    squares = sum(float((one.after**2).sum()) for one in found.predictions)
-    return 1000.0 * (squares / sum(len(one.after) for one in found.predictions)) ** 0.5
+    return 1000.0 * found.together[0].after
 
 
 def main() -> None:

@@ -17,25 +17,14 @@ from warpbrain.cases.shipped import find_case
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import decide
 from warpbrain.threads import one_thread_of_blas
-from warpbrain.worlds.body.base import BaseFinder
-from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
-from warpbrain.worlds.body.not_physics import not_physics_at
-from warpbrain.worlds.body.observable import require_observable
-from warpbrain.worlds.body.states import States
+from warpbrain.worlds.body.screened import screened
 from warpbrain.worlds.listener import Listener
 
 
 def weighed(case: Case, device: str | None, listener: Listener) -> HypothesisSearch:
     """All sets of causes of a case that are worth looking at."""
-    require_observable(case)
-    states = States(case, device)
-    dictionary = dictionary_of(case, None, len(states.times))
-    spacing = dictionary.situation.spacing
-    base = BaseFinder(states, spacing, True, False, listener).find()
-    candidates = candidates_at(dictionary, base.effects, not_physics_at(base.at, base.nuisances))
-    search = HypothesisSearch(base, candidates, spacing, listener)
-    search.screen()
+    search = screened(case, device, listener)
     search.fit()
     return search
 

@@ -10,16 +10,20 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 from shapes import box
 
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.errors import SolveError
 from warpbrain.estimation.discretisation import Discretisation
-from warpbrain.estimation.estimate import EstimationOptions, estimate
+from warpbrain.estimation.estimate import estimate
 from warpbrain.estimation.forward import Forward, State
+from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.registration import Registration
+from warpbrain.estimation.registration import moved as moved_rigidly
 from warpbrain.gp.prior import Prior
+from warpbrain.inference.noise import noise_factor, outliers, scales
 from warpbrain.mesh import TetMesh, nodes_of
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.mechanisms.gravity import Gravity
@@ -113,13 +117,13 @@ def prior(tissues: int) -> Prior:
 class Truths:
     """States of draws of the prior that are not those which it rests on."""
 
-    def __init__(self, setting: Setting, case: Case, seed: int) -> None:
+    def __init__(self, setting: Setting, case: Case, seed: int, count: int) -> None:
         fine = replace(case, mesh=refined(case.mesh)[0]) if setting.other_elements else case
         self._middle = prior(setting.tissues).mean
         self._forward = Forward(fine, self._middle, "cpu", elements="tet10" if setting.other_elements else "tet4")
         self.middle = self._forward.solve(self._middle)
         self.mesh = self._forward.system.model.node_mesh
-        self._drawn = iter(prior(setting.tissues).samples(1000, 10_000 + seed))
+        self._drawn = iter(prior(setting.tissues).samples(count, 10_000 + seed))
 
     def next(self) -> State:
         """Of the next draw that has an equilibrium: there is none to record of one that has none."""
@@ -140,7 +144,8 @@ def ranks(setting: Setting, count: int, seed: int = 0) -> Floats:
     Where there is no estimate at all, 0: a truth outside of every interval.
     """
     case = body(setting)
-    truths = Truths(setting, case, seed)
+    # some draws have no equilibrium
+    truths = Truths(setting, case, seed, 2 * count + 20)
     motion = float(np.sqrt(np.mean(np.sum(truths.middle.u**2, axis=1))))
     sigma = setting.noise * motion / np.sqrt(3.0)
     registration = Registration(motion, 0.05) if setting.registration else None
@@ -163,6 +168,20 @@ def ranks(setting: Setting, count: int, seed: int = 0) -> Floats:
     return found
 
 
+def noise_of(points: Floats, sigma: float, rng: np.random.Generator) -> Floats:
+    """Noise (n, 3) as it is believed to be where `sigma` is declared: its size, what neighbours share, gross errors."""
+    count, (values, log_probability) = len(points), scales()
+    along, times = np.tile(np.eye(3), (count, 1)), np.full(3 * count, np.inf)
+    factor = noise_factor(np.repeat(points, 3, axis=0), along, times, np.full(3 * count, sigma))
+    believed = outliers()
+    inflation = rng.choice(believed.inflations, count, p=np.exp(believed.log_probabilities))
+    found = factor @ rng.normal(size=3 * count)
+    blocks = np.array([(factor @ factor.T)[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(count)])
+    more = np.einsum("nij,nj->ni", np.linalg.cholesky(blocks), rng.normal(size=(count, 3)))
+    found = found.reshape(count, 3) + np.sqrt(inflation**2 - 1.0)[:, None] * more
+    return np.asarray(rng.choice(values, p=np.exp(log_probability)) * found)
+
+
 def record(
     mesh: TetMesh,
     truths: Truths,
@@ -172,16 +191,15 @@ def record(
     rng: np.random.Generator,
     count: int = 40,
 ) -> PointsRecording:
-    """Points spread evenly over the body, recorded with normal noise of the standard deviation that is declared."""
+    """Points spread evenly over the body, recorded with the noise that is believed of a declared standard deviation."""
     chosen = mesh.tetrahedra[rng.choice(len(mesh.tetrahedra), count, p=mesh.volumes / mesh.volumes.sum())]
     points = np.einsum("ni,nij->nj", rng.dirichlet(np.ones(4), count), mesh.points[chosen])
     moved = locate(truths.mesh.points, truths.mesh.tetrahedra, points).interpolate(truth.u)
-    moved = moved + sigma * rng.normal(size=moved.shape)
+    moved = moved + noise_of(points, sigma, rng)
     if registration is not None:
         shift, turn = registration.shift * rng.normal(size=3), registration.turn * rng.normal(size=3)
-        # what is recorded less its motion is what was: the motion is of the recorded positions
+        # about the mean of what is recorded then
         positions = points + moved
-        matrix = np.eye(3) - np.array([[0, -turn[2], turn[1]], [turn[2], 0, -turn[0]], [-turn[1], turn[0], 0]])
-        centre = (positions + shift).mean(axis=0)
-        moved = np.linalg.solve(matrix, (positions + shift - centre).T).T + centre - points
+        centre = positions.mean(axis=0) + Rotation.from_rotvec(turn).inv().apply(shift)
+        moved = moved_rigidly(positions, np.concatenate([shift, turn]), centre) - points
     return PointsRecording(name="beads", file="", points=points, displacement=moved, sigma=sigma)

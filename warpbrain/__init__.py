@@ -42,7 +42,8 @@ _HOMES = {
     "cases.writing": ("write_case",),
     "cases.checking": ("check_case",),
     "simulation.observation": ("observe",),
-    "estimation.estimate": ("EstimationOptions", "estimate"),
+    "estimation.estimate": ("estimate",),
+    "estimation.options": ("EstimationOptions",),
     "diagnosis.diagnose": ("diagnose",),
     "diagnosis.options": ("DiagnosisOptions",),
     "diagnosis.result": ("Diagnosis",),
@@ -107,7 +108,8 @@ if TYPE_CHECKING:
     from warpbrain.diagnosis.options import DiagnosisOptions
     from warpbrain.diagnosis.result import Diagnosis
     from warpbrain.errors import InputError, SolveError
-    from warpbrain.estimation.estimate import EstimationOptions, estimate
+    from warpbrain.estimation.estimate import estimate
+    from warpbrain.estimation.options import EstimationOptions
     from warpbrain.gp.literature.studies import read_studies
     from warpbrain.gp.prior import Prior
     from warpbrain.gp.sampling import draw_laws

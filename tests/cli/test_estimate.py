@@ -32,7 +32,7 @@ def estimate(*arguments) -> Ran:
 
 def test_tables_files_and_figures(folder, tmp_path):
     out = tmp_path / "out"
-    done = estimate(folder, "--out", out, *QUICK, "--registration", "0.5", "0.5")
+    done = estimate(folder, "--out", out, *QUICK, "--registration", "0.5", "0.5", "--causes")
     assert (done.status, done.err) == (0, "")
     for words in ("The recordings inform", "shear modulus", "Pareto k", "error of the mesh", "registration: shifted"):
         assert words in done.out
@@ -51,12 +51,44 @@ def test_tables_files_and_figures(folder, tmp_path):
     assert said["discretisation"]["difference_root_mean_square_mm"] > 0.0
     assert len(said["registration"]["shift_mm"]) == 3
     assert set(said["inputs_sha256"]) == {"case.toml", "mesh.vtu", "recordings/beads.csv", "recordings/check.csv"}
-    assert said["likelihood"]["degrees_of_freedom"] == 4.0 and said["seed"] == 0
+    assert said["likelihood"]["degrees_of_freedom"] is None and 0.6 < said["likelihood"]["noise_scale"] < 1.6
+    for one, together in zip(said["predictions"], said["all_recordings"], strict=True):
+        assert together["role"] == one["role"] and together["count"] == one["count"]
+        for key in ("before", "after", "of_run"):
+            assert together[f"root_mean_square_{key}_mm"] == pytest.approx(one[f"root_mean_square_{key}"])
+    nothing_else_acts(done.out, said)
+    assert said["seed"] == 0
     assert said["versions"]["warpbrain"] and said["seconds"] and said["equilibria"]["check of the posterior"] == 25
     rows = (out / "predictions.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + 60 + 40
     for picture in ("posterior.png", "predicted.png", "residuals.png"):
         assert (out / picture).stat().st_size > 5000
+
+
+def nothing_else_acts(printed, said):
+    """Of the sets of causes none is the most probable, and tissue is much as it is without any."""
+    assert (
+        re.search(r"probability that nothing acts but what the case says: 0\.\d\d\n", printed)
+        and "tissue averaged" not in printed
+    )
+    sets = said["nothing_else"]
+    assert {"pressure", "traction", "registration", "unknown"} <= {one["name"] for one in sets["causes"]}
+    assert sets["probability"] > 2.0 * max(one["probability"] for one in sets["causes"])
+    for alone, averaged in zip(said["parameters"], sets["tissue"], strict=True):
+        assert (averaged["tissue"], averaged["unit"]) == (alone["tissue"], "Pa")
+        low, high = averaged["interval_95"]
+        assert low < alone["estimate"] < high and low < averaged["middle"] < high
+
+
+def test_too_few_points_to_know_what_else_may_act(tmp_path):
+    case = block({"brain": WHITE}, "pushed")
+    recording = replace(beads(truth(case), count=9, noise=1e-4), file="b.csv")
+    write_case(tmp_path / "block", replace(case, recordings=(recording,)))
+    out = tmp_path / "out"
+    done = estimate(tmp_path / "block", "--out", out, *QUICK, "--no-discretisation", "--causes")
+    assert (done.status, done.err) == (0, "") and "shear modulus" in done.out
+    assert "what else may act is not known: " in done.out and "too few for any conclusion" in done.out
+    assert json.loads((out / "estimate.json").read_text(encoding="utf-8"))["nothing_else"] is None
 
 
 def test_a_sweep_goes_on_where_it_was_interrupted(folder, tmp_path):

@@ -1,22 +1,23 @@
-"""Gradients of the objective against differences of it, and noise against SciPy's distributions."""
+"""Gradients of the objective against differences of it, and noise against draws and SciPy's distributions."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_t, norm
+from scipy.stats import multivariate_normal
 from synthetic import GREY, WHITE, beads, block, lid, scale, truth
 
 from warpbrain.errors import InputError
 from warpbrain.estimation.discretisation import NAMES, Discretisation, FinerMesh
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gaussian import Gaussian
-from warpbrain.estimation.likelihood import Likelihood, at_normal_noise
+from warpbrain.estimation.likelihood import Likelihood, Noise, Rows
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.prior_modes import PriorMode
 from warpbrain.estimation.problem import Problem
 from warpbrain.estimation.registration import Registration
+from warpbrain.inference.noise import outliers
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
 from warpbrain.recordings.location import locate
@@ -44,16 +45,23 @@ def problem(request: pytest.FixtureRequest) -> Problem:
 
 
 SHAPE = 0.1 * np.random.default_rng(5).normal(size=len(NAMES) - 1)
-VALUES = np.array([1.2, *SHAPE, 1e-4, -2e-4, 5e-5, 1e-3, 2e-3, -1e-3])
+VALUES = np.array([1.2, *SHAPE, 1e-4, -2e-4, 5e-5, 0.03, 0.08, -0.05])
 
 
-def test_the_gradient_is_that_of_the_objective(problem: Problem) -> None:
-    def objective(point: np.ndarray) -> float:
-        return problem.at(problem.forward.solve(point[:2]), point[2:]).objective
-
+@pytest.mark.parametrize("known", [False, True])
+def test_the_gradient_is_that_of_the_objective(problem: Problem, known: bool) -> None:
     # beside the tissue that the error of the mesh was computed at
     here = np.concatenate([THETA + np.array([0.1, -0.05]), VALUES])
-    gradient = problem.linearise(problem.at(problem.forward.solve(here[:2]), VALUES)).gradient
+    point = problem.at(problem.forward.solve(here[:2]), VALUES)
+    noise = None
+    if known:
+        point = problem.with_likely_noise(point, problem.linearise(point))
+        noise = point.known_noise
+
+    def objective(point: np.ndarray) -> float:
+        return problem.at(problem.forward.solve(point[:2]), point[2:], noise).objective
+
+    gradient = problem.linearise(problem.at(problem.forward.solve(here[:2]), VALUES, noise)).gradient
     steps = np.array([*[1e-3] * (2 + len(NAMES)), *[1e-6] * 3, *[1e-5] * 3])
     for k, step in enumerate(steps):
         beside = [objective(here + sign * step * np.eye(len(here))[k]) for sign in (1.0, -1.0)]
@@ -64,77 +72,52 @@ def test_the_gradient_is_that_of_the_objective(problem: Problem) -> None:
 
 def test_nuisances_are_at_their_best_and_integrated_out(problem: Problem) -> None:
     state = problem.forward.solve(THETA)
-    misfit, best = problem.without_nuisances(state, problem.nuisances.mean)
+    point = problem.at(state, problem.nuisances.mean)
+    noise = problem.with_likely_noise(point, problem.linearise(point)).known_noise
+    misfit, best = problem.without_nuisances(state, problem.nuisances.mean, noise)
     gradient = problem.linearise(best).gradient[2:]
     size = np.sqrt(np.diag(problem.linearise(best).hessian)[2:])
     assert np.abs(gradient / size).max() < 1e-4
-    other, _ = problem.without_nuisances(state, VALUES)
+    other, _ = problem.without_nuisances(state, VALUES, noise)
     assert other == pytest.approx(misfit, abs=1e-3)
 
 
-@pytest.mark.parametrize("nu", [4.0, np.inf])
-def test_noise_is_the_distribution_that_it_is_said_to_be(nu: float) -> None:
-    case = block({"white": WHITE}, "pushed")
-    observations = Observations.to_fit(replace(case, recordings=(beads(truth(case), sigma=3e-4),)))
-    residuals = 4e-4 * np.random.default_rng(0).normal(size=(40, 3))
-    [weighed] = Likelihood(nu).weigh(observations.each, [residuals])
-    if np.isinf(nu):
-        expected = norm(0.0, 3e-4).logpdf(residuals).sum()
-    else:
-        scale = weighed.scale[0]
-        assert scale == pytest.approx(0.8694 * 3e-4, rel=1e-3)
-        expected = multivariate_t(np.zeros(3), scale**2 * np.eye(3), df=nu).logpdf(residuals).sum()
-    assert weighed.negative_log == pytest.approx(-expected)
-
-
-def test_the_estimated_noise_is_the_likeliest() -> None:
-    case = block({"white": WHITE}, "pushed")
-    seen = replace(case, recordings=(beads(truth(case), sigma=None),))
-    residuals = 4e-4 * np.random.default_rng(0).normal(size=(40, 3))
-    [weighed] = Likelihood().weigh(Observations.to_fit(seen).each, [residuals])
-    for factor in (0.95, 1.05):
-        given = replace(seen, recordings=(replace(seen.recordings[0], sigma=factor * weighed.sigma[0]),))
-        [beside] = Likelihood().weigh(Observations.to_fit(given).each, [residuals])
-        assert beside.negative_log > weighed.negative_log
-
-
-def test_sigma_is_the_standard_deviation_of_normal_noise(verify) -> None:
-    """Estimated of many rows with a few gross errors, whose number moves it little."""
-    case = block({"white": WHITE}, "pushed")
-    [one] = Observations.to_fit(replace(case, recordings=(beads(truth(case), sigma=None),))).each
-    residuals = 3e-4 * np.random.default_rng(4).normal(size=(20000, 3))
-    many = replace(one, rows=np.arange(20000), weights=np.ones(20000))
-    [weighed] = Likelihood().weigh([many], [residuals])
+def test_noise_and_gross_errors_are_found_as_they_were_drawn(verify) -> None:
+    """Rows drawn from the likelihood itself, without anything to estimate."""
+    random = np.random.default_rng(0)
+    where = np.repeat(random.uniform(0.0, 0.1, (150, 3)), 3, axis=0)
+    points = tuple(np.arange(3 * k, 3 * k + 3) for k in range(150))
+    rows = Rows(where, np.tile(np.eye(3), (150, 1)), np.full(450, 5e-4), np.zeros(450, int), np.array([True]), points)
+    wrong = np.zeros(150, dtype=bool)
+    wrong[:8] = True
+    drawn = Noise(rows, rows.sigma, 1.5, np.where(wrong, 8.0, 1.0), outliers())
+    residual = 1.5 * drawn.factor @ random.normal(size=450)
+    found = Likelihood().noise(rows, residual, residual, np.zeros((450, 0)))
+    assert not (found.gross & ~wrong).any() and found.gross.sum() >= 6
     verify(
-        "estimated noise, normal, is its standard deviation",
-        "standard deviation of 60000 numbers that were drawn",
-        abs(weighed.sigma[0] / 3e-4 - 1.0),
-        0.01,
+        "factor on the noise of 450 recorded numbers, 8 of 150 points gross errors",
+        "factor with which they were drawn",
+        abs(found.scale / 1.5 - 1.0),
+        0.1,
     )
-    residuals[:400] *= 30.0
-    [weighed] = Likelihood().weigh([many], [residuals])
-    # one row of fifty is a gross error: 2.9 % off
-    assert weighed.sigma[0] == pytest.approx(3e-4, rel=0.05)
-
-
-@pytest.mark.parametrize("d", [1, 3])
-def test_the_information_is_that_of_the_estimate_at_normal_noise(verify, d: int) -> None:
-    """The location of 50 rows of normal noise of a given sigma, 4000 times: its scatter against what is stated."""
-    nu, n, count = 4.0, 50, 4000
-    scale, share = at_normal_noise(nu, d)
-    rows = np.random.default_rng(d).normal(size=(count, n, d))
-    location = rows.mean(axis=1)
-    for _ in range(60):  # weighted means until they stand still: the likeliest location
-        z2 = np.sum((rows - location[:, None]) ** 2, axis=2) / scale**2
-        weights = (nu + d) / (nu + z2)
-        location = np.einsum("cn,cnd->cd", weights, rows) / weights.sum(axis=1)[:, None]
-    stated = np.sqrt(scale**2 / (share * weights.sum(axis=1)))
+    covariance = 2.25 * drawn.factor @ drawn.factor.T
+    expected = -multivariate_normal(np.zeros(450), covariance).logpdf(residual) - drawn.log_prior
+    assert drawn.negative_log(residual) == pytest.approx(expected)
+    undeclared = replace(rows, sigma=np.ones(450), declared=np.array([False]))
+    found = Likelihood().noise(undeclared, residual, residual, np.zeros((450, 0)))
     verify(
-        f"stated standard deviation of a location, {d} components a row",
-        "scatter of 4000 estimates of normal noise (Monte Carlo error 1 %)",
-        abs(float(np.mean((location / stated[:, None]) ** 2)) ** 0.5 - 1.0),
-        0.04,
+        "standard deviation of a noise that is not declared, 8 of 150 points gross errors",
+        "standard deviation with which they were drawn",
+        abs(found.sigma[0] / 7.5e-4 - 1.0),
+        0.1,
     )
+
+
+def test_no_point_is_a_gross_error_where_there_are_none() -> None:
+    rows = Rows(np.zeros((3, 3)), np.eye(3), np.full(3, 1e-3), np.zeros(3, int), np.array([True]), (np.arange(3),))
+    residual = np.full(3, 1.0)
+    assert Likelihood().noise(rows, residual, residual, np.zeros((3, 0))).gross.all()
+    assert not Likelihood(None).noise(rows, residual, residual, np.zeros((3, 0))).gross.any()
 
 
 def test_points_are_located_anew_where_they_or_the_mesh_are_others() -> None:
@@ -146,13 +129,8 @@ def test_points_are_located_anew_where_they_or_the_mesh_are_others() -> None:
     for there, recording in ((case, seen), (case, moved), (larger, seen)):
         [one] = Observations.to_fit(replace(there, recordings=(recording,))).each
         expected = locate(there.mesh.points, there.mesh.tetrahedra, recording.points).interpolate(u)
-        values = one.at(u, np.zeros_like(u), np.zeros(3)).values
+        values = one.at(u, np.zeros_like(u), np.zeros(3), np.zeros(6)).values
         np.testing.assert_allclose(values, recording.displacement - expected, atol=1e-15)
-
-
-def test_degrees_of_freedom_are_positive() -> None:
-    with pytest.raises(InputError, match="nu = 0: expected a positive number"):
-        Likelihood(0.0)
 
 
 def test_a_mechanism_that_says_the_law_is_refused() -> None:

@@ -8,9 +8,11 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import Outliers, columns_of_gross_errors, with_gross_errors
+from warpbrain.inference.gross_errors import Outliers, columns_of_inflation, with_gross_errors
 
 PRIOR = Outliers(0.03, 15.0)
+#: Two kinds of gross errors.
+TWO = Outliers(0.03, 6.0, (60.0,))
 POINTS = [np.arange(3 * k, 3 * k + 3) for k in range(6)]
 
 
@@ -20,32 +22,54 @@ def model(random: np.random.Generator) -> GaussianModel:
     return GaussianModel(noise, random.normal(size=(18, 2)), 1.1)
 
 
-def sum_written_out(one: GaussianModel, residual: np.ndarray) -> tuple[float, np.ndarray]:
+def sum_written_out(one: GaussianModel, residual: np.ndarray, prior: Outliers) -> tuple[float, np.ndarray]:
     noise = one.scale**2 * one.noise_factor @ one.noise_factor.T
+    kinds = [(1.0, 1.0 - prior.probability)]
+    kinds += [(w, prior.probability / (1 + len(prior.further))) for w in (prior.inflation, *prior.further)]
     logs, each = [], []
-    for gross in product([False, True], repeat=len(POINTS)):
+    for chosen in product(kinds, repeat=len(POINTS)):
         covariance = one.covariance.copy()
-        for rows, there in zip(POINTS, gross, strict=True):
-            covariance[np.ix_(rows, rows)] += there * (PRIOR.inflation**2 - 1.0) * noise[np.ix_(rows, rows)]
-        log_prior = np.where(gross, np.log(PRIOR.probability), np.log1p(-PRIOR.probability)).sum()
-        logs.append(stats.multivariate_normal(np.zeros(18), covariance).logpdf(residual) + log_prior)
-        each.append(gross)
+        for rows, (inflation, _) in zip(POINTS, chosen, strict=True):
+            covariance[np.ix_(rows, rows)] += (inflation**2 - 1.0) * noise[np.ix_(rows, rows)]
+        log_prior = sum(np.log(probability) for _, probability in chosen)
+        square = residual @ np.linalg.solve(covariance, residual)
+        logs.append(-0.5 * (square + np.linalg.slogdet(2.0 * np.pi * covariance)[1]) + log_prior)
+        each.append([inflation > 1.0 for inflation, _ in chosen])
     total = logsumexp(logs)
     return float(total), np.exp(np.array(logs) - total) @ np.array(each, dtype=float)
 
 
+@pytest.mark.parametrize("prior", [PRIOR, TWO])
 @pytest.mark.parametrize("bad", [(), (2,), (0, 4)])
-def test_density_and_odds_are_those_of_the_sum_written_out(bad: tuple[int, ...]) -> None:
+def test_density_and_odds_are_those_of_the_sum_written_out(bad: tuple[int, ...], prior: Outliers) -> None:
     random = np.random.default_rng(len(bad))
     one = model(random)
     residual = one.draws(1, random)[:, 0]
     for point in bad:
-        residual[POINTS[point]] += 15.0 * random.normal(size=3)
-    found = with_gross_errors(one, residual, POINTS, PRIOR)
-    log_density, probability = sum_written_out(one, residual)
-    assert found.log_density == pytest.approx(log_density, abs=1e-6)
-    np.testing.assert_allclose(1.0 / (1.0 + np.exp(-found.log_odds)), probability, atol=1e-6)
+        residual[POINTS[point]] += 40.0 * random.normal(size=3)
+    found = with_gross_errors(one, residual, POINTS, prior)
+    log_density, probability = sum_written_out(one, residual, prior)
+    assert found.log_density == pytest.approx(log_density, abs=1e-3 if prior is TWO else 1e-6)
+    np.testing.assert_allclose(1.0 / (1.0 + np.exp(-found.log_odds)), probability, atol=1e-4 if prior is TWO else 1e-6)
     assert set(np.flatnonzero(found.log_odds > 0.0).tolist()) == set(bad)
+    np.testing.assert_array_equal(found.inflation > 1.0, found.log_odds > 0.0)
+
+
+def test_a_point_that_is_far_away_pulls_no_more() -> None:
+    """A mean of all points, one of which is a hundred standard deviations off: as good as without it."""
+    random = np.random.default_rng(6)
+    one = GaussianModel(np.eye(30), np.tile(np.eye(3), (10, 1)))
+    points = [np.arange(3 * k, 3 * k + 3) for k in range(10)]
+    residual = random.normal(size=30)
+    without = residual[3:].reshape(-1, 3).mean(axis=0)
+    residual[:3] += 100.0
+    away = []
+    for prior in (PRIOR, TWO):
+        inflation = with_gross_errors(one, residual, points, prior).inflation
+        assert inflation[0] == prior.inflations[-1] and (inflation[1:] == 1.0).all()
+        mean, _ = one.with_columns(columns_of_inflation(one, points, inflation)).coefficients(residual)
+        away.append(np.abs(mean[:3] - 0.9 * without).max())
+    assert away[1] < 0.1 * away[0] and away[1] < 0.05
 
 
 def test_what_a_cause_explains_is_no_gross_error() -> None:
@@ -91,6 +115,6 @@ def test_points_of_three_rows_and_of_one_against_covariances_written_out() -> No
         other[point] = ~gross[point]
         odds = (here - log_density(other)) * (1.0 if gross[point] else -1.0)
         assert found.log_odds[point] == pytest.approx(odds, abs=1e-8)
-    wider = one.with_columns(columns_of_gross_errors(one, points, gross, PRIOR))
+    wider = one.with_columns(columns_of_inflation(one, points, found.inflation))
     prior = np.where(gross, np.log(PRIOR.probability), np.log1p(-PRIOR.probability)).sum()
     assert float(wider.log_density(residual)) + prior == pytest.approx(here, abs=1e-8)

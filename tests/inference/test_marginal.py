@@ -37,7 +37,7 @@ def test_gross_errors_are_louder_in_its_noise():
     own = found.scale**2 * model.noise_factor @ model.noise_factor.T
     louder = np.diag(found.noise.noise_factor @ found.noise.noise_factor.T) / np.diag(own)
     bad = np.isin(np.arange(N), np.concatenate([POINTS[2], POINTS[7]]))
-    np.testing.assert_allclose(louder[bad], outliers().inflation ** 2)
+    assert set(np.round(louder[bad], 6)) <= set(outliers().inflations[1:] ** 2)
     np.testing.assert_allclose(louder[~bad], 1.0)
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy import integrate
+from scipy import integrate, stats
 
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.noise import log_scale_density, noise_covariance, noise_factor, outliers, scales
@@ -53,6 +53,8 @@ def test_scale_is_a_distribution() -> None:
         lambda x: math.exp(float(log_scale_density(np.array(math.exp(x))))), -20.0, 20.0, limit=200
     )
     assert total == pytest.approx(1.0, abs=1e-3)
+    at = np.array([0.2, 1.0, 3.0])
+    np.testing.assert_allclose(log_scale_density(at), stats.t.logpdf(np.log(at), 3.0, scale=0.2), rtol=1e-12)
     values, logs = scales()
     assert np.exp(logs).sum() == pytest.approx(1.0)
     assert values[np.argmax(logs)] == 1.0

@@ -9,6 +9,7 @@ from shapes import cube, distorted
 
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
+from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.comparison import (
     Error,
     compare_force,
@@ -16,7 +17,6 @@ from warpbrain.recordings.comparison import (
     compare_surface,
     faces_of_set,
     legacy_error,
-    root_mean_square,
 )
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, SurfaceRecording

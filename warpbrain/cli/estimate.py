@@ -9,12 +9,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
-    from warpbrain.estimation.estimate import EstimationOptions
+    from warpbrain.estimation.options import EstimationOptions
+    from warpbrain.estimation.posterior import Posterior
+    from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
 #: Steps of Gauss-Newton, as printed.
 _HEADER = "  step    objective   to go [sd]    taken   Newton"
@@ -48,16 +50,22 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         nargs=2,
         type=float,
         metavar=("MM", "DEG"),
-        help="standard deviations of a rigid error of registration, to be estimated along (default: there is none)",
+        help="standard deviations of a rigid error of registration, which is estimated along (default: 1 1)",
     )
+    add("--no-registration", action="store_true", help="take positions as they were recorded")
     add(
         "--nu",
         type=float,
         default=4.0,
         metavar="NU",
-        help="degrees of freedom of the noise (default: 4, robust to gross errors; inf: normal)",
+        help="inf: no point is a gross error; any other number: those that are are found (default: 4)",
     )
     add("--no-discretisation", action="store_true", help="take the mesh for exact")
+    add(
+        "--causes",
+        action="store_true",
+        help="also say how probable it is that nothing acts but what the case says, and tissue averaged over what may",
+    )
     add("--samples", type=int, default=40, metavar="N", help="equilibria that check the posterior (default: 40)")
     add("--seed", type=int, default=0, metavar="S", help="of these draws (default: 0)")
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
@@ -95,12 +103,12 @@ def _run(options: argparse.Namespace) -> None:
 def _options(options: argparse.Namespace) -> EstimationOptions:
     """What is asked for; refuses bad numbers before anything is computed."""
     from warpbrain.estimation.discretisation import Discretisation
-    from warpbrain.estimation.estimate import EstimationOptions
     from warpbrain.estimation.likelihood import Likelihood
+    from warpbrain.estimation.options import EstimationOptions
     from warpbrain.estimation.registration import Registration
 
-    registration = None
-    if options.registration is not None:
+    registration = None if options.no_registration else Registration()
+    if options.registration is not None and not options.no_registration:
         shift, turn = options.registration
         if not (shift > 0.0 and turn > 0.0 and math.isfinite(shift + turn)):
             raise InputError(f"--registration {shift:g} {turn:g}: expected two positive numbers [mm] and [degrees]")
@@ -108,7 +116,7 @@ def _options(options: argparse.Namespace) -> EstimationOptions:
     if not options.nu > 0.0:
         raise InputError(f"--nu {options.nu:g}: expected a positive number of degrees of freedom, or inf")
     return EstimationOptions(
-        Likelihood(options.nu),
+        Likelihood(None) if math.isinf(options.nu) else Likelihood(),
         None if options.no_discretisation else Discretisation(),
         registration,
         samples=options.samples,
@@ -123,8 +131,9 @@ def _estimate(
     from warpbrain.estimation.gauss_newton import GaussNewtonStep
     from warpbrain.gp.trained import find_model
     from warpbrain.report import estimate_picture
-    from warpbrain.report.estimate import describe_estimate, estimate_lines
+    from warpbrain.report.estimate import describe_estimate
     from warpbrain.report.estimate_files import write_predictions
+    from warpbrain.report.estimate_text import estimate_lines
     from warpbrain.report.files import write_summary
     from warpbrain.simulation.system import find_device
 
@@ -146,14 +155,30 @@ def _estimate(
         posterior = Estimation(case, model, asked, options.device, listener).run()
     finally:
         progress.clear()
-    said = describe_estimate(posterior, asked, find_device(options.device).alias)
-    say("", *estimate_lines(said), sep="\n")
+    averaged = _averaged(posterior, options.device, on_stage) if options.causes else None
+    say("", *estimate_lines(posterior, averaged), sep="\n")
     write_predictions(out / "predictions.csv", posterior)
     estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)
     estimate_picture.write_observed_against_predicted(out / "predicted.png", posterior)
     estimate_picture.write_residuals(out / "residuals.png", posterior)
-    write_summary(out / "estimate.json", said)
+    write_summary(out / "estimate.json", describe_estimate(posterior, find_device(options.device).alias, averaged))
     say("", f"written to {out}: estimate.json, predictions.csv, posterior.png, predicted.png, residuals.png", sep="\n")
+
+
+def _averaged(posterior: Posterior, device: str | None, on_stage: Callable[[str], None]) -> AveragedTissue | None:
+    """Tissue averaged over what may act; None if that cannot be known of this case, which is said."""
+    from numpy.linalg import LinAlgError
+
+    from warpbrain.worlds.body.averaged_tissue import averaged_tissue
+    from warpbrain.worlds.body.screened import screened
+    from warpbrain.worlds.listener import Listener
+
+    prior, mesh_error = posterior.best.estimate.problem.mode.gaussian, posterior.options.discretisation is not None
+    try:
+        return averaged_tissue(screened(posterior.case, device, Listener(on_stage), prior, mesh_error=mesh_error))
+    except (InputError, SolveError, LinAlgError) as error:
+        on_stage(f"what else may act is not known: {error}")
+        return None
 
 
 def _sweep(options: argparse.Namespace, case: Case, out: Path, say: Callable[..., None]) -> None:

@@ -13,11 +13,11 @@ from warpbrain.diagnosis.held_out import distance
 from warpbrain.errors import SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.realigned import realigned
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.fitting import Refit
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
 from warpbrain.worlds.body.nuisances import registration_sd
-from warpbrain.worlds.body.realigned import realigned
 from warpbrain.worlds.body.sensors import sensors_at
 
 Floats = NDArray[np.float64]

@@ -26,12 +26,9 @@ from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import Confirmation, after_checks
 from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN, Decision, decide
 from warpbrain.threads import one_thread_of_blas
-from warpbrain.worlds.body.base import Base, BaseFinder
-from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
-from warpbrain.worlds.body.not_physics import not_physics_at
 from warpbrain.worlds.body.observable import require_observable
-from warpbrain.worlds.body.states import States
+from warpbrain.worlds.body.screened import screened
 from warpbrain.worlds.body.surfaces import with_sets_that_act
 from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
@@ -66,12 +63,10 @@ class Diagnosing:
         device: str | None = None,
         listener: Listener | None = None,
     ) -> None:
-        self.case = case
+        self.case, self._device = case, device
         self.options = options or DiagnosisOptions()
         self.listener = listener or Listener()
         require_observable(case)
-        self.states = States(case, device)
-        self.dictionary = dictionary_of(case, self.options.candidates, len(self.states.times))
         self.seconds: dict[str, float] = {}
 
     def run(self) -> Diagnosis:
@@ -86,9 +81,18 @@ class Diagnosing:
             return self._run()
 
     def _run(self) -> Diagnosis:
-        options, spacing = self.options, self.dictionary.situation.spacing
+        options = self.options
         random = np.random.default_rng([options.seed, 7])
-        search = self._search()
+        search = screened(
+            self.case,
+            self._device,
+            self.listener,
+            mesh_error=options.mesh_error,
+            without_nuisances=options.without_nuisances,
+            mechanisms=options.candidates,
+            timed=self._timed,
+        )
+        spacing = search.spacing
         confirming = Confirming(search, options.draws, random)
         nothing = _of(search, ())
         with self._timed("significance"):
@@ -119,7 +123,7 @@ class Diagnosing:
             model, residual = nothing.marginal.model, nothing.residual
             draws = model.draws(options.draws, random)
             where = score_map(search.base.at, model, residual, draws, _PATCH * spacing, spacing, options.alpha)
-            unknown = self._traits(decision, search.base, best, where)
+            unknown = self._traits(decision, search, best, where)
         with self._timed("what would be seen"):
             confusion = imitations(search.causes, model)
             seen = smallest(search.causes, model, confusion)
@@ -146,7 +150,7 @@ class Diagnosing:
             search=search,
             weighed=weighed,
             held_out=predictions,
-            explained=self._explained(best, named),
+            explained=self._explained(search, best, named),
             smallest=seen,
             confusion=confusion,
             next_measurement=measurements,
@@ -158,24 +162,6 @@ class Diagnosing:
             unknown=unknown,
         )
 
-    def _search(self) -> HypothesisSearch:
-        """Sets of causes, weighed about the base."""
-        options, spacing = self.options, self.dictionary.situation.spacing
-        with self._timed("base"):
-            finder = BaseFinder(self.states, spacing, options.mesh_error, options.without_nuisances, self.listener)
-            base = finder.find()
-        with self._timed("candidates"):
-            candidates = candidates_at(
-                self.dictionary,
-                base.effects,
-                not_physics_at(base.at, base.nuisances),
-                lambda kind: self.listener.stage(f"candidate: {kind}"),
-            )
-        search = HypothesisSearch(base, candidates, spacing, self.listener)
-        with self._timed("screening"):
-            search.screen()
-        return search
-
     def _decided(self, search: HypothesisSearch, p_value: float) -> Decision:
         """The verdict of least expected loss; of nothing where there is no alarm."""
         if p_value > self.options.alpha:
@@ -183,18 +169,19 @@ class Diagnosing:
         hypotheses = [one.hypothesis for one in search.weighed]
         return decide(hypotheses, search.probabilities, calibration().losses)[0]
 
-    def _traits(self, decision: Decision, base: Base, best: Weighed, where: ScoreMap) -> Traits | None:
+    @staticmethod
+    def _traits(decision: Decision, search: HypothesisSearch, best: Weighed, where: ScoreMap) -> Traits | None:
         """Of the force without a name that is left, alone or beside what is named."""
         if decision.verdict not in (UNKNOWN, NAMED_AND_REST):
             return None
-        length = self.dictionary.situation.spacing
-        return traits_of(base.at, best.marginal.model, best.residual, base.typical_noise, length, where.centre)
+        base, model = search.base, best.marginal.model
+        return traits_of(base.at, model, best.residual, base.typical_noise, search.spacing, where.centre)
 
-    def _explained(self, best: Weighed, named: tuple[str, ...]) -> Case | None:
+    def _explained(self, search: HypothesisSearch, best: Weighed, named: tuple[str, ...]) -> Case | None:
         if not named:
             return None
         assert best.refit is not None
-        case = with_sets_that_act(self.states.case_of(best.refit.state.hypothesis), self.case.mesh)
+        case = with_sets_that_act(search.base.states.case_of(best.refit.state.hypothesis), self.case.mesh)
         return replace(case, name=f"{case.name}-explained", title=f"{case.title}, with {' and '.join(named)}")
 
     def _fit(

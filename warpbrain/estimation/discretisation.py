@@ -25,7 +25,7 @@ held fixed, it would make the displacement change too little with a modulus, by 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import ROUGH, Forward, State
 from warpbrain.estimation.parameters import Parameters
+from warpbrain.inference.beliefs import belief
 from warpbrain.physics.force import NodalForce
 from warpbrain.simulation.finer import FinerCase, restricted
 from warpbrain.simulation.of_case import model_of
@@ -67,9 +68,9 @@ class Discretisation:
         Standard deviation of each coefficient of `B`.
     """
 
-    mean: float = 5.0 / 3.0
-    deviation: float = 0.4
-    shape: float = 0.2
+    mean: float = field(default_factory=lambda: belief("mesh.amount"))
+    deviation: float = field(default_factory=lambda: belief("mesh.amount_width"))
+    shape: float = field(default_factory=lambda: belief("mesh.shape"))
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.mean):

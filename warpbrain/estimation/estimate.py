@@ -5,28 +5,27 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.errors import InputError, SolveError
+from warpbrain.errors import SolveError
 from warpbrain.estimation.chain import Chain, run_chain
 from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, FinerMesh
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gauss_newton import GaussNewton, GaussNewtonOptions, GaussNewtonStep, require_explained
 from warpbrain.estimation.importance import Importance, importance_sampling
-from warpbrain.estimation.likelihood import Likelihood
 from warpbrain.estimation.modes import Mode
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.prior_modes import PriorMode, prior_modes, prior_of
 from warpbrain.estimation.problem import Problem
 from warpbrain.estimation.proposal import Proposal
-from warpbrain.estimation.registration import Registration
 from warpbrain.estimation.target import Target
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
@@ -42,41 +41,6 @@ _BEFORE = 0.1
 _TOO_COARSE = 0.15
 #: And no more often than this.
 _MOST_ERRORS = 4
-
-
-@dataclass(frozen=True)
-class EstimationOptions:
-    """How to estimate.
-
-    Attributes
-    ----------
-    likelihood : Likelihood
-    discretisation : Discretisation or None
-        None: the mesh is taken for exact, and the estimate holds for this mesh only.
-    registration : Registration or None
-        None: positions are taken as they were recorded.
-    samples : int
-        Draws that check Laplace's approximation, an equilibrium each.
-    chain : int
-        Equilibria of the chain that replaces it where it fails.
-    seed : int
-        Of those draws.
-    tolerance : float
-        Of Gauss-Newton, see `GaussNewtonOptions`.
-    """
-
-    likelihood: Likelihood = field(default_factory=Likelihood)
-    discretisation: Discretisation | None = field(default_factory=Discretisation)
-    registration: Registration | None = None
-    samples: int = 40
-    chain: int = 300
-    seed: int = 0
-    tolerance: float = 3e-3
-
-    def __post_init__(self) -> None:
-        for name, least in (("samples", 25), ("chain", 10), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise InputError(f"{name} = {getattr(self, name)}: expected a whole number of at least {least}")
 
 
 @dataclass(frozen=True)
@@ -190,6 +154,7 @@ class Estimation:
             solves["chain"] = self.forward.solves - before
         return Posterior(
             self.case,
+            self.options,
             self.prior,
             modes,
             tuple(self._remarks),

@@ -5,9 +5,8 @@ squares with what the last one taught of the curvature, and starts the next equi
 will be. A step is halved until the objective falls. Parameters at an end of their range stay there while the objective
 pushes them out.
 
-Far from the estimate most of a residual is no noise yet, and a Student t would take nearly all rows for gross errors
-and settle for a few. So the noise is first taken to be as large as the residuals say, and what is known of it after
-that.
+Far from the estimate most of a residual is no noise yet. So the noise is first taken to be as large as the residuals
+say; then noise and estimate are found in turn, see `likelihood`.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import State
+from warpbrain.estimation.likelihood import Noise
 from warpbrain.estimation.problem import Linearised, Point, Problem
 
 Floats = NDArray[np.float64]
@@ -30,6 +30,8 @@ Floats = NDArray[np.float64]
 _STIFFER = 4
 #: There is no estimate if fewer rows than this share are something else.
 _FEWEST_EXPLAINED = 0.1
+#: Tolerance while noise is not known yet, and how often it is found again.
+_ROUGHLY, _ROUNDS = 0.1, 8
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class GaussNewtonOptions:
     least_step : float
         Or when no parameter would change by more than this.
     max_iterations : int
-        In each of the two stages.
+        With each noise.
     """
 
     tolerance: float = 1e-3
@@ -146,10 +148,19 @@ class GaussNewton:
         self._history = []
         if start is None:
             point, linearised = self._first(values)
-            point, _, _ = self._descend(point, linearised, cautious=True)
-            start, values = point.state, point.nuisances
-        point = problem.at(start, values)
-        point, linearised, converged = self._descend(point, problem.linearise(point), cautious=False)
+            point, linearised, _ = self._descend(point, linearised, _ROUGHLY)
+        else:
+            point = problem.at(start, values)
+            linearised = problem.linearise(point)
+        for number in range(_ROUNDS):
+            last = point.noise
+            point = problem.with_likely_noise(point, linearised)
+            linearised = problem.linearise(point, (linearised.du, linearised.dR))
+            settled = isinstance(last, Noise) and point.known_noise.is_near(last)
+            tolerance = self.options.tolerance if number else max(_ROUGHLY, self.options.tolerance)
+            point, linearised, converged = self._descend(point, linearised, tolerance)
+            if settled:
+                break
         return Estimate(problem, point, linearised, converged, tuple(self._history))
 
     def _first(self, values: Floats) -> tuple[Point, Linearised]:
@@ -161,16 +172,15 @@ class GaussNewton:
         why = ""
         for times in range(_STIFFER + 1):
             try:
-                point = problem.at(problem.forward.solve(theta + times * stiffer), values, cautious=True)
+                point = problem.at(problem.forward.solve(theta + times * stiffer), values)
                 return point, problem.linearise(point)
             except SolveError as error:
                 why = str(error)
         raise SolveError(f"in the middle of the prior, and up to {math.exp(_STIFFER):.0f} times stiffer: {why}")
 
-    def _descend(self, point: Point, linearised: Linearised, cautious: bool) -> tuple[Point, Linearised, bool]:
-        """Downhill to where a step is no longer worth it."""
+    def _descend(self, point: Point, linearised: Linearised, tolerance: float) -> tuple[Point, Linearised, bool]:
+        """Downhill with one noise to where a step is no longer worth it."""
         options = self.options
-        tolerance = max(0.1, options.tolerance) if cautious else options.tolerance
         hessian = linearised.hessian
         for iteration in itertools.count():
             step = self._step(point, linearised, hessian)
@@ -179,7 +189,7 @@ class GaussNewton:
                 return point, linearised, True
             if iteration == options.max_iterations:
                 return point, linearised, False
-            reached, share, newton = self._search(point, linearised, step, cautious)
+            reached, share, newton = self._search(point, linearised, step)
             record = GaussNewtonStep(len(self._history) + 1, point.objective, decrement, share, newton)
             self._history.append(record)
             if self._on_step is not None:
@@ -207,7 +217,7 @@ class GaussNewton:
         return step
 
     def _search(
-        self, point: Point, linearised: Linearised, step: Floats, cautious: bool
+        self, point: Point, linearised: Linearised, step: Floats
     ) -> tuple[tuple[Point, Linearised] | None, float, int]:
         """Halve the step until there is a stable equilibrium of a lower objective; None and 0 if there never is."""
         problem, mode = self.problem, self.problem.mode
@@ -223,7 +233,7 @@ class GaussNewton:
                 problem.parameters.require_possible(theta)
                 state = self._solve_near(theta, predicted, point.state.u)
                 newton += state.newton_iterations
-                trial = problem.at(state, point.nuisances + share * step[p:], cautious)
+                trial = problem.at(state, point.nuisances + share * step[p:], point.given_noise)
                 if trial.objective < point.objective + 1e-4 * share * slope:
                     return (trial, problem.linearise(trial)), share, newton
             except (InputError, SolveError):
@@ -257,10 +267,10 @@ def _secant(hessian: Floats, step: Floats, change: Floats) -> Floats:
 
 def require_explained(estimate: Estimate) -> None:
     """Raise `SolveError` if nearly all rows are gross errors: such an estimate is of nothing."""
-    gross = np.concatenate(estimate.point.gross)
+    gross = estimate.point.known_noise.gross
     explained = int(np.count_nonzero(~gross))
     if explained < _FEWEST_EXPLAINED * len(gross):
-        names = ", ".join(f"'{observation.name}'" for observation in estimate.problem.observations.each)
+        names = ", ".join(f"'{one.name}'" for one in estimate.problem.observations.each if one.unit == "m")
         raise SolveError(
             f"no estimate: {len(gross) - explained} of {len(gross)} rows recorded in {names} are gross errors, "
             "farther from what any parameters found make of them than their sigma allows; is the unit, the axes or "

@@ -32,7 +32,7 @@ class Laplace:
         Its mean: the estimate.
     prior : Gaussian
     information : (p, p) array
-        Expected information of the data alone, nuisances integrated out.
+        Information of the data alone, nuisances integrated out.
     """
 
     parameters: Parameters

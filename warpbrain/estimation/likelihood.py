@@ -1,217 +1,299 @@
-"""How likely residuals are: noise that is normal at heart, with tails for gross errors.
+"""How likely residuals are: the noise of `warpbrain.inference`, its scale and its gross errors found by the fit itself.
 
-A row of d components has the density of a multivariate Student t of `nu` degrees of freedom (Lange, Little and Taylor
-1989, J. Am. Stat. Assoc. 84, 881):
+The n numbers of all recordings, one after the other, have the covariance `kappa^2 R(w)`: independent noise and what
+neighbours share, a factor that nobody knows exactly, and points whose noise is many times larger
+(`inference.noise`, `inference.gross_errors`). About a fit everything is linear, with columns of one standard deviation
+of all that is estimated: `w` and `kappa` are those that are most probable with these integrated out, and so is a
+standard deviation that was not declared. The fit goes on with them until they stay as they are.
 
-    -ln p = (nu + d)/2 ln(1 + z^2/nu) + d ln s + constant,    z^2 = |r|^2/s^2
-
-so a gross error takes a whole point with it, not one of its components. `sigma`, what a recording calls its noise, is
-the standard deviation of one component where there are no gross errors. The scale `s` is the one that is likeliest for
-normal noise of that standard deviation, `s = c sigma` with `c` from 0.83 for one component to 0.87 for three at `nu` 4
-(consistency at the normal distribution; Huber and Ronchetti 2009, Robust Statistics, chapter 5). The density's own
-standard deviation, tails included, is `sqrt(nu/(nu - 2)) s`. With `nu` infinite the noise is normal, nothing is a gross
-error, and `s` is `sigma`.
-
-The gradient is that of weighted least squares with weights `w = (nu + d)/(nu + z^2)`. Of the residuals of a row the
-Hessian is `w/s^2 (I - 2/(nu + z^2) r r^T/s^2)`. Near the estimate Gauss and Newton's method takes it, less what
-of it is negative: gross errors would bend a step the wrong way. Far from it, it takes the weighted squares alone, whose
-step never goes too far. The posterior takes the information that the estimate has where noise is normal: `A^2/B`, with
-`A` the mean Hessian and `B` the mean square of the gradient (Godambe 1960; White 1982). The weights have the mean 1
-there, and it is a fixed share of the weighted squares `J^T w J / s^2`.
-
-A sigma that is not given is the one that makes the residuals likeliest, at every state. Location and scale of a
-symmetric distribution are independent in the information matrix, so nothing is lost by that to first order.
+Far from the estimate most of a residual is no noise yet. There each recording's noise is taken to be independent and as
+large as its residuals are, but no less than declared.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.errors import InputError
-from warpbrain.estimation.observations import Observation
+from warpbrain.estimation.observations import Observations, Residuals
+from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.gross_errors import Outliers, with_gross_errors
+from warpbrain.inference.noise import log_scale_density, noise_covariance, outliers, scales
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
 
-#: An estimated sigma is no smaller [m]: below this it is rounding of the computation.
+#: An undeclared noise is no smaller [m] or [N]: below this it is rounding of the computation.
 LEAST_SIGMA = 1e-9
+#: Noise is found again this often at most, and until its size changes by less than this part.
+_ROUNDS, _SETTLED = 6, 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Weighed:
-    """Residuals of one recording, weighed.
+class Rows:
+    """The numbers of all recordings, one after the other.
 
     Attributes
     ----------
+    positions, directions : (n, 3) array
+        As of `noise_covariance`.
     sigma : (n,) array
-        Standard deviation of one component of each row where there are no gross errors, in its unit.
-    scale : (n,) array
-        `s` of each row.
-    squares : (n,) array
-        `|r|^2 / sigma^2` of each row.
-    weights : (n,) array
-        `w`, up to `(nu + d)/nu`; 1 for normal noise.
-    negative_log : float
-        `-ln p` of the recording.
-    bend : (n,) array
-        By how much the Hessian of a row is smaller along its residual than across, relative: from 0 to 1; 0 if it is
-        the weighted squares that are wanted.
-    share : float
-        Of the weighted squares that is the information.
+        Declared; where it is to be estimated, relative to the others of the recording.
+    recordings : (n,) int array
+        Number of the recording.
+    declared : (m,) bool array
+        Of which recordings the noise is known.
+    points : tuple of int arrays
+        Rows of each point that may be a gross error, those of a recording together; forces have none.
     """
 
+    positions: Floats
+    directions: Floats
     sigma: Floats
-    scale: Floats
-    squares: Floats
-    weights: Floats
-    negative_log: float
-    bend: Floats
-    share: float
+    recordings: Ints
+    declared: Bools
+    points: tuple[Ints, ...]
 
-    def gradient(self, residuals: Floats, jacobian: Floats) -> Floats:
-        """Of `-ln p` by what the Jacobian (n, d, q) of the residuals (n, d) is by."""
-        return np.einsum("n,nd,ndq->q", self.weights / self.scale**2, residuals, jacobian)
+    @classmethod
+    def of(cls, observations: Observations, parts: tuple[Residuals, ...]) -> Rows:
+        """Those of residuals at a state: surfaces are looked at along their normals there."""
+        positions, sigma, points, first = [], [], [], 0
+        for one in observations.each:
+            count = len(one.rows)
+            where = one.positions if len(one.positions) else np.full((count, 3), np.nan)
+            positions.append(np.repeat(where, one.size, axis=0))
+            own = 1.0 / np.sqrt(one.weights) if one.sigma is None else one.sigma
+            sigma.append(np.repeat(own, one.size))
+            numbers = first + np.arange(count * one.size).reshape(count, one.size)
+            points += list(numbers) if one.unit == "m" else []
+            first += count * one.size
+        sizes = [part.values.size for part in parts]
+        return cls(
+            np.concatenate(positions),
+            np.concatenate([part.directions.reshape(-1, 3) for part in parts]),
+            np.concatenate(sigma),
+            np.repeat(np.arange(len(parts)), sizes),
+            np.array([one.sigma is not None for one in observations.each]),
+            tuple(points),
+        )
 
-    def hessian(self, residuals: Floats, jacobian: Floats) -> Floats:
-        """Of `-ln p` to first order in the residuals, less what of it is negative, shape (q, q)."""
-        precision = self.weights / self.scale**2
-        squares = np.sum(residuals**2, axis=1)
-        along = np.einsum("nd,ndq->nq", residuals, jacobian)
-        bent = precision * self.bend / np.where(squares > 0.0, squares, 1.0)
-        return np.einsum("n,ndp,ndq->pq", precision, jacobian, jacobian) - np.einsum("n,np,nq->pq", bent, along, along)
+    def covariance(self, sigma: Floats) -> Floats:
+        """Of the noise at a scale of 1, (n, n), with standard deviations (n,): all was recorded at the end."""
+        return noise_covariance(self.positions, self.directions, np.full(len(sigma), np.inf), sigma)
 
-    def information(self, jacobian: Floats) -> Floats:
-        """What the estimate has where noise is normal, shape (q, q)."""
-        return self.share * np.einsum("n,ndp,ndq->pq", self.weights / self.scale**2, jacobian, jacobian)
+
+@dataclass(frozen=True, eq=False)
+class Rough:
+    """Independent noise as large as the residuals of each recording are, for the way to the estimate."""
+
+    rows: Rows
+
+    def sigma(self, residual: Floats) -> Floats:
+        """Standard deviation (n,) of each number."""
+        sigma = self.rows.sigma.copy()
+        for number, declared in enumerate(self.rows.declared.tolist()):
+            own = self.rows.recordings == number
+            size = math.sqrt(float(np.mean((residual[own] / sigma[own]) ** 2)))
+            sigma[own] *= max(size, 1.0 if declared else LEAST_SIGMA)
+        return sigma
+
+    def negative_log(self, residual: Floats) -> float:
+        """`-ln p` of residuals (n,)."""
+        sigma = self.sigma(residual)
+        return float(np.sum(np.log(sigma) + 0.5 * (residual / sigma) ** 2))
+
+    def standardised(self, residual: Floats, numbers: Floats) -> Floats:
+        """Numbers (n, ...) in units of the noise that the residuals (n,) have."""
+        return np.asarray((numbers.T / self.sigma(residual)).T)
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """What the noise of residuals is, with everything that is estimated integrated out.
+
+    Attributes
+    ----------
+    rows : Rows
+    sigma : (n,) array
+        Standard deviation of the independent part of each number, at a scale of 1.
+    scale : float
+        Factor on all of it.
+    inflation : (g,) array
+        How many times larger the noise of each point is: 1 of a sound one, more of a gross error.
+    believed : Outliers or None
+        What was believed of them; None: there are none.
+    """
+
+    rows: Rows
+    sigma: Floats
+    scale: float
+    inflation: Floats
+    believed: Outliers | None
+
+    @property
+    def gross(self) -> Bools:
+        """Which points (g,) are gross errors."""
+        return self.inflation > 1.0
+
+    @cached_property
+    def factor(self) -> Floats:
+        """Lower triangular factor (n, n) of the covariance at a scale of 1, gross errors in it."""
+        covariance = self.rows.covariance(self.sigma)
+        for number in np.flatnonzero(self.gross).tolist():
+            own = self.rows.points[number]
+            covariance[np.ix_(own, own)] *= self.inflation[number] ** 2
+        # metres beside newtons: one size for all
+        return np.asarray(
+            self.sigma[:, None] * np.linalg.cholesky(covariance / np.outer(self.sigma, self.sigma)), dtype=np.float64
+        )
+
+    @cached_property
+    def log_prior(self) -> float:
+        """Of its scale and of its gross errors."""
+        found = float(log_scale_density(np.array(self.scale)))
+        if self.believed is not None:
+            kinds = np.searchsorted(self.believed.inflations, self.inflation)
+            found += float(self.believed.log_probabilities[kinds].sum())
+        return found
+
+    def negative_log(self, residual: Floats) -> float:
+        """`-ln p` of residuals (n,), with that of the noise itself."""
+        n = len(residual)
+        volume = float(np.log(np.diag(self.factor)).sum()) + n * math.log(math.sqrt(2.0 * math.pi) * self.scale)
+        return 0.5 * float(np.sum(self.standardised(residual, residual) ** 2)) + volume - self.log_prior
+
+    def standardised(self, _residual: Floats, numbers: Floats) -> Floats:
+        """Numbers (n, ...) in coordinates in which noise is independent and of unit variance."""
+        from scipy.linalg import solve_triangular
+
+        return np.asarray(solve_triangular(self.factor, numbers, lower=True, check_finite=False) / self.scale)
+
+    def of_recording(self, number: int, shape: tuple[int, ...]) -> tuple[Floats, Floats, Bools]:
+        """Of a recording of n rows of d numbers, without gross errors.
+
+        Returns
+        -------
+        sigma : (n,) array
+            Standard deviation of the independent part of one component.
+        deviation : (n, d) array
+            With what neighbours share.
+        gross : (n,) bool array
+            Rows that are gross errors.
+        """
+        own = self.rows.recordings == number
+        deviation = self.scale * np.sqrt(np.diag(self.rows.covariance(self.sigma)))
+        gross = [wrong for rows, wrong in zip(self.rows.points, self.gross.tolist(), strict=True) if own[rows[0]]]
+        return (
+            self.scale * self.sigma[own].reshape(shape)[:, 0],
+            deviation[own].reshape(shape),
+            np.array(gross or np.zeros(shape[0]), dtype=bool),
+        )
+
+    def is_near(self, other: Noise) -> bool:
+        """Whether another one has the same gross errors and nearly the same size."""
+        sizes = np.abs(np.log(self.scale * self.sigma / (other.scale * other.sigma)))
+        return bool(np.array_equal(self.inflation, other.inflation) and sizes.max() <= _SETTLED)
 
 
 @dataclass(frozen=True)
 class Likelihood:
-    """Noise of the recordings.
+    """What is believed of noise.
 
     Parameters
     ----------
-    nu : float
-        Degrees of freedom; infinite for normal noise.
-
-    Raises
-    ------
-    InputError
-        If `nu` is not positive.
+    outliers : Outliers or None
+        None: nothing is a gross error.
     """
 
-    nu: float = 4.0
+    outliers: Outliers | None = field(default_factory=outliers)
 
-    def __post_init__(self) -> None:
-        if not self.nu > 0.0:
-            raise InputError(f"nu = {self.nu:g}: expected a positive number of degrees of freedom, or infinity")
-
-    def weigh(
-        self, observations: Sequence[Observation], residuals: Sequence[Floats], cautious: bool = False
-    ) -> tuple[Weighed, ...]:
-        """Weigh the residuals (n, d) of each recording.
+    def noise(self, rows: Rows, left: Floats, expected: Floats, columns: Floats) -> Noise:
+        """The most probable noise about a fit.
 
         Parameters
         ----------
-        observations : sequence of Observation
-        residuals : sequence of (n, d) arrays
-        cautious : bool
-            Far from the estimate, where most is not noise yet: take a sigma that is given for the least one, and the
-            weighted squares for the Hessian.
+        rows : Rows
+        left : (n,) array
+            What the fit leaves.
+        expected : (n,) array
+            Residuals in the middle of the prior, by the linear model about the fit.
+        columns : (n, k) array
+            What one standard deviation of each number that is estimated changes.
         """
-        pairs = zip(observations, residuals, strict=True)
-        return tuple(self._weigh(observation, values, cautious) for observation, values in pairs)
+        sound = np.ones(len(rows.points))
+        sigma = rows.sigma.copy()
+        for number in np.flatnonzero(~rows.declared).tolist():
+            own = rows.recordings == number
+            # few of them are gross errors
+            sigma[own] *= max(1.4826 * float(np.median(np.abs(left[own] / sigma[own]))), LEAST_SIGMA)
+        found = [
+            self._settled(Noise(rows, sigma, scale, sound, self.outliers), expected, columns)
+            for scale in self._starts(rows, sigma, expected, columns)
+        ]
+        return max(found, key=lambda noise: _log_evidence(noise, expected, columns))
 
-    def _weigh(self, observation: Observation, residuals: Floats, cautious: bool) -> Weighed:
-        n, d = residuals.shape
-        lengths = np.sum(residuals**2, axis=1)
-        c, share = at_normal_noise(self.nu, d)
-        if observation.sigma is None:
-            shape = 1.0 / np.sqrt(observation.weights)
-            sigma = max(self._scale(lengths / shape**2, d) / c, LEAST_SIGMA) * shape
-        elif cautious:
-            sigma = max(self._scale(lengths / observation.sigma**2, d) / c, 1.0) * observation.sigma
-        else:
-            sigma = observation.sigma
-        scale = c * sigma
-        squares = lengths / sigma**2
-        z2 = lengths / scale**2
-        log_scale = d * float(np.sum(np.log(scale)))
-        if math.isinf(self.nu):
-            constant = 0.5 * n * d * math.log(2.0 * math.pi)
-            negative_log = 0.5 * float(z2.sum()) + log_scale + constant
-            return Weighed(sigma, scale, squares, np.ones(n), negative_log, np.zeros(n), share)
-        nu = self.nu
-        constant = n * (math.lgamma(0.5 * nu) - math.lgamma(0.5 * (nu + d)) + 0.5 * d * math.log(nu * math.pi))
-        logs = 0.5 * (nu + d) * float(np.log1p(z2 / nu).sum())
-        weights = (nu + d) / (nu + z2)
-        bend = np.zeros(n) if cautious else np.minimum(2.0 * z2 / (nu + z2), 1.0)
-        return Weighed(sigma, scale, squares, weights, logs + log_scale + constant, bend, share)
+    def _starts(self, rows: Rows, sigma: Floats, expected: Floats, columns: Floats) -> tuple[float, ...]:
+        """Scales to begin with: gross errors first, and all points sound first."""
+        if self.outliers is None:
+            return (1.0,)
+        sound = Noise(rows, sigma, 1.0, np.ones(len(rows.points)), self.outliers)
+        return 1.0, _likely_scale(sound, expected, columns)
 
-    def _scale(self, squares: Floats, d: int) -> float:
-        """The scale that makes rows of squared lengths (n,) likeliest; zero if more than half of them are zero."""
-        if math.isinf(self.nu):
-            return math.sqrt(float(squares.mean()) / d)
-        from scipy.optimize import brentq
-
-        nu, n = self.nu, len(squares)
-        top = float(squares.max())
-        # too many rows without any residual: no positive scale is likeliest
-        if top == 0.0 or (nu + d) * np.count_nonzero(squares) <= n * d:
-            return 0.0
-
-        # derivative of -ln p by ln sigma, which rises with sigma
-        def slope(log_square: float) -> float:
-            ratio = squares * math.exp(-log_square)
-            return n * d - float(np.sum((nu + d) * ratio / (nu + ratio)))
-
-        # w is largest, (nu + d)/nu, for small residuals: no root lies above
-        high = math.log((nu + d) * float(squares.sum()) / (n * d * nu)) + 1e-9
-        low = high - 4.0
-        while slope(low) > 0.0:
-            low -= 4.0
-        return math.exp(0.5 * float(brentq(slope, low, high, xtol=1e-14, rtol=1e-14)))
+    def _settled(self, noise: Noise, expected: Floats, columns: Floats) -> Noise:
+        """Gross errors, undeclared noise and scale in turn until they stay."""
+        for _ in range(_ROUNDS):
+            last = noise
+            if self.outliers is not None and len(noise.rows.points):
+                sound = replace(noise, inflation=np.ones_like(noise.inflation))
+                model = GaussianModel(sound.factor, columns, noise.scale)
+                found = with_gross_errors(model, expected, noise.rows.points, self.outliers)
+                noise = replace(noise, inflation=found.inflation)
+            for number in np.flatnonzero(~noise.rows.declared).tolist():
+                noise = _with_likely_sigma(noise, number, expected, columns)
+            if noise.rows.declared.any():
+                noise = replace(noise, scale=_likely_scale(noise, expected, columns))
+            if noise.is_near(last):
+                break
+        return noise
 
 
-@cache
-def at_normal_noise(nu: float, d: int) -> tuple[float, float]:
-    """How a Student t of `nu` degrees of freedom takes standard normal rows of d components.
+def _log_evidence(noise: Noise, expected: Floats, columns: Floats) -> float:
+    return float(GaussianModel(noise.factor, columns, noise.scale).log_density(expected)) + noise.log_prior
 
-    Returns
-    -------
-    scale : float
-        The likeliest one: its mean derivative is zero, `E[w z^2] = d`.
-    share : float
-        Information `A^2/B` about one component of the location, over what the weighted squares have.
 
-    Examples
-    --------
-    >>> [round(value, 3) for value in at_normal_noise(4.0, 3)]
-    [0.869, 0.669]
-    """
-    if math.isinf(nu):
-        return 1.0, 1.0
-    from scipy.integrate import quad
-    from scipy.optimize import brentq
-    from scipy.stats import chi2
+def _likely_scale(noise: Noise, expected: Floats, columns: Floats) -> float:
+    """The most probable scale with the gross errors that there are."""
+    model = GaussianModel(noise.factor, columns)
 
-    def mean(value: Callable[[float], float]) -> float:
-        return float(quad(lambda q: value(q) * chi2.pdf(q, d), 0.0, np.inf, epsabs=1e-12)[0])
+    def negative(log_scale: float) -> float:
+        scale = math.exp(log_scale)
+        return -float(model.with_scale(scale).log_density(expected)) - float(log_scale_density(np.array(scale)))
 
-    def weight(z2: float) -> float:
-        return (nu + d) / (nu + z2)
+    values, _ = scales()
+    return math.exp(_least(negative, math.log(values.min()), math.log(values.max())))
 
-    def excess(square: float) -> float:
-        return mean(lambda q: weight(q / square) * q / square) - d
 
-    # heavier tails than the noise has: the scale is less than its standard deviation
-    square = float(brentq(excess, 1e-9, 1.0, xtol=1e-14))
-    # of the squared length a component has 1/d in the mean over directions
-    A = mean(lambda q: weight(q / square) * (1.0 - 2.0 * q / square / d / (nu + q / square)))
-    B = mean(lambda q: weight(q / square) ** 2 * q / square / d)
-    return math.sqrt(square), A**2 / B
+def _with_likely_sigma(noise: Noise, number: int, expected: Floats, columns: Floats) -> Noise:
+    """The noise with another size of that of a recording which declares none: the likeliest of its own rows."""
+    own = noise.rows.recordings == number
+    model = GaussianModel(noise.factor, columns).rows(own)
+
+    def negative(log_size: float) -> float:
+        return -float(model.with_scale(math.exp(log_size)).log_density(expected[own]))
+
+    size = math.exp(_least(negative, -2.0, 2.0)) / noise.scale
+    sigma = noise.sigma.copy()
+    sigma[own] = np.maximum(size * sigma[own], LEAST_SIGMA)
+    return replace(noise, sigma=sigma)
+
+
+def _least(function: Callable[[float], float], low: float, high: float) -> float:
+    from scipy.optimize import minimize_scalar
+
+    return float(minimize_scalar(function, bounds=(low, high), method="bounded", options={"xatol": 1e-4}).x)

@@ -37,7 +37,8 @@ class Mode:
     def log_evidence(self) -> float:
         """Log probability of what was recorded and of this mode, by Laplace, up to what all modes have in common."""
         prior = self.estimate.problem.mode
-        misfit, _ = self.estimate.problem.without_nuisances(self.estimate.point.state, self.estimate.point.nuisances)
+        point = self.estimate.point
+        misfit, _ = self.estimate.problem.without_nuisances(point.state, point.nuisances, point.known_noise)
         log_volume = 0.5 * float(np.linalg.slogdet(self.laplace.covariance)[1])
         log_volume -= float(np.log(np.diag(prior.gaussian.factor)).sum())
         return float(np.log(prior.share)) + log_volume - misfit - prior.gaussian.negative_log(self.estimate.theta)

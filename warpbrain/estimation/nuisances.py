@@ -78,9 +78,9 @@ class Nuisances:
         u, reactions = self.error.at(state.theta, values[: len(DISCRETISATION_NAMES)])
         return state.u + u, state.reactions + reactions
 
-    def residuals(self, part: Residuals, values: Floats) -> Floats:
-        """Residuals (n, d) of a recording, the rigid motion taken off."""
-        return part.values if self.registration is None else part.values - part.rigid @ values[-6:]
+    def motion(self, values: Floats) -> Floats:
+        """Rigid motion (6,) of what was recorded."""
+        return np.zeros(6) if self.registration is None else values[-6:]
 
     def by_theta(self, values: Floats, du: Floats, dR: Floats) -> tuple[Floats, Floats]:
         """Derivatives (p, n, 3) of what is observed by `theta`, from those of a state."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
-from warpbrain.estimation.registration import rigid_columns
+from warpbrain.estimation.registration import moved_back, moved_back_columns
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.feature_normals import feature_normals
 from warpbrain.recordings.closest import closest_points
@@ -45,13 +45,16 @@ class Residuals:
     values : (n, d) array
         Of points 3 components [m]; of a surface the signed distance [m]; of a force those recorded [N].
     rigid : (n, d, 6) array
-        Derivatives of what was recorded by a rigid motion of it (`registration`).
+        Derivatives of the values by a rigid motion of what was recorded (`registration`), with another sign.
+    directions : (n, d, 3) array
+        Along which lengths are; zero of forces.
     by_displacement, by_reactions : (n d, 3 N) SciPy CSR
         Derivatives of what was computed by displacement and reactions.
     """
 
     values: Floats
     rigid: Floats
+    directions: Floats
     by_displacement: Any
     by_reactions: Any
 
@@ -80,7 +83,7 @@ class Observation:
     positions : (k, 3) array
         What a wrong registration moves [m]; empty for forces.
     at : callable
-        From displacement and reactions (N, 3) and the centre of a rigid motion (3,) to `Residuals`.
+        From displacement and reactions (N, 3), the centre of a rigid motion (3,) and that motion (6,) to `Residuals`.
     """
 
     name: str
@@ -91,7 +94,7 @@ class Observation:
     weights: Floats
     size: int
     positions: Floats
-    at: Callable[[Floats, Floats, Floats], Residuals]
+    at: Callable[[Floats, Floats, Floats, Floats], Residuals]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +167,9 @@ class Observations:
         positions = np.concatenate([observation.positions for observation in self.each])
         return positions.mean(axis=0) if len(positions) else np.zeros(3)
 
-    def at(self, u: Floats, reactions: Floats, centre: Floats | None = None) -> tuple[Residuals, ...]:
+    def at(
+        self, u: Floats, reactions: Floats, centre: Floats | None = None, motion: Floats | None = None
+    ) -> tuple[Residuals, ...]:
         """Residuals of each recording at a state.
 
         Parameters
@@ -175,9 +180,12 @@ class Observations:
             Of the constrained components [N].
         centre : (3,) array, optional
             Of a rigid motion [m]; that of these recordings by default.
+        motion : (6,) array, optional
+            By which what was recorded was moved, see `registration`; by nothing by default.
         """
         about = self.centre if centre is None else centre
-        return tuple(observation.at(u, reactions, about) for observation in self.each)
+        by = np.zeros(6) if motion is None else motion
+        return tuple(observation.at(u, reactions, about, by) for observation in self.each)
 
 
 def _observation(case: Case, recording: Recording, time: float | None) -> Observation:
@@ -205,9 +213,12 @@ def _points(case: Case, recording: PointsRecording, time: float | None) -> Obser
     nothing = csr_matrix(by_displacement.shape)
     positions = recording.points[rows] + recording.displacement[rows]
 
-    def at(u: Floats, _reactions: Floats, centre: Floats) -> Residuals:
-        values = recording.displacement[rows] - matrix @ u
-        return Residuals(values, rigid_columns(positions, centre), by_displacement, nothing)
+    directions = np.tile(np.eye(3), (len(rows), 1, 1))
+
+    def at(u: Floats, _reactions: Floats, centre: Floats, motion: Floats) -> Residuals:
+        displacement = moved_back(positions, motion, centre) - recording.points[rows]
+        rigid = -moved_back_columns(positions, motion, centre)
+        return Residuals(displacement - matrix @ u, rigid, directions, by_displacement, nothing)
 
     sigma = _sigma(recording, rows, weights)
     return Observation(recording.name, recording.kind, "m", rows, sigma, weights, 3, positions, at)
@@ -230,13 +241,13 @@ def _surface(case: Case, recording: SurfaceRecording, time: float | None) -> Obs
 
     mesh = case.remaining[0]
     rows = rows_at(recording, time)
-    points = recording.points[rows]
+    positions = recording.points[rows]
     faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
     size = float(np.ptp(mesh.points, axis=0).max())
     shape = (len(rows), 3 * len(mesh.points))
 
-    def at(u: Floats, _reactions: Floats, centre: Floats) -> Residuals:
-        moved = mesh.points + u
+    def at(u: Floats, _reactions: Floats, centre: Floats, motion: Floats) -> Residuals:
+        moved, points = mesh.points + u, moved_back(positions, motion, centre)
         closest = closest_points(points, moved, faces)
         nodes, weights = faces[closest.face], closest.weights
         # by a face's normal the side would depend on which of the faces at an edge is found, and that on rounding
@@ -253,12 +264,13 @@ def _surface(case: Case, recording: SurfaceRecording, time: float | None) -> Obs
         shares = weights[:, :, None] * directions[:, None, :]
         columns = 3 * nodes[:, :, None] + np.arange(3)
         by_displacement = csr_matrix((shares.ravel(), (np.repeat(np.arange(len(rows)), 9), columns.ravel())), shape)
-        rigid = np.einsum("nj,njk->nk", directions, rigid_columns(points, centre))[:, None, :]
-        return Residuals((side * closest.distance)[:, None], rigid, by_displacement, csr_matrix(shape))
+        rigid = -np.einsum("nj,njk->nk", directions, moved_back_columns(positions, motion, centre))[:, None, :]
+        values = (side * closest.distance)[:, None]
+        return Residuals(values, rigid, directions[:, None, :], by_displacement, csr_matrix(shape))
 
     ones = np.ones(len(rows))
     sigma = _sigma(recording, rows, ones)
-    return Observation(recording.name, recording.kind, "m", rows, sigma, ones, 1, points, at)
+    return Observation(recording.name, recording.kind, "m", rows, sigma, ones, 1, positions, at)
 
 
 def _force(case: Case, recording: ForceRecording, time: float | None) -> Observation:
@@ -280,9 +292,9 @@ def _force(case: Case, recording: ForceRecording, time: float | None) -> Observa
     by_reactions = csr_matrix((np.ones(len(columns)), (which, columns)), (size * len(rows), 3 * len(nodes)))
     nothing = csr_matrix(by_reactions.shape)
 
-    def at(_u: Floats, reactions: Floats, _centre: Floats) -> Residuals:
+    def at(_u: Floats, reactions: Floats, _centre: Floats, _motion: Floats) -> Residuals:
         values = force - reactions[nodes].sum(axis=0)[recorded]
-        return Residuals(values, np.zeros((len(rows), size, 6)), nothing, by_reactions)
+        return Residuals(values, np.zeros((len(rows), size, 6)), np.zeros((len(rows), size, 3)), nothing, by_reactions)
 
     ones = np.ones(len(rows))
     sigma = _sigma(recording, rows, ones)

@@ -16,8 +16,9 @@ from warpbrain.estimation.identifiability import Identifiability, identifiabilit
 from warpbrain.estimation.importance import Importance
 from warpbrain.estimation.modes import Mode, probabilities
 from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
-from warpbrain.estimation.prediction import Prediction, predictions
+from warpbrain.estimation.prediction import Prediction, Together, predictions
 from warpbrain.gp.prior import Prior
 
 Floats = NDArray[np.float64]
@@ -63,6 +64,7 @@ class Posterior:
     Attributes
     ----------
     case : Case
+    options : EstimationOptions
     prior : Prior
     modes : tuple of Mode
         The most probable first.
@@ -83,6 +85,7 @@ class Posterior:
     """
 
     case: Case
+    options: EstimationOptions
     prior: Prior
     modes: tuple[Mode, ...]
     remarks: tuple[str, ...]
@@ -197,8 +200,13 @@ class Posterior:
         return tuple(
             one
             for role, observations in both
-            for one in predictions(self.best, role, observations, self.joint_covariance)
+            for one in predictions(self.case, self.best, role, observations, self.joint_covariance)
         )
+
+    @property
+    def together(self) -> tuple[Together, ...]:
+        """Errors over all rows of points and surfaces, of those that were fitted and of those that check."""
+        return Together.of(self.predictions)
 
     @property
     def fitted_case(self) -> Case:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.cases.case import Case
+from warpbrain.estimation.likelihood import Noise, Rows
 from warpbrain.estimation.modes import Mode
-from warpbrain.estimation.observations import Observations
-from warpbrain.estimation.problem import GROSS
+from warpbrain.estimation.observations import Observation, Observations, Residuals
+from warpbrain.estimation.realigned import realigned
+from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.gross_errors import with_gross_errors
+from warpbrain.mesh import TetMesh
+from warpbrain.recordings.agreement import by_unit
+from warpbrain.recordings.comparison import Comparison
+from warpbrain.simulation.observation import observe
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -27,17 +35,20 @@ class Prediction:
     ----------
     name, kind, role, unit : str
     rows : (n,) int array
-        Rows of the recording.
+        Rows of the recording that have a weight.
     before, after : (n, d) array
-        Residuals with nothing moved (or no force), and those of the estimate with its nuisances.
+        Their residuals with nothing moved (or no force), and those of the estimate with its nuisances.
     sigma : (n,) array or None
-        Noise of one component of each row, given or estimated; None if it is not known.
+        Noise of one component of each row, given or estimated, its scale in it; None if it is not known.
     deviation : (n, d) array
         Standard deviation of the prediction itself, from the posterior to first order.
     gross : (n,) bool array
         Rows that are gross errors; none where the noise is not known.
     coverage : tuple of float or None
         Part of the components that lie in their predictive intervals of `INTERVALS`, without gross errors.
+    run, fitted : Comparison
+        All recorded rows beside the most probable state as `warpbrain run` has it, and beside the estimate: with the
+        error of the mesh, and with what was recorded moved back by the error of registration.
     """
 
     name: str
@@ -51,23 +62,67 @@ class Prediction:
     deviation: Floats
     gross: Bools
     coverage: tuple[float, ...] | None
+    run: Comparison
+    fitted: Comparison
 
     @property
     def error_before(self) -> float:
-        """Root mean square of the lengths, in `unit`."""
-        return _root_mean_square(self.before)
+        """Root mean square of all rows with nothing moved, in `unit`."""
+        return self.run.before.root_mean_square
 
     @property
     def error_after(self) -> float:
-        """Root mean square of the lengths, in `unit`."""
-        return _root_mean_square(self.after)
+        """Root mean square of all rows beside the estimate, in `unit`."""
+        return self.fitted.after.root_mean_square
 
 
-def predictions(mode: Mode, role: str, observations: Observations, joint: Floats) -> tuple[Prediction, ...]:
+@dataclass(frozen=True)
+class Together:
+    """All points and surfaces of one role: root mean square of the 3-D distance over every row [m].
+
+    Attributes
+    ----------
+    role : str
+    count : int
+    before, after, of_run : float
+        With nothing moved, beside the estimate, and beside its most probable state as `warpbrain run` has it.
+    """
+
+    role: str
+    count: int
+    before: float
+    after: float
+    of_run: float
+
+    @classmethod
+    def of(cls, each: Sequence[Prediction]) -> tuple[Together, ...]:
+        """Of each role that has any."""
+        found = []
+        for role in dict.fromkeys(one.role for one in each):
+            lengths = [one for one in each if one.role == role and one.unit == "m"]
+            if lengths:
+                before = by_unit((one.unit, one.run.residuals_before) for one in lengths)["m"]
+                after = by_unit((one.unit, one.fitted.residuals_after) for one in lengths)["m"]
+                of_run = by_unit((one.unit, one.run.residuals_after) for one in lengths)["m"]
+                found.append(cls(role, sum(one.fitted.count for one in lengths), before, after, of_run))
+        return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Moved:
+    """What recordings are compared with, see `warpbrain.simulation.observation.State`."""
+
+    mesh: TetMesh
+    u: Floats
+    reactions: Floats
+
+
+def predictions(case: Case, mode: Mode, role: str, observations: Observations, joint: Floats) -> tuple[Prediction, ...]:
     """Recordings of one role beside an estimate.
 
     Parameters
     ----------
+    case : Case
     mode : Mode
     role : {"fit", "check"}
     observations : Observations
@@ -76,21 +131,23 @@ def predictions(mode: Mode, role: str, observations: Observations, joint: Floats
         Covariance of parameters and nuisances.
     """
     problem, point, derivatives = mode.estimate.problem, mode.estimate.point, mode.estimate.linearised
-    centre = problem.observations.centre
-    rest = observations.at(np.zeros_like(point.state.u), np.zeros_like(point.state.u), centre)
-    parts = observations.at(*problem.nuisances.observed(point.state, point.nuisances), centre)
-    estimated = {
-        each.name: weighed.sigma for each, weighed in zip(problem.observations.each, point.weighed, strict=True)
-    }
+    centre, motion = problem.observations.centre, problem.nuisances.motion(point.nuisances)
+    rest = np.zeros_like(point.state.u)
+    seen = problem.nuisances.observed(point.state, point.nuisances)
+    before, parts = observations.at(rest, rest, centre), observations.at(*seen, centre, motion)
+    run = compared(case, point.state.u, point.state.reactions)
+    fitted = compared(realigned(case, motion, centre), *seen)
     found = []
-    for observation, before, part in zip(observations.each, rest, parts, strict=True):
-        after = problem.nuisances.residuals(part, point.nuisances)
+    for number, (observation, first, part) in enumerate(zip(observations.each, before, parts, strict=True)):
         jacobian = problem.nuisances.jacobian(
             part, point.state.theta, point.nuisances, (derivatives.du, derivatives.dR)
         )
         deviation = np.sqrt(np.einsum("ndp,pq,ndq->nd", jacobian, joint, jacobian))
-        sigma = observation.sigma if observation.sigma is not None else estimated.get(observation.name)
-        gross = np.zeros(len(after), dtype=bool) if sigma is None else gross_errors(after, deviation, sigma)
+        noise, own = point.known_noise, number
+        if role != "fit":
+            noise, own = _unseen(observation, part, jacobian, joint, noise), 0
+        known = role == "fit" or observation.sigma is not None
+        sigma, of_noise, gross = noise.of_recording(own, part.values.shape)
         found.append(
             Prediction(
                 observation.name,
@@ -98,34 +155,41 @@ def predictions(mode: Mode, role: str, observations: Observations, joint: Floats
                 role,
                 observation.unit,
                 observation.rows,
-                before.values,
-                after,
-                sigma,
+                first.values,
+                part.values,
+                sigma if known else None,
                 deviation,
                 gross,
-                None if sigma is None else coverage(after, deviation, sigma, gross),
+                coverage(part.values, np.hypot(deviation, of_noise), gross) if known else None,
+                run[observation.name],
+                fitted[observation.name],
             )
         )
     return tuple(found)
 
 
-def gross_errors(residuals: Floats, deviation: Floats, sigma: Floats) -> Bools:
-    """Rows (n,) farther away than noise and prediction pass once in ten thousand."""
-    from scipy.special import gammaincinv
+def _unseen(observation: Observation, part: Residuals, jacobian: Floats, joint: Floats, fitted: Noise) -> Noise:
+    """The noise of a recording that was not fitted, its gross errors beside what the estimate knows of it."""
+    rows = Rows.of(Observations((observation,), ()), (part,))
+    noise = Noise(rows, rows.sigma, fitted.scale, np.ones(len(rows.points)), fitted.believed)
+    if observation.sigma is None or fitted.believed is None:
+        return noise
+    columns = jacobian.reshape(-1, jacobian.shape[2]) @ np.linalg.cholesky(joint)
+    model = GaussianModel(noise.factor, columns, noise.scale)
+    found = with_gross_errors(model, part.values.ravel(), rows.points, fitted.believed)
+    return replace(noise, inflation=found.inflation)
 
-    squares = np.sum(residuals**2 / (deviation**2 + sigma[:, None] ** 2), axis=1)
-    return np.asarray(squares > 2.0 * gammaincinv(0.5 * residuals.shape[1], GROSS))
+
+def compared(case: Case, u: Floats, reactions: Floats) -> Mapping[str, Comparison]:
+    """Recordings by name beside displacement and reactions (N, 3), as `warpbrain run` compares them."""
+    return {one.name: one for one in observe(case, _Moved(case.remaining[0], u, reactions)).comparisons}
 
 
-def coverage(residuals: Floats, deviation: Floats, sigma: Floats, gross: Bools) -> tuple[float, ...] | None:
-    """Part of the components in their intervals of noise and prediction, normal; None if all rows are gross errors."""
+def coverage(residuals: Floats, deviation: Floats, gross: Bools) -> tuple[float, ...] | None:
+    """Part of the components (n, d) in their normal intervals; None if all rows are gross errors."""
     from scipy.special import ndtri
 
     if gross.all():
         return None
-    away = (np.abs(residuals) / np.sqrt(deviation**2 + sigma[:, None] ** 2))[~gross]
+    away = (np.abs(residuals) / deviation)[~gross]
     return tuple(float(np.mean(away <= ndtri(0.5 + 0.5 * probability))) for probability in INTERVALS)
-
-
-def _root_mean_square(residuals: Floats) -> float:
-    return math.sqrt(float(np.mean(np.sum(residuals**2, axis=1))))

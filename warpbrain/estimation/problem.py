@@ -8,17 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.estimation.forward import Forward, State
-from warpbrain.estimation.likelihood import Likelihood, Weighed
+from warpbrain.estimation.likelihood import Likelihood, Noise, Rough, Rows
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations, Residuals
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.prior_modes import PriorMode
 
 Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-
-#: A row beyond the distance that normal noise passes once in ten thousand is a gross error.
-GROSS = 1.0 - 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +26,10 @@ class Point:
     state : State
     nuisances : (q,) array
     parts : tuple of Residuals
-    residuals : tuple of (n, d) arrays
-        Of each observation, the rigid motion taken off.
-    weighed : tuple of Weighed
+        With a rigid motion of what was recorded taken off.
+    residual : (n,) array
+        All of them, one after the other.
+    noise : Noise or Rough
     misfit : float
         `-ln` of the likelihood and of the nuisances' density.
     objective : float
@@ -42,23 +39,26 @@ class Point:
     state: State
     nuisances: Floats
     parts: tuple[Residuals, ...]
-    residuals: tuple[Floats, ...]
-    weighed: tuple[Weighed, ...]
+    residual: Floats
+    noise: Noise | Rough
     misfit: float
     objective: float
+
+    @property
+    def given_noise(self) -> Noise | None:
+        """The noise, if it is known."""
+        return self.noise if isinstance(self.noise, Noise) else None
+
+    @property
+    def known_noise(self) -> Noise:
+        """The noise of an estimate, where it is always known."""
+        assert isinstance(self.noise, Noise)
+        return self.noise
 
     @property
     def coordinates(self) -> Floats:
         """Parameters and nuisances, shape (p + q,)."""
         return np.concatenate([self.state.theta, self.nuisances])
-
-    @property
-    def gross(self) -> tuple[Bools, ...]:
-        """Which rows of each observation are gross errors."""
-        from scipy.special import gammaincinv
-
-        pairs = zip(self.residuals, self.weighed, strict=True)
-        return tuple(weighed.squares > 2.0 * gammaincinv(0.5 * values.shape[1], GROSS) for values, weighed in pairs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,15 +67,18 @@ class Linearised:
 
     Attributes
     ----------
+    jacobian : (n, p + q) array
+        Of the residuals.
     gradient : (p + q,) array
     information : (p + q, p + q) array
-        Expected information of the data alone.
+        Of the data alone.
     hessian : (p + q, p + q) array
-        Of the objective, positive definite; see `warpbrain.estimation.likelihood`.
+        Of the objective, to first order in the residuals: positive definite.
     du, dR : (p, N, 3) array
         Derivatives of the displacement [m] and of the reactions [N].
     """
 
+    jacobian: Floats
     gradient: Floats
     information: Floats
     hessian: Floats
@@ -107,48 +110,68 @@ class Problem:
         """What `theta` means."""
         return self.forward.parameters
 
-    def at(self, state: State, nuisances: Floats, cautious: bool = False) -> Point:
-        """The objective at a state; `cautious` as in `Likelihood.weigh`."""
-        parts = self.observations.at(*self.nuisances.observed(state, nuisances))
-        residuals = tuple(self.nuisances.residuals(part, nuisances) for part in parts)
-        weighed = self.likelihood.weigh(self.observations.each, residuals, cautious)
-        misfit = sum(one.negative_log for one in weighed) + self.nuisances.negative_log(nuisances)
+    def at(self, state: State, nuisances: Floats, noise: Noise | None = None) -> Point:
+        """The objective at a state; noise that is as large as the residuals are, unless it is known."""
+        motion = self.nuisances.motion(nuisances)
+        parts = self.observations.at(*self.nuisances.observed(state, nuisances), motion=motion)
+        residual = np.concatenate([part.values.ravel() for part in parts])
+        known = Rough(Rows.of(self.observations, parts)) if noise is None else noise
+        misfit = known.negative_log(residual) + self.nuisances.negative_log(nuisances)
         objective = misfit + self.mode.gaussian.negative_log(state.theta)
-        return Point(state, nuisances, parts, residuals, weighed, misfit, objective)
+        return Point(state, nuisances, parts, residual, known, misfit, objective)
 
-    def linearise(self, point: Point) -> Linearised:
-        """Derivatives at a point; `SolveError` if its equilibrium is unstable."""
-        p, q = len(self.parameters), len(self.nuisances)
-        found = self.forward.differentiate(point.state)
-        gradient, hessian, information = np.zeros(p + q), np.zeros((p + q, p + q)), np.zeros((p + q, p + q))
-        for part, residuals, weighed in zip(point.parts, point.residuals, point.weighed, strict=True):
-            jacobian = self.nuisances.jacobian(part, point.state.theta, point.nuisances, (found.u, found.reactions))
-            gradient += weighed.gradient(residuals, jacobian)
-            hessian += weighed.hessian(residuals, jacobian)
-            information += weighed.information(jacobian)
-        prior = self.mode.gaussian
+    def linearise(self, point: Point, derivatives: tuple[Floats, Floats] | None = None) -> Linearised:
+        """Derivatives at a point.
+
+        Parameters
+        ----------
+        point : Point
+        derivatives : pair of (p, N, 3) arrays, optional
+            Of displacement and reactions there, if they are known.
+
+        Raises
+        ------
+        SolveError
+            If its equilibrium is unstable.
+        """
+        if derivatives is None:
+            found = self.forward.differentiate(point.state)
+            derivatives = found.u, found.reactions
+        jacobian = self._jacobian(point, derivatives)
+        gradient, information = _weighted(point, jacobian)
+        p, hessian, prior = len(self.parameters), information.copy(), self.mode.gaussian
         gradient[:p] += prior.precision @ (point.state.theta - prior.mean)
         hessian[:p, :p] += prior.precision
         gradient[p:] += self.nuisances.precision @ (point.nuisances - self.nuisances.mean)
         hessian[p:, p:] += self.nuisances.precision
-        return Linearised(gradient, information, hessian, found.u, found.reactions)
+        return Linearised(jacobian, gradient, information, hessian, *derivatives)
 
-    def without_nuisances(self, state: State, start: Floats) -> tuple[float, Point]:
+    def with_likely_noise(self, point: Point, linearised: Linearised) -> Point:
+        """The point with the most probable noise, everything that is estimated integrated out about it."""
+        p, prior = len(self.parameters), self.mode.gaussian
+        deviations = 1.0 / np.sqrt(np.diag(self.nuisances.precision))
+        columns = np.column_stack([linearised.jacobian[:, :p] @ prior.factor, linearised.jacobian[:, p:] * deviations])
+        middle = np.concatenate([prior.mean, self.nuisances.mean])
+        expected = point.residual + linearised.jacobian @ (middle - point.coordinates)
+        rows = Rows.of(self.observations, point.parts)
+        return self.at(point.state, point.nuisances, self.likelihood.noise(rows, point.residual, expected, columns))
+
+    def without_nuisances(self, state: State, start: Floats, noise: Noise) -> tuple[float, Point]:
         """`-ln` of the likelihood of a state with the nuisances integrated out (Laplace), and their best values.
 
         No equilibrium is solved: nuisances act on what is observed of the state.
         """
-        point = self.at(state, start)
+        point = self.at(state, start, noise)
         if len(self.nuisances) == 0:
             return point.misfit, point
         for _ in range(20):
             gradient, hessian = self._by_nuisances(point)
             step = -np.linalg.solve(hessian, gradient)
             decrement = float(-gradient @ step)
-            trial = self.at(state, point.nuisances + step)
+            trial = self.at(state, point.nuisances + step, noise)
             while trial.misfit > point.misfit and decrement > 1e-6:
                 step, decrement = 0.5 * step, 0.25 * decrement
-                trial = self.at(state, point.nuisances + step)
+                trial = self.at(state, point.nuisances + step, noise)
             point = trial if trial.misfit <= point.misfit else point
             if decrement <= 1e-6:
                 break
@@ -156,10 +179,20 @@ class Problem:
         return point.misfit + 0.5 * float(np.linalg.slogdet(hessian)[1]), point
 
     def _by_nuisances(self, point: Point) -> tuple[Floats, Floats]:
-        gradient = self.nuisances.precision @ (point.nuisances - self.nuisances.mean)
-        hessian = self.nuisances.precision.copy()
-        for part, residuals, weighed in zip(point.parts, point.residuals, point.weighed, strict=True):
-            jacobian = self.nuisances.jacobian(part, point.state.theta, point.nuisances)
-            gradient += weighed.gradient(residuals, jacobian)
-            hessian += weighed.hessian(residuals, jacobian)
-        return gradient, hessian
+        gradient, hessian = _weighted(point, self._jacobian(point, None))
+        gradient += self.nuisances.precision @ (point.nuisances - self.nuisances.mean)
+        return gradient, hessian + self.nuisances.precision
+
+    def _jacobian(self, point: Point, derivatives: tuple[Floats, Floats] | None) -> Floats:
+        """Derivatives (n, k) of the residuals, as `Nuisances.jacobian`."""
+        blocks = [
+            self.nuisances.jacobian(part, point.state.theta, point.nuisances, derivatives) for part in point.parts
+        ]
+        return np.concatenate([block.reshape(-1, block.shape[2]) for block in blocks])
+
+
+def _weighted(point: Point, jacobian: Floats) -> tuple[Floats, Floats]:
+    """Gradient (k,) of `-ln p` and its Hessian (k, k) to first order in the residuals."""
+    both = point.noise.standardised(point.residual, np.column_stack([jacobian, point.residual]))
+    J, r = both[:, :-1], both[:, -1]
+    return J.T @ r, J.T @ J

@@ -1,19 +1,24 @@
 """A rigid error of registration: what was recorded may lie turned and shifted against the anatomy.
 
-One small motion is common to all recorded positions of a case: `x -> x + t + omega x (x - c)`, with `c` their mean. It
-is no property of the tissue: it is estimated along with the tissue's parameters, and integrated out of what is said of
-them. It enters the residuals linearly, so of normal noise both are the same.
+One motion is common to all recorded positions of a case,
+
+    x -> R(omega) (x - c) + c + t
+
+with `c` their mean and `R` the rotation by the angle `|omega|` about `omega`. It is no property of the tissue: it is
+estimated along with the tissue's parameters, and integrated out of what is said of them. Turns are finite: 5 degrees at
+80 mm is 0.3 mm more than its first order.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
+from warpbrain.inference.beliefs import belief
 
 Floats = NDArray[np.float64]
 
@@ -33,8 +38,8 @@ class Registration:
         Of each component of `omega` [rad].
     """
 
-    shift: float = 0.002
-    turn: float = math.radians(1.0)
+    shift: float = field(default_factory=lambda: belief("registration.shift"))
+    turn: float = field(default_factory=lambda: belief("registration.turn"))
 
     def __post_init__(self) -> None:
         for name, value in (("shift", self.shift), ("turn", self.turn)):
@@ -47,10 +52,50 @@ class Registration:
         return np.diag(np.repeat([self.shift**-2, self.turn**-2], 3))
 
 
-def rigid_columns(positions: Floats, centre: Floats) -> Floats:
-    """Derivatives (n, 3, 6) of moved positions (n, 3) by shift and turn."""
+def moved(positions: Floats, motion: Floats, centre: Floats) -> Floats:
+    """Positions (n, 3) after a rigid motion: shift [m] and turn [rad] (6,) about a centre (3,)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(motion[3:]).apply(positions - centre) + centre + motion[:3])
+
+
+def moved_back(positions: Floats, motion: Floats, centre: Floats) -> Floats:
+    """Positions (n, 3) that `moved` takes to these."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(motion[3:]).inv().apply(positions - centre - motion[:3]) + centre)
+
+
+def moved_back_columns(positions: Floats, motion: Floats, centre: Floats) -> Floats:
+    """Derivatives (n, 3, 6) of `moved_back` by the motion.
+
+    Of `R(omega)^T v` it is `[R^T v]_x J(-omega)`, with the left Jacobian `J` of the rotation group.
+    """
+    from scipy.spatial.transform import Rotation
+
     columns = np.zeros((len(positions), 3, 6))
-    columns[:, :, :3] = np.eye(3)
-    for axis in range(3):
-        columns[:, :, 3 + axis] = np.cross(np.eye(3)[axis], positions - centre)
+    columns[:, :, :3] = -Rotation.from_rotvec(motion[3:]).inv().as_matrix()
+    back = moved_back(positions, motion, centre) - centre
+    columns[:, :, 3:] = _crossed(back) @ _left_jacobian(-motion[3:])
     return columns
+
+
+def rigid_columns(positions: Floats, centre: Floats) -> Floats:
+    """Derivatives (n, 3, 6) of moved positions (n, 3) by shift and turn, at no motion."""
+    return -moved_back_columns(positions, np.zeros(6), centre)
+
+
+def _crossed(vectors: Floats) -> Floats:
+    """Matrices (n, 3, 3) that take `w` to the cross product of each vector (n, 3) with it."""
+    return np.cross(vectors[:, None, :], np.eye(3)).swapaxes(1, 2)
+
+
+def _left_jacobian(turn: Floats) -> Floats:
+    """`J` with `R(w + dw) = R(J dw) R(w)` to first order (Barfoot 2017, State Estimation for Robotics, eq. 7.77)."""
+    angle = float(np.linalg.norm(turn))
+    [K] = _crossed(turn[None])
+    first, second = 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
+    # the series is exact to rounding below this
+    if angle > 1e-3:
+        first, second = (1.0 - math.cos(angle)) / angle**2, (angle - math.sin(angle)) / angle**3
+    return np.asarray(np.eye(3) + first * K + second * K @ K)

@@ -6,7 +6,6 @@ two tissues all 289 pairs. The best is the one of the least root mean square dis
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -19,8 +18,10 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.prediction import compared
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import law_of_curve
+from warpbrain.recordings.agreement import by_unit
 
 Floats = NDArray[np.float64]
 #: Steps of each tissue.
@@ -136,14 +137,8 @@ def sweep(
                 state = forward.solve(theta)
             if not state.passed_unstable:
                 near = state.u
-            parts = observations.at(state.u, state.reactions)
-            error = _error(
-                [
-                    part.values
-                    for part, observation in zip(parts, observations.each, strict=True)
-                    if observation.unit == unit
-                ]
-            )
+            beside = compared(case, state.u, state.reactions)
+            error = by_unit((one.unit, beside[one.name].residuals_after) for one in observations.each)[unit]
         except (InputError, SolveError) as failure:
             reason = str(failure)
         found[k] = SweepPoint(k, tuple(theta.tolist()), error, reason)
@@ -163,8 +158,3 @@ def _neighbours(values: Sequence[float], tissues: int) -> list[Steps]:
             for step in (falling if number % 2 == 0 else tuple(reversed(falling)))
         ]
     return order
-
-
-def _error(residuals: Sequence[Floats]) -> float:
-    squares = np.concatenate([np.sum(values**2, axis=1) for values in residuals])
-    return math.sqrt(float(squares.mean()))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import ROUGH, State
 from warpbrain.estimation.modes import Mode
+from warpbrain.estimation.problem import Point
 from warpbrain.gp.prior import Prior
 
 Floats = NDArray[np.float64]
@@ -71,7 +72,7 @@ class Target:
         if not self._possible(theta):
             return -np.inf
         mode = self.nearest(theta)
-        return self._log_density(mode.predicted(theta), mode.estimate.point.nuisances)[0]
+        return self._log_density(mode.predicted(theta), mode.estimate.point)[0]
 
     def at(self, theta: Floats) -> Evaluated:
         """The log density; an equilibrium is solved for it."""
@@ -85,7 +86,7 @@ class Target:
         except SolveError:
             self.failed += 1
             return nothing
-        log_density, nuisances = self._log_density(state, mode.estimate.point.nuisances)
+        log_density, nuisances = self._log_density(state, mode.estimate.point)
         return Evaluated(log_density, state, nuisances)
 
     def _solve(self, theta: Floats, mode: Mode) -> State:
@@ -96,8 +97,8 @@ class Target:
             # far from the estimate the prediction may turn elements inside out
             return forward.solve(theta, mode.estimate.point.state.u, ROUGH)
 
-    def _log_density(self, state: State, start: Floats) -> tuple[float, Floats]:
-        misfit, point = self.problem.without_nuisances(state, start)
+    def _log_density(self, state: State, start: Point) -> tuple[float, Floats]:
+        misfit, point = self.problem.without_nuisances(state, start.nuisances, start.known_noise)
         return float(self.prior.log_density(state.theta)) - misfit, point.nuisances
 
     def _possible(self, theta: Floats) -> bool:

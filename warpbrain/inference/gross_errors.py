@@ -1,9 +1,10 @@
 """Points whose noise is far larger than declared, such as mispaired landmarks: each hypothesis pays for its own.
 
-With the indicator `w_i` of point i its noise is W times as large: the covariance of its rows grows by
-`Delta_i = (W^2 - 1) kappa^2 (L L^T)_ii`. Seen from all other rows, given the indicators of the other points,
+The noise of point i is `w_i` times as large, 1 or one of few inflations: the covariance of its rows is larger by
+`Delta_i = (w_i^2 - 1) kappa^2 (L L^T)_ii`. Seen from all other rows, given the inflations of the other points, another
+one that changes it by `D_i` has
 
-    ln p(r | w_i = 1) / p(r | w_i = 0) = v^T (Delta_i^-1 + P_ii)^-1 v / 2 - ln |I + Delta_i P_ii| / 2
+    ln p(r | w_i') / p(r | w_i) = v^T (I + D_i P_ii)^-1 D_i v / 2 - ln |I + D_i P_ii| / 2
 
 with `v = (S^-1 r)_i` and `P_ii = (S^-1)_ii`. What one hypothesis takes for gross errors is what another one explains,
 so nothing is set aside before a hypothesis is asked.
@@ -32,11 +33,25 @@ class Outliers:
     probability : float
         That a point is one.
     inflation : float
-        `W`, factor on the standard deviation of its noise.
+        Factor on the standard deviation of its noise.
+    further : tuple of float
+        Others, all alike probable: of one inflation alone a point that is much farther away still pulls.
     """
 
     probability: float
     inflation: float
+    further: tuple[float, ...] = ()
+
+    @property
+    def inflations(self) -> Floats:
+        """Of a sound point, which is 1, and of a gross error, shape (1 + k,)."""
+        return np.array([1.0, self.inflation, *self.further])
+
+    @property
+    def log_probabilities(self) -> Floats:
+        """Of each of them, shape (1 + k,)."""
+        count = 1 + len(self.further)
+        return np.log(np.array([1.0 - self.probability, *[self.probability / count] * count]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +61,16 @@ class GrossErrors:
     Attributes
     ----------
     log_density : float
-        Log density of the rows, summed over the indicators: each by itself about the most probable of all of them.
+        Log density of the rows, summed over the inflations: each by itself about the most probable of all of them.
     log_odds : (g,) array
         Of each point to be a gross error, given the others.
+    inflation : (g,) array
+        The most probable one of each point, 1 of a sound one.
     """
 
     log_density: float
     log_odds: Floats
+    inflation: Floats
 
 
 def with_gross_errors(
@@ -73,116 +91,116 @@ def with_gross_errors(
         Passes over the points at most. The point whose odds change sides the most goes first.
     """
     search = _Search(model, residual, points, prior)
+    log_prior = prior.log_probabilities
+    everyone = np.arange(len(points))
     for _ in range(sweeps * max(len(points), 1)):
-        odds = search.log_odds()
-        wrong = np.where((odds > 0.0) != search.gross, np.abs(odds), 0.0)
-        if not wrong.any():
+        logs = search.log_ratios() + log_prior
+        logs -= logs[everyone, search.kinds][:, None]
+        best = np.argmax(logs, axis=1)
+        if not (best != search.kinds).any():
             break
-        search.flip(int(np.argmax(wrong)))
-    count = int(np.count_nonzero(search.gross))
-    log_indicators = count * np.log(prior.probability) + (len(points) - count) * np.log1p(-prior.probability)
-    others = np.log1p(np.exp(-np.abs(odds))).sum()
-    return GrossErrors(float(search.log_density() + log_indicators + others), odds)
+        worst = int(np.argmax(logs[everyone, best]))
+        search.change(worst, int(best[worst]))
+    others = np.logaddexp.reduce(logs, axis=1)
+    log_density = search.log_density() + float(log_prior[search.kinds].sum() + others.sum())
+    odds = np.logaddexp.reduce(logs[:, 1:], axis=1) - logs[:, 0]
+    return GrossErrors(log_density, odds, prior.inflations[search.kinds])
 
 
-def columns_of_gross_errors(
-    model: GaussianModel, points: Sequence[Ints], gross: NDArray[np.bool_], prior: Outliers
-) -> Floats:
-    """Columns (n, k) of normal coefficients by which the noise of points that are gross errors (g,) is larger."""
+def columns_of_inflation(model: GaussianModel, points: Sequence[Ints], inflation: Floats) -> Floats:
+    """Columns (n, k) of normal coefficients by which the noise of points is as many times larger (g,) as it is."""
     found = [np.zeros((len(model), 0))]
-    for number in np.flatnonzero(gross).tolist():
+    for number in np.flatnonzero(inflation > 1.0).tolist():
         columns = np.zeros((len(model), len(points[number])))
-        columns[points[number]] = np.linalg.cholesky(_added(model, points[number][None], prior)[0])
+        noise = model.noise_blocks(points[number][None])[0]
+        columns[points[number]] = np.linalg.cholesky((inflation[number] ** 2 - 1.0) * noise)
         found.append(columns)
     return np.concatenate(found, axis=1)
 
 
-def _added(model: GaussianModel, rows: Ints, prior: Outliers) -> Floats:
-    """`Delta` (g, d, d) of points with the rows (g, d)."""
-    return (prior.inflation**2 - 1.0) * model.noise_blocks(rows)
-
-
 @dataclass(frozen=True, eq=False)
 class _Alike:
-    """Points of equally many rows: their numbers (g,), rows (g, d), `Delta` (g, d, d), and `P_ii` of all sound."""
+    """Points of equally many rows: their numbers (g,), rows (g, d), noise (g, d, d), and `P_ii` of all sound."""
 
     numbers: Ints
     rows: Ints
-    added: Floats
+    noise: Floats
     precision: Floats
 
 
 class _Search:
-    """Points that are gross errors, and the inverse of the covariance with them, as updates of that with none.
+    """The inflation of each point, and the inverse of the covariance with them, as updates of that with none.
 
     With the rows R of all gross errors, `P = P_0 - P_0[:, R] (Delta_R^-1 + P_0[R, R])^-1 P_0[R, :]` (Woodbury).
     """
 
     def __init__(self, model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> None:
-        self.gross = np.zeros(len(points), dtype=bool)
-        self._model, self._points, self._prior = model, points, prior
+        self.kinds = np.zeros(len(points), dtype=np.int64)
+        self._model, self._points = model, points
+        # variance of each kind, in units of that of a sound point
+        self._variances = prior.inflations**2
         sizes = np.array([len(rows) for rows in points], dtype=np.int64)
         self._alike = []
         for size in np.unique(sizes).tolist():
             numbers = np.flatnonzero(sizes == size)
             rows = np.array([points[number] for number in numbers.tolist()])
-            self._alike.append(_Alike(numbers, rows, _added(model, rows, prior), model.precision_blocks(rows)))
+            self._alike.append(_Alike(numbers, rows, model.noise_blocks(rows), model.precision_blocks(rows)))
         self._weighted = model.precision_times(residual)
         self._log_sound = float(model.log_density(residual))
-        # of points that have been gross errors: columns of the inverse, the inverse of what is added and its volume
+        # of points that have been gross errors: columns of the inverse, the inverse of their noise and its volume
         self._once: dict[int, tuple[Floats, Floats, float]] = {}
         self._update()
 
-    def flip(self, number: int) -> None:
-        """Let a point be a gross error if it is none, or none if it is one."""
-        self.gross[number] = not self.gross[number]
+    def change(self, number: int, kind: int) -> None:
+        """Give a point another inflation."""
+        self.kinds[number] = kind
         if number not in self._once:
             rows = self._points[number]
-            added = _added(self._model, rows[None], self._prior)[0]
+            noise = self._model.noise_blocks(rows[None])[0]
             columns = self._model.precision_columns(rows)
-            self._once[number] = columns, np.asarray(np.linalg.inv(added)), float(np.linalg.slogdet(added)[1])
+            self._once[number] = columns, np.asarray(np.linalg.inv(noise)), float(np.linalg.slogdet(noise)[1])
         self._update()
 
     def _update(self) -> None:
         """Factor of `Delta_R^-1 + P_0[R, R]`, and its inverse times `P_0[R, :]` and `(P_0 r)_R`."""
         from scipy.linalg import solve_triangular
 
-        numbers = np.flatnonzero(self.gross).tolist()
+        numbers = np.flatnonzero(self.kinds).tolist()
         R = np.concatenate([np.zeros(0, dtype=np.int64), *(self._points[number] for number in numbers)])
         columns = np.concatenate([np.zeros((len(self._model), 0)), *(self._once[k][0] for k in numbers)], axis=1)
-        inner, at = columns[R], 0
+        inner, at, log_volume = columns[R], 0, 0.0
         for number in numbers:
-            size = len(self._points[number])
-            inner[at : at + size, at : at + size] += self._once[number][1]
+            _, inverse, log_noise = self._once[number]
+            size, more = len(inverse), float(self._variances[self.kinds[number]]) - 1.0
+            inner[at : at + size, at : at + size] += inverse / more
+            log_volume += log_noise + size * np.log(more)
             at += size
         factor = np.linalg.cholesky(inner)
         both = np.column_stack([columns.T, self._weighted[R]])
         solved = solve_triangular(factor, both, lower=True, check_finite=False) if numbers else both
         self._seen, self._residual = solved[:, :-1].T, solved[:, -1]
-        self._log_volume = sum(self._once[k][2] for k in numbers) + 2.0 * float(np.log(np.diag(factor)).sum())
+        self._log_volume = log_volume + 2.0 * float(np.log(np.diag(factor)).sum())
 
-    def log_odds(self) -> Floats:
-        """Of each point (g,) to be a gross error, given the others."""
-        log_prior_odds = np.log(self._prior.probability) - np.log1p(-self._prior.probability)
+    def log_ratios(self) -> Floats:
+        """Log density (g, k) with every kind of each point, less that with the one it is of now."""
         weighted = self._weighted - self._seen @ self._residual
-        odds = np.empty(len(self.gross))
+        logs = np.empty((len(self.kinds), len(self._variances)))
         for alike in self._alike:
             seen = self._seen[alike.rows]
             P = alike.precision - seen @ np.swapaxes(seen, 1, 2)
-            there = self.gross[alike.numbers]
-            odds[alike.numbers] = log_prior_odds + _log_ratios(weighted[alike.rows], P, alike.added, there)
-        return odds
+            now = self._variances[self.kinds[alike.numbers]]
+            for kind, variance in enumerate(self._variances.tolist()):
+                change = (variance - now)[:, None, None] * alike.noise
+                logs[alike.numbers, kind] = _log_ratios(weighted[alike.rows], P, change)
+        return logs
 
     def log_density(self) -> float:
         """Of the rows, with the gross errors that there are."""
         return self._log_sound + 0.5 * float(self._residual @ self._residual) - 0.5 * self._log_volume
 
 
-def _log_ratios(v: Floats, P: Floats, added: Floats, there: NDArray[np.bool_]) -> Floats:
-    """Log densities (g,) with larger noise of a point less those without, from the inverse covariance as it is now."""
-    sign = np.where(there, -1.0, 1.0)
-    times = sign[:, None, None] * added
-    middle = np.linalg.solve(np.eye(v.shape[1]) + times @ P, times)
-    squares = np.einsum("gi,gij,gj->g", v, middle, v)
-    volume = np.linalg.slogdet(np.eye(v.shape[1]) + times @ P)[1]
-    return np.asarray(sign * (0.5 * squares - 0.5 * volume))
+def _log_ratios(v: Floats, P: Floats, change: Floats) -> Floats:
+    """Log densities (g,) with a change of each point's covariance, less those without it."""
+    inner = np.eye(v.shape[1]) + change @ P
+    squares = np.einsum("gi,gi->g", v, np.linalg.solve(inner, change @ v[:, :, None])[:, :, 0])
+    return np.asarray(0.5 * squares - 0.5 * np.linalg.slogdet(inner)[1])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import columns_of_gross_errors, with_gross_errors
+from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
 from warpbrain.inference.noise import outliers, scales
 
 Floats = NDArray[np.float64]
@@ -30,7 +30,7 @@ class Marginal:
     scale : float
         The most probable factor on the noise.
     gross : (g,) bool array
-        Points that are rather gross errors than not, at that scale.
+        Points that are most probably gross errors, at that scale.
     model : GaussianModel
         At that scale, with columns of the larger noise of these points after those of the hypothesis.
     louder : int
@@ -77,11 +77,11 @@ def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], nea
     """
     values, log_prior = scales()
     logs = np.full(len(values), -np.inf)
-    odds: dict[int, Floats] = {}
+    inflations: dict[int, Floats] = {}
 
     def ask(number: int) -> None:
         at_scale = with_gross_errors(model.with_scale(float(values[number])), residual, points, outliers())
-        logs[number], odds[number] = at_scale.log_density + log_prior[number], at_scale.log_odds
+        logs[number], inflations[number] = at_scale.log_density + log_prior[number], at_scale.inflation
 
     first = int(np.argmin(np.abs(np.log(values / near))))
     ask(first)
@@ -93,9 +93,12 @@ def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], nea
                 break
             number += step
     best = int(np.argmax(logs))
-    gross = odds[best] > 0.0
     at_best = model.with_scale(float(values[best]))
-    columns = columns_of_gross_errors(at_best, points, gross, outliers())
+    columns = columns_of_inflation(at_best, points, inflations[best])
     return Marginal(
-        float(np.logaddexp.reduce(logs)), at_best.scale, gross, at_best.with_columns(columns), columns.shape[1]
+        float(np.logaddexp.reduce(logs)),
+        at_best.scale,
+        inflations[best] > 1.0,
+        at_best.with_columns(columns),
+        columns.shape[1],
     )

@@ -9,6 +9,8 @@ is a Student t. Of a few points the noise is many times larger, see `gross_error
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,15 +55,16 @@ def noise_factor(positions: Floats, directions: Floats, times: Floats, sigma: Fl
 
 def outliers() -> Outliers:
     """What is believed of gross errors."""
-    return Outliers(belief("noise.gross_share"), belief("noise.gross_times"))
+    return Outliers(
+        belief("noise.gross_share"), belief("noise.gross_times"), tuple(beliefs("noise.gross_far").tolist())
+    )
 
 
 def log_scale_density(scales: Floats) -> Floats:
     """Log density (...) of `ln kappa` at factors `kappa` (...) on the noise."""
-    from scipy.stats import t
-
-    found = t.logpdf(np.log(scales), belief("noise.scale_tail"), scale=belief("noise.scale_width"))
-    return np.asarray(found, dtype=np.float64)
+    nu, width = belief("noise.scale_tail"), belief("noise.scale_width")
+    constant = math.lgamma(0.5 * (nu + 1.0)) - math.lgamma(0.5 * nu) - 0.5 * math.log(nu * math.pi) - math.log(width)
+    return np.asarray(constant - 0.5 * (nu + 1.0) * np.log1p((np.log(scales) / width) ** 2 / nu))
 
 
 def scales() -> tuple[Floats, Floats]:

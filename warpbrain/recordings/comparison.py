@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpbrain.errors import InputError
 from warpbrain.mesh.surface import faces_of
 from warpbrain.mesh.tet_mesh import TetMesh
+from warpbrain.recordings.agreement import lengths, root_mean_square
 from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.location import Location, locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, SurfaceRecording
@@ -17,11 +18,6 @@ from warpbrain.recordings.times import rows_at
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
-
-
-def root_mean_square(residuals: ArrayLike) -> float:
-    """`sqrt(mean |r|^2)` of residual vectors (n, 3) or distances (n,), in their unit."""
-    return float(np.sqrt(np.mean(_lengths(residuals) ** 2)))
 
 
 def legacy_error(distances: ArrayLike) -> float:
@@ -40,7 +36,7 @@ def legacy_error(distances: ArrayLike) -> float:
     float
         [sqrt(mm)]
     """
-    return float(np.sqrt(np.mean(1000.0 * _lengths(distances))))
+    return float(np.sqrt(np.mean(1000.0 * lengths(distances))))
 
 
 @dataclass(frozen=True)
@@ -63,7 +59,7 @@ class Error:
     @classmethod
     def of(cls, residuals: ArrayLike, unit: str = "m") -> Error:
         """The error of residual vectors (n, 3) or distances (n,)."""
-        distances = _lengths(residuals)
+        distances = lengths(residuals)
         return cls(
             root_mean_square(distances),
             legacy_error(distances) if unit == "m" else None,
@@ -257,8 +253,3 @@ def _to_recorded(nodes: Floats, points: Floats, faces: Ints | None) -> Floats:
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(points).query(nodes)[0])
-
-
-def _lengths(residuals: ArrayLike) -> Floats:
-    values = np.asarray(residuals, dtype=np.float64)
-    return np.linalg.norm(values, axis=1) if values.ndim == 2 else np.abs(values)

@@ -1,20 +1,21 @@
-"""An estimate of tissue: its JSON, and the tables that are printed, which are made from it."""
+"""An estimate of tissue as JSON; what is printed is made of the same `Posterior`, see `estimate_text`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from warpbrain.estimation.estimate import EstimationOptions
 from warpbrain.estimation.laplace import Laplace
+from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
-from warpbrain.estimation.prediction import INTERVALS, Prediction
+from warpbrain.estimation.prediction import INTERVALS, Prediction, Together
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
+from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
 #: Units as people read them: of a recording, the factor and the name.
 SHOWN = {"m": (MILLIMETRES, "mm"), "N": (1.0, "N")}
@@ -22,9 +23,9 @@ SHOWN = {"m": (MILLIMETRES, "mm"), "N": (1.0, "N")}
 _UNEXPLAINED = 0.3
 
 
-def describe_estimate(posterior: Posterior, options: EstimationOptions, device: str) -> dict[str, Any]:
+def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissue | None = None) -> dict[str, Any]:
     """Everything that is known of an estimate, with units in keys or beside the values; docs/estimation.md."""
-    prior, parameters, case = posterior.prior, posterior.parameters, posterior.case
+    prior, parameters, case, options = posterior.prior, posterior.parameters, posterior.case, posterior.options
     said = posterior.identifiability
     gauss_newton = posterior.best.estimate
     return {
@@ -40,6 +41,7 @@ def describe_estimate(posterior: Posterior, options: EstimationOptions, device: 
             "directions": _directions(posterior.best.laplace),
         },
         "parameters": [_describe(marginal, posterior) for marginal in posterior.marginals],
+        "nothing_else": None if averaged is None else _describe_nothing_else(averaged),
         "correlation": {"names": list(parameters.names), "matrix": posterior.correlation},
         "covariance": {"names": list(parameters.names), "matrix": posterior.covariance},
         "method": posterior.method,
@@ -63,12 +65,10 @@ def describe_estimate(posterior: Posterior, options: EstimationOptions, device: 
             for mode, probability in zip(posterior.modes, posterior.mode_probabilities, strict=True)
         ],
         "predictions": [_describe_prediction(prediction) for prediction in posterior.predictions],
-        "likelihood": {
-            "density": "normal" if math.isinf(options.likelihood.nu) else "multivariate Student t, a row at a time",
-            "degrees_of_freedom": options.likelihood.nu,
-        },
-        "discretisation": _describe_discretisation(posterior, options),
-        "registration": _describe_registration(posterior, options),
+        "all_recordings": [_describe_together(together) for together in posterior.together],
+        "likelihood": _describe_likelihood(posterior),
+        "discretisation": describe_discretisation(posterior),
+        "registration": describe_registration(posterior),
         "prior": {
             "model": prior.model.name,
             "variant": prior.model.variant,
@@ -84,7 +84,7 @@ def describe_estimate(posterior: Posterior, options: EstimationOptions, device: 
             "converged": gauss_newton.converged,
             "history": [vars(step) for step in gauss_newton.history],
         },
-        "remarks": [*posterior.remarks, *_unexplained(posterior.predictions)],
+        "remarks": remarks_of(posterior),
         "equilibria": dict(posterior.solves),
         "seconds": dict(posterior.seconds),
         "seed": options.seed,
@@ -95,19 +95,10 @@ def describe_estimate(posterior: Posterior, options: EstimationOptions, device: 
 
 def _describe(marginal: Marginal, posterior: Posterior) -> dict[str, Any]:
     parameter = marginal.parameter
-    tissue = posterior.parameters.tissues.index(parameter.tissue)
-
-    def shown(value: float) -> float:
-        return math.exp(value) if parameter.is_modulus else value
-
-    estimate, unit = shown(marginal.estimate), "Pa" if parameter.is_modulus else "1"
+    shown = _shown(parameter)
+    estimate = shown(marginal.estimate)
     return {
-        "tissue": parameter.tissue,
-        "labels": list(posterior.parameters.labels[tissue]),
-        "group": posterior.parameters.groups[tissue],
-        "law": posterior.parameters.laws_of[tissue],
-        "name": "shear modulus" if parameter.is_modulus else parameter.coordinate.name,
-        "unit": unit,
+        **_parameter(parameter, posterior.parameters),
         "estimate": estimate,
         "standard_deviation": (estimate if parameter.is_modulus else 1.0) * marginal.deviation,
         "interval_95": [shown(value) for value in marginal.interval],
@@ -125,6 +116,45 @@ def _describe(marginal: Marginal, posterior: Posterior) -> dict[str, Any]:
             "prior_mean": marginal.prior_mean,
             "prior_standard_deviation": marginal.prior_deviation,
         },
+    }
+
+
+def _parameter(parameter: Parameter, parameters: Parameters) -> dict[str, Any]:
+    """What a parameter is."""
+    tissue = parameters.tissues.index(parameter.tissue)
+    return {
+        "tissue": parameter.tissue,
+        "labels": list(parameters.labels[tissue]),
+        "group": parameters.groups[tissue],
+        "law": parameters.laws_of[tissue],
+        "name": "shear modulus" if parameter.is_modulus else parameter.coordinate.name,
+        "unit": "Pa" if parameter.is_modulus else "1",
+    }
+
+
+def _shown(parameter: Parameter) -> Callable[[float], float]:
+    """From the coordinate of a parameter to what people read."""
+    return math.exp if parameter.is_modulus else float
+
+
+def _describe_nothing_else(averaged: AveragedTissue) -> dict[str, Any]:
+    deviations = np.sqrt(np.diag(averaged.covariance)).tolist()
+    each = zip(averaged.parameters.each, averaged.mean.tolist(), deviations, averaged.interval(0.95), strict=True)
+    return {
+        "probability": averaged.nothing,
+        "causes": [
+            {"name": one.name, "kind": one.kind.value, "probability": one.probability} for one in averaged.causes
+        ],
+        "tissue": [
+            {
+                **_parameter(parameter, averaged.parameters),
+                "middle": _shown(parameter)(mean),
+                "interval_95": [_shown(parameter)(end) for end in ends],
+                "coordinate": {"name": parameter.coordinate.name, "mean": mean, "standard_deviation": deviation},
+            }
+            for parameter, mean, deviation, ends in each
+        ],
+        "covariance": {"names": list(averaged.parameters.names), "matrix": averaged.covariance},
     }
 
 
@@ -149,17 +179,17 @@ def _describe_chain(posterior: Posterior) -> dict[str, Any] | None:
 def _describe_prediction(prediction: Prediction) -> dict[str, Any]:
     factor, unit = SHOWN[prediction.unit]
     sigma = None if prediction.sigma is None else factor * float(np.sqrt(np.mean(prediction.sigma**2)))
-    size = prediction.after.shape[1]
     return {
         "name": prediction.name,
         "kind": prediction.kind,
         "role": prediction.role,
         "unit": unit,
-        "count": len(prediction.rows),
+        "count": prediction.fitted.count,
         "root_mean_square_before": factor * prediction.error_before,
         "root_mean_square_after": factor * prediction.error_after,
+        "root_mean_square_of_run": factor * prediction.run.after.root_mean_square,
         "noise_sigma": sigma,
-        "noise_root_mean_square": None if sigma is None else math.sqrt(size) * sigma,
+        "noise_root_mean_square": noise_of(prediction),
         "prediction_standard_deviation": factor * float(np.sqrt(np.mean(prediction.deviation**2))),
         "gross_errors": prediction.rows[prediction.gross],
         "coverage": None
@@ -168,7 +198,38 @@ def _describe_prediction(prediction: Prediction) -> dict[str, Any]:
     }
 
 
-def _describe_discretisation(posterior: Posterior, options: EstimationOptions) -> dict[str, Any] | None:
+def noise_of(prediction: Prediction) -> float | None:
+    """Root mean square [mm or N] that independent noise alone would leave."""
+    if prediction.sigma is None:
+        return None
+    size = prediction.after.shape[1]
+    return SHOWN[prediction.unit][0] * math.sqrt(size * float(np.mean(prediction.sigma**2)))
+
+
+def _describe_together(together: Together) -> dict[str, Any]:
+    return {
+        "role": together.role,
+        "count": together.count,
+        "root_mean_square_before_mm": MILLIMETRES * together.before,
+        "root_mean_square_after_mm": MILLIMETRES * together.after,
+        "root_mean_square_of_run_mm": MILLIMETRES * together.of_run,
+    }
+
+
+def _describe_likelihood(posterior: Posterior) -> dict[str, Any]:
+    noise = posterior.best.estimate.point.known_noise
+    believed = noise.believed
+    return {
+        "density": "normal, shared by neighbours" + ("" if believed is None else ", with gross errors"),
+        "degrees_of_freedom": None,
+        "noise_scale": noise.scale,
+        "gross_share": 0.0 if believed is None else believed.probability,
+        "gross_times": [] if believed is None else believed.inflations[1:],
+    }
+
+
+def describe_discretisation(posterior: Posterior) -> dict[str, Any] | None:
+    options = posterior.options
     if not posterior.mesh_errors or options.discretisation is None:
         return None
     _, value, deviation = posterior.nuisances[0]
@@ -184,7 +245,8 @@ def _describe_discretisation(posterior: Posterior, options: EstimationOptions) -
     }
 
 
-def _describe_registration(posterior: Posterior, options: EstimationOptions) -> dict[str, Any] | None:
+def describe_registration(posterior: Posterior) -> dict[str, Any] | None:
+    options = posterior.options
     if options.registration is None:
         return None
     found = posterior.nuisances[-6:]
@@ -198,81 +260,11 @@ def _describe_registration(posterior: Posterior, options: EstimationOptions) -> 
     }
 
 
-def _unexplained(predictions: Sequence[Prediction]) -> list[str]:
-    """What a user must know of recordings that no parameters explain."""
-    return [
+def remarks_of(posterior: Posterior) -> list[str]:
+    """With what a user must know of recordings that no parameters explain."""
+    return list(posterior.remarks) + [
         f"{int(one.gross.sum())} of {len(one.rows)} rows of '{one.name}' are gross errors, farther from the prediction "
         "than its noise allows: what moved them is not in this case"
-        for one in predictions
+        for one in posterior.predictions
         if one.gross.mean() > _UNEXPLAINED
     ]
-
-
-def estimate_lines(said: Mapping[str, Any]) -> list[str]:
-    """The tables, as printed."""
-    lines = [*said["identifiability"]["sentences"], ""]
-    lines.append(
-        "tissue             parameter         estimate       sd   95 % interval         prior 95 %         shrinkage"
-    )
-    for one in said["parameters"]:
-        unit = "" if one["unit"] == "1" else one["unit"]
-        ends = (one["interval_95"], one["prior"]["interval_95"])
-        interval, prior = (f"{_number(low)} to {_number(high)}" for low, high in ends)
-        lines.append(
-            f"  {one['tissue']:<16.16} {one['name']:<15} {_number(one['estimate']):>9} "
-            f"{_number(one['standard_deviation']):>8}   {interval:<19}   {prior:<16} "
-            f"{100 * one['shrinkage']:>7.0f} %  {unit}"
-        )
-    lines += _check_lines(said)
-    lines += ["", "RMSE at recordings      count   before    after    noise   in 50 %   in 95 %   gross errors"]
-    for one in said["predictions"]:
-        noise = one["noise_root_mean_square"]
-        within = ["", ""] if one["coverage"] is None else [f"{100 * part:.0f} %" for part in one["coverage"].values()]
-        lines.append(
-            f"  {one['name']:<18.18} {one['count']:>8} {one['root_mean_square_before']:>8.3f} "
-            f"{one['root_mean_square_after']:>8.3f} {'' if noise is None else f'{noise:.3f}':>8} {within[0]:>9} "
-            f"{within[1]:>9} {len(one['gross_errors']):>9}      {one['unit']}"
-            + (", check" if one["role"] == "check" else "")
-        )
-    lines += [f"  remark    {remark}" for remark in said["remarks"]]
-    seconds = said["seconds"]
-    lines += ["", "time [s]   " + ", ".join(f"{stage} {spent:.1f}" for stage, spent in seconds.items())]
-    lines.append("equilibria " + ", ".join(f"{stage} {count}" for stage, count in said["equilibria"].items()))
-    return lines
-
-
-def _check_lines(said: Mapping[str, Any]) -> list[str]:
-    check, chain, mesh = said["check_of_laplace"], said["chain"], said["discretisation"]
-    names, matrix = said["correlation"]["names"], np.asarray(said["correlation"]["matrix"])
-    lines = [
-        f"  correlation of {names[i]} and {names[j]}: {matrix[i, j]:.2f}"
-        for i in range(len(names))
-        for j in range(i)
-        if abs(matrix[i, j]) >= 0.3
-    ]
-    lines.append(
-        f"  {said['method']}: Pareto k {check['pareto_k']:.2f} of {check['draws']} weighted draws "
-        f"({check['effective_draws']:.0f} effective; without equilibrium: {check['without_equilibrium']}, "
-        f"unstable laws: {check['unstable_laws']})"
-    )
-    lines += [f"  Laplace fails: {doubt}" for doubt in check["doubts"]]
-    if chain is not None:
-        lines.append(
-            f"  chain of {chain['equilibria']} equilibria, {100 * chain['accepted']:.0f} % accepted, worth "
-            f"{min(chain['effective_draws']):.0f} independent draws"
-        )
-    if mesh is not None:
-        lines.append(
-            f"  error of the mesh: {mesh['amount']:.2f} +- {mesh['standard_deviation']:.2f} times what elements of "
-            f"half the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square"
-        )
-    if said["registration"] is not None:
-        shift = ", ".join(f"{value:.2f}" for value in said["registration"]["shift_mm"])
-        turn = ", ".join(f"{value:.2f}" for value in said["registration"]["turn_degrees"])
-        lines.append(f"  registration: shifted by ({shift}) mm, turned by ({turn}) degrees")
-    return lines
-
-
-def _number(value: float) -> str:
-    """Four digits, as a person writes them."""
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.4g}"

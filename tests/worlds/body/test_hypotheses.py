@@ -10,25 +10,15 @@ from warpbrain.inference import GaussianModel
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import NAMED, decide
 from warpbrain.inference.marginal import marginal
-from warpbrain.worlds.body.base import BaseFinder
-from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
-from warpbrain.worlds.body.not_physics import not_physics_at
-from warpbrain.worlds.body.states import States
-from warpbrain.worlds.listener import Listener
+from warpbrain.worlds.body.screened import screened
 
 
 @pytest.fixture(scope="module")
 def search(tmp_path_factory: pytest.TempPathFactory) -> HypothesisSearch:
     """Everything weighed, the best fitted."""
     case = write_sinking(Path(tmp_path_factory.mktemp("sets")) / "case")
-    states = States(case, "cpu")
-    dictionary = dictionary_of(case, OPTIONS.candidates, len(states.times))
-    spacing = dictionary.situation.spacing
-    base = BaseFinder(states, spacing, False, False, Listener()).find()
-    candidates = candidates_at(dictionary, base.effects, not_physics_at(base.at, base.nuisances))
-    found = HypothesisSearch(base, candidates, spacing, Listener())
-    found.screen()
+    found = screened(case, "cpu", mesh_error=False, mechanisms=OPTIONS.candidates)
     found.fit()
     return found
 

@@ -16,7 +16,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
-from warpbrain.inference.gross_errors import columns_of_gross_errors, with_gross_errors
+from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
 from warpbrain.inference.noise import noise_factor, outliers, scales
 from warpbrain.simulation.locking import on_linear_elements
 from warpbrain.threads import beside
@@ -119,14 +119,22 @@ class BaseFinder:
     mesh_error : bool
     without_nuisances : bool
     listener : Listener
+    prior : Gaussian, optional
+        Of the tissues' parameters, if it is not `tissue_prior`.
     """
 
     def __init__(
-        self, states: States, spacing: float, mesh_error: bool, without_nuisances: bool, listener: Listener
+        self,
+        states: States,
+        spacing: float,
+        mesh_error: bool,
+        without_nuisances: bool,
+        listener: Listener,
+        prior: Gaussian | None = None,
     ) -> None:
         self.states = states
         # a second of drawing from the generative model, while the first state is solved
-        self._prior = beside(lambda: tissue_prior(states.case, states.parameters))
+        self._prior = beside(lambda: prior or tissue_prior(states.case, states.parameters))
         self._spacing, self._mesh_error, self._bare = spacing, mesh_error, without_nuisances
         self._listener = listener
         self._remarks = on_linear_elements(states.case.poisson, "a diagnosis")
@@ -204,8 +212,8 @@ class BaseFinder:
         model = GaussianModel(rough.noise_factor, loose)
         values, log_prior = scales()
         model = model.with_scale(model.likely_scale(rough.residual, values, log_prior))
-        gross = with_gross_errors(model, rough.residual, rough.points, outliers()).log_odds > 0.0
-        model = model.with_columns(columns_of_gross_errors(model, rough.points, gross, outliers()))
+        inflation = with_gross_errors(model, rough.residual, rough.points, outliers()).inflation
+        model = model.with_columns(columns_of_inflation(model, rough.points, inflation))
         xi, _ = model.coefficients(rough.residual)
         turned = loose.shape[1]
         self.states.realign((xi[part] + wider * xi[turned - 6 : turned]) * registration_sd())

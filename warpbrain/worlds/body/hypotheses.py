@@ -117,7 +117,7 @@ class HypothesisSearch:
     """
 
     def __init__(self, base: Base, candidates: Candidates, spacing: float, listener: Listener) -> None:
-        self.base, self.candidates, self._spacing, self._listener = base, candidates, spacing, listener
+        self.base, self.candidates, self.spacing, self._listener = base, candidates, spacing, listener
         self.causes = causes_of(base, candidates)
         self.fits = Refitting(base)
         self._weighed: dict[frozenset[str], Weighed] = {}
@@ -313,7 +313,7 @@ class HypothesisSearch:
             usual = effect.proposed.elsewhere(effect.proposed.centre, effect.proposed.radius)
             size = float(np.max(effect.proposed.sd / usual.sd))
             found = placed(
-                self.base, self.base.effects, effect, size, self._spacing, without, one.residual + effect.mean
+                self.base, self.base.effects, effect, size, self.spacing, without, one.residual + effect.mean
             )
             columns = one.columns.copy()
             columns[:, own] = found.effect.columns

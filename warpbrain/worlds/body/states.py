@@ -15,6 +15,7 @@ from warpbrain.errors import SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.realigned import realigned
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.composition import CompositionError
 from warpbrain.physics.mechanism import Mechanism
@@ -27,7 +28,6 @@ from warpbrain.simulation.model import Material
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
-from warpbrain.worlds.body.realigned import realigned
 from warpbrain.worlds.body.sensors import Sensors, sensors_at
 from warpbrain.worlds.body.stiffness_field import StiffnessField, stiffness_modes
 from warpbrain.worlds.body.surfaces import with_free_surfaces

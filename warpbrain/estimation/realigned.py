@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
-from warpbrain.estimation.registration import rigid_columns
+from warpbrain.estimation.registration import moved_back
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 
 Floats = NDArray[np.float64]
 
 
 def realigned(case: Case, motion: Floats, centre: Floats) -> Case:
-    """The case as if its recordings had not been moved by a small rigid motion.
+    """The case as if its recordings had not been moved by a rigid motion.
 
     Parameters
     ----------
@@ -27,13 +27,14 @@ def realigned(case: Case, motion: Floats, centre: Floats) -> Case:
     """
     if not motion.any():
         return case
-    return replace(case, recordings=tuple(_moved_back(one, motion, centre) for one in case.recordings))
+    return replace(case, recordings=tuple(realigned_recording(one, motion, centre) for one in case.recordings))
 
 
-def _moved_back(recording: Recording, motion: Floats, centre: Floats) -> Recording:
+def realigned_recording(recording: Recording, motion: Floats, centre: Floats) -> Recording:
+    """The same of one recording: forces are as they were."""
     if isinstance(recording, PointsRecording):
-        moved = recording.points + recording.displacement
-        return replace(recording, displacement=recording.displacement - rigid_columns(moved, centre) @ motion)
+        positions = recording.points + recording.displacement
+        return replace(recording, displacement=moved_back(positions, motion, centre) - recording.points)
     if isinstance(recording, SurfaceRecording):
-        return replace(recording, points=recording.points - rigid_columns(recording.points, centre) @ motion)
+        return replace(recording, points=moved_back(recording.points, motion, centre))
     return recording

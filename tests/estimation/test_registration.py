@@ -1,0 +1,102 @@
+"""Rigid errors of registration: finite turns, their derivatives, and that what was moved is moved back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from synthetic import WHITE, beads, block, lid, truth
+
+from warpbrain.cases.case import Case
+from warpbrain.errors import InputError
+from warpbrain.estimation.forward import Forward
+from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.likelihood import Likelihood, Noise, Rows
+from warpbrain.estimation.nuisances import Nuisances
+from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.prior_modes import PriorMode
+from warpbrain.estimation.problem import Problem
+from warpbrain.estimation.realigned import realigned
+from warpbrain.estimation.registration import Registration, moved, moved_back, moved_back_columns, rigid_columns
+
+THETA = np.log([1000.0])
+
+
+def motion(seed: int, shift: float, turn: float) -> np.ndarray:
+    """A shift [m] and a turn [degrees] in any direction."""
+    random = np.random.default_rng(seed)
+    directions = random.normal(size=(2, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    return np.concatenate([shift * directions[0], np.radians(turn) * directions[1]])
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-4, 6.0, 170.0])
+def test_motions_are_rigid_and_their_derivatives_those_of_differences(turn: float) -> None:
+    by, centre = motion(1, 0.006, turn), np.array([0.01, -0.02, 0.03])
+    points = np.random.default_rng(2).uniform(-0.08, 0.08, (20, 3))
+    there = moved(points, by, centre)
+    matrix = Rotation.from_rotvec(by[3:]).as_matrix()
+    np.testing.assert_allclose(there, (points - centre) @ matrix.T + centre + by[:3], atol=1e-15)
+    np.testing.assert_allclose(moved_back(there, by, centre), points, atol=1e-15)
+    columns = moved_back_columns(there, by, centre)
+    for k in range(6):
+        step = 1e-6 * np.eye(6)[k]
+        expected = (moved_back(there, by + step, centre) - moved_back(there, by - step, centre)) / 2e-6
+        np.testing.assert_allclose(columns[:, :, k], expected, atol=1e-9)
+    if turn == 0.0:
+        np.testing.assert_allclose(
+            rigid_columns(points, centre)[:, :, 3:],
+            -np.cross((points - centre)[:, None], np.eye(3)).swapaxes(1, 2),
+            atol=1e-15,
+        )
+
+
+def recorded(by: np.ndarray, surface: bool) -> Case:
+    """A pushed block whose recordings were moved rigidly about the mean of their positions."""
+    case = block({"brain": WHITE}, "pushed")
+    result = truth(case)
+    points = beads(result, count=80)
+    seen = (points, lid(result)) if surface else (points,)
+    centre = np.concatenate([points.points + points.displacement, *(one.points for one in seen[1:])]).mean(axis=0)
+    back = np.concatenate([-Rotation.from_rotvec(by[3:]).inv().apply(by[:3]), -by[3:]])
+    return realigned(replace(case, recordings=seen), back, centre)
+
+
+@pytest.mark.parametrize("surface", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_an_exact_rigid_motion_is_recovered(seed: int, surface: bool, verify) -> None:
+    by = motion(seed, 0.006, 6.0)
+    case = recorded(by, surface)
+    forward = Forward(case, THETA, "cpu")
+    observations = Observations.to_fit(case)
+    mode = PriorMode(1.0, Gaussian(THETA, np.eye(1)), np.full(1, -np.inf), np.full(1, np.inf))
+    nuisances = Nuisances(registration=Registration(1.0, 10.0))
+    problem = Problem(forward, observations, mode, Likelihood(), nuisances)
+    state = forward.solve(THETA)
+    rows = Rows.of(observations, problem.at(state, np.zeros(6)).parts)
+    exact = Noise(rows, np.full(len(rows.sigma), 1e-5), 1.0, np.ones(len(rows.points)), None)
+    _, best = problem.without_nuisances(state, np.zeros(6), exact)
+    # about the mean of what was recorded, which the shift moved: the shift is turned along
+    away = best.nuisances - np.concatenate([Rotation.from_rotvec(by[3:]).apply(by[:3]), by[3:]])
+    verify(
+        "a rigid error of registration of 6 mm and 6 degrees, of " + ("points and a surface" if surface else "points"),
+        "the motion by which recordings were moved (SciPy's rotations)",
+        float(np.abs(away).max()),
+        1e-6,
+        "m, rad",
+    )
+
+
+def test_an_estimate_takes_the_registration_that_a_diagnosis_takes() -> None:
+    from warpbrain.estimation.options import EstimationOptions
+    from warpbrain.worlds.body.nuisances import registration_sd
+
+    registration = EstimationOptions().registration
+    assert registration is not None
+    np.testing.assert_allclose(np.diag(registration.precision) ** -0.5, registration_sd())
+
+
+@pytest.mark.parametrize("values", [(0.0, 0.1), (0.001, -1.0), (np.nan, 0.1)])
+def test_registration_is_positive(values: tuple[float, float]) -> None:
+    with pytest.raises(InputError, match="expected a positive number"):
+        Registration(*values)

@@ -1,0 +1,34 @@
+"""What an estimate prints of tissue averaged over causes."""
+
+import numpy as np
+import pytest
+from synthetic import WHITE, block
+
+from warpbrain.estimation.parameters import Parameters
+from warpbrain.inference.causes import Kind
+from warpbrain.report.estimate_text import averaged_lines
+from warpbrain.worlds.body.averaged_tissue import AveragedTissue, LikelyCause
+
+
+def averaged(nothing: float) -> AveragedTissue:
+    means = np.log([[1000.0], [2000.0]])
+    return AveragedTissue(
+        Parameters.of(block({"brain": WHITE}, "pushed")),
+        nothing,
+        (LikelyCause("pressure", Kind.PHYSICS, 1.0 - nothing), LikelyCause("mesh", Kind.NOT_PHYSICS, 0.01)),
+        np.array([nothing, 1.0 - nothing]),
+        means,
+        np.full((2, 1, 1), 0.01),
+    )
+
+
+def test_what_is_more_probable_than_nothing_is_printed():
+    first, causes, _, row = averaged_lines(averaged(0.0))
+    assert first.endswith("case says: below 0.01")
+    assert causes == "  what may act: pressure above 0.99"
+    assert row.split()[:3] == ["brain", "shear", "modulus"] and row.split()[-1] == "Pa"
+    assert [float(word) for word in row.split()[3:5]] == pytest.approx([2000.0, 200.0])
+
+
+def test_where_nothing_is_the_most_probable_only_that_is_printed():
+    assert averaged_lines(averaged(0.6)) == ["  probability that nothing acts but what the case says: 0.60"]

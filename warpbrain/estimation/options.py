@@ -1,0 +1,45 @@
+"""How to estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from warpbrain.errors import InputError
+from warpbrain.estimation.discretisation import Discretisation
+from warpbrain.estimation.likelihood import Likelihood
+from warpbrain.estimation.registration import Registration
+
+
+@dataclass(frozen=True)
+class EstimationOptions:
+    """How to estimate.
+
+    Attributes
+    ----------
+    likelihood : Likelihood
+    discretisation : Discretisation or None
+        None: the mesh is taken for exact, and the estimate holds for this mesh only.
+    registration : Registration or None
+        None: positions are taken as they were recorded.
+    samples : int
+        Draws that check Laplace's approximation, an equilibrium each.
+    chain : int
+        Equilibria of the chain that replaces it where it fails.
+    seed : int
+        Of those draws.
+    tolerance : float
+        Of Gauss-Newton, see `GaussNewtonOptions`.
+    """
+
+    likelihood: Likelihood = field(default_factory=Likelihood)
+    discretisation: Discretisation | None = field(default_factory=Discretisation)
+    registration: Registration | None = field(default_factory=Registration)
+    samples: int = 40
+    chain: int = 300
+    seed: int = 0
+    tolerance: float = 3e-3
+
+    def __post_init__(self) -> None:
+        for name, least in (("samples", 25), ("chain", 10), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise InputError(f"{name} = {getattr(self, name)}: expected a whole number of at least {least}")

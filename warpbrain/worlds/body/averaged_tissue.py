@@ -1,0 +1,107 @@
+"""Tissue averaged over what may act on a body: that of each set of causes, weighed by the probability of the set.
+
+With the probability `P(S)` of each set S, and mean `m_S` and covariance `C_S` of the tissue in the linear model with S,
+
+    p(theta) = sum P(S) N(theta; m_S, C_S),  m = sum P(S) m_S,  C = sum P(S) (C_S + (m_S - m) (m_S - m)^T)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.estimation.parameters import Parameters
+from warpbrain.inference.causes import Kind
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LikelyCause:
+    """Something that may act, and the probability that it does, whatever else acts."""
+
+    name: str
+    kind: Kind
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class AveragedTissue:
+    """A mixture of normal distributions of `theta`, one for each set of causes.
+
+    Attributes
+    ----------
+    parameters : Parameters
+        What `theta` means.
+    nothing : float
+        Probability that nothing acts but what the case says.
+    causes : tuple of LikelyCause
+        The most probable first.
+    probabilities : (s,) array
+        Of the sets.
+    means : (s, p) array
+    covariances : (s, p, p) array
+    """
+
+    parameters: Parameters
+    nothing: float
+    causes: tuple[LikelyCause, ...]
+    probabilities: Floats
+    means: Floats
+    covariances: Floats
+
+    @property
+    def mean(self) -> Floats:
+        """Of `theta`, shape (p,)."""
+        return self.probabilities @ self.means
+
+    @property
+    def covariance(self) -> Floats:
+        """Of `theta`, shape (p, p)."""
+        away = self.means - self.mean
+        each = self.covariances + away[:, :, None] * away[:, None, :]
+        return np.asarray(np.tensordot(self.probabilities, each, 1))
+
+    def interval(self, probability: float) -> Floats:
+        """Ends (p, 2) between which a parameter is with a probability, as much below as above."""
+        from scipy.optimize import brentq
+        from scipy.special import ndtr, ndtri
+
+        tails = 0.5 * (1.0 - probability), 0.5 * (1.0 + probability)
+        found = np.empty((len(self.mean), 2))
+        for k, ends in enumerate(found):
+            means, deviations = self.means[:, k], np.sqrt(self.covariances[:, k, k])
+            for side, tail in enumerate(tails):
+                # a quantile of a mixture is between those of its parts
+                parts = means + ndtri(tail) * deviations
+                low, high = parts.min() - deviations.max(), parts.max() + deviations.max()
+                ends[side] = brentq(
+                    lambda x, m=means, s=deviations, q=tail: self.probabilities @ ndtr((x - m) / s) - q, low, high
+                )
+        return found
+
+
+def averaged_tissue(search: HypothesisSearch) -> AveragedTissue:
+    """Tissue averaged over the sets of a search that were weighed."""
+    base, weighed, probabilities = search.base, search.weighed, search.probabilities
+    part, prior = base.nuisances.part("tissue"), base.prior
+    means, covariances = [], []
+    causes: dict[tuple[str, Kind], float] = {}
+    for one, probability in zip(weighed, probabilities.tolist(), strict=True):
+        xi, covariance = one.marginal.model.coefficients(one.residual)
+        means.append(prior.mean + prior.factor @ xi[part])
+        covariances.append(prior.factor @ covariance[part, part] @ prior.factor.T)
+        for cause in zip(one.hypothesis.causes, one.hypothesis.kinds, strict=True):
+            causes[cause] = causes.get(cause, 0.0) + probability
+    likely = sorted(causes.items(), key=lambda item: -item[1])
+    return AveragedTissue(
+        base.states.parameters,
+        sum(p for one, p in zip(weighed, probabilities.tolist(), strict=True) if not one.names),
+        tuple(LikelyCause(name, kind, probability) for (name, kind), probability in likely),
+        probabilities,
+        np.array(means),
+        np.array(covariances),
+    )

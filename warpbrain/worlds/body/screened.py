@@ -1,0 +1,80 @@
+"""From a case to its sets of causes, weighed in the linear model about its base."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+from warpbrain.cases.case import Case
+from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.threads import one_thread_of_blas
+from warpbrain.worlds.body.base import BaseFinder
+from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
+from warpbrain.worlds.body.not_physics import not_physics_at
+from warpbrain.worlds.body.observable import require_observable
+from warpbrain.worlds.body.states import States
+from warpbrain.worlds.listener import Listener
+
+
+def _untimed(_stage: str) -> AbstractContextManager[Any]:
+    return nullcontext()
+
+
+def screened(
+    case: Case,
+    device: str | None = None,
+    listener: Listener | None = None,
+    prior: Gaussian | None = None,
+    *,
+    mesh_error: bool = True,
+    without_nuisances: bool = False,
+    mechanisms: Sequence[str] | None = None,
+    timed: Callable[[str], AbstractContextManager[Any]] = _untimed,
+) -> HypothesisSearch:
+    """Sets of causes of a case.
+
+    Parameters
+    ----------
+    case : Case
+    device : str, optional
+        Warp device.
+    listener : Listener, optional
+    prior : Gaussian, optional
+        Of the tissues' parameters; that of a diagnosis unless given.
+    mesh_error : bool
+        False: the mesh is taken for exact.
+    without_nuisances : bool
+        Whether mechanisms are credited with what is no physics, too.
+    mechanisms : sequence of str, optional
+        Kinds that are looked for; all by default.
+    timed : callable, optional
+        A context in which each stage is done, by its name.
+
+    Raises
+    ------
+    InputError
+        If there are too few recordings.
+    SolveError
+        If the case as declared has no equilibrium.
+    """
+    require_observable(case)
+    listener = listener or Listener()
+    states = States(case, device)
+    dictionary = dictionary_of(case, mechanisms, len(states.times))
+    spacing = dictionary.situation.spacing
+    with one_thread_of_blas():
+        with timed("base"):
+            base = BaseFinder(states, spacing, mesh_error, without_nuisances, listener, prior).find()
+        with timed("candidates"):
+            candidates = candidates_at(
+                dictionary,
+                base.effects,
+                not_physics_at(base.at, base.nuisances),
+                lambda kind: listener.stage(f"candidate: {kind}"),
+            )
+        search = HypothesisSearch(base, candidates, spacing, listener)
+        with timed("screening"):
+            search.screen()
+    return search
