@@ -11,6 +11,8 @@ from typing import Any
 
 from common import RESULTS, ROOT
 
+from warpbrain.inference.probability import percent
+
 PAGE = ROOT / "docs" / "proof-recordings.md"
 STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what was added"}
 
@@ -40,7 +42,7 @@ def verdicts(cases: dict[str, Any]) -> str:
                 f"**{said['verdict']}**",
                 named or " / ".join(said["group"]),
                 " + ".join(best["causes"]) or "nothing",
-                f"{best['probability']:.2f}, {best['log_evidence']:+.0f}",
+                f"{percent(best['probability'])}, {best['log_evidence']:+.0f}",
             ]
         )
     return table(["", "verdict", "named, or among", "most probable set", "its probability, log evidence"], rows)
