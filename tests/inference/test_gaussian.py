@@ -60,3 +60,12 @@ def test_draws_have_the_covariance() -> None:
     one = model()
     squares = np.sum(one.standardised(one.draws(4000, np.random.default_rng(1))) ** 2, axis=0)
     assert stats.kstest(squares, stats.chi2(N).cdf).pvalue > 1e-3
+
+
+def test_standardised_at_several_scales_is_as_at_each() -> None:
+    rng = np.random.default_rng(3)
+    factor = np.tril(rng.normal(size=(9, 9))) + 4.0 * np.eye(9)
+    model = GaussianModel(factor, rng.normal(size=(9, 3)))
+    rows, scales = rng.normal(size=(9, 4)), [0.5, 1.0, 3.0]
+    for scale, found in zip(scales, model.standardised_at(scales, rows), strict=True):
+        assert np.allclose(found, GaussianModel(factor, model.columns, scale).standardised(rows), rtol=0.0, atol=1e-12)

@@ -217,6 +217,10 @@ class Term(abc.ABC):
             1 for the components of `x` that count, and for those of `y` that are added to; 0 for others.
         """
 
+    def skew_stiffness(self, u: NDArray[np.float64]) -> Any:
+        """What of its tangent [N/m] is skew, which no block holds, SciPy sparse (3 n, 3 n); None if nothing is."""
+        return None
+
     def nodal_pressures(self) -> dict[str, NDArray[np.float64]]:
         """Pressures of its own at the nodes (n,) [Pa], by name, where the forces were last evaluated."""
         return {}

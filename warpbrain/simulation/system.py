@@ -477,6 +477,12 @@ class System:
         K = bsr_matrix((values, self.matrix.columns.numpy(), self.matrix.offsets.numpy()))
         return K if self._beyond_blocks is None else K + self._beyond_blocks.stiffness()
 
+    def skew_stiffness(self) -> Any:
+        """What `stiffness` lacks at `u`: the skew part of terms without a potential, SciPy; None if there is none."""
+        u = self.u.numpy().astype(np.float64)
+        parts = [part for term in self.terms if not term.conservative and (part := term.skew_stiffness(u)) is not None]
+        return sum(parts[1:], start=parts[0]) if parts else None
+
     @property
     def coupled(self) -> bool:
         """Whether unknowns of a term's own follow the displacement in the coming steps."""

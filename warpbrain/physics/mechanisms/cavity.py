@@ -9,7 +9,7 @@ A fluid at the pressure `p` presses on the wall, the faces between the set and t
 the load of `pressure` on the wall of a `resection`, which is the limit for `r` to 0. A set that reaches the surface of
 the body has an open wall, and the faces of the set on that surface carry nothing: what closes the opening (skull,
 dura, a dressing) bears the fluid there. What the rim of an open wall does is said in `pressure`: if it moves, the load
-has no energy, the skew part of the tangent along it is left out, and Newton's method converges linearly.
+has no energy, and linear solvers leave out the skew part of the tangent along it.
 
 What other mechanisms add to the law of these elements (fibres, residual stress, viscosity) is taken out with them. What
 acts on them (a pressure or a traction on their faces, fluid in their pores) would act on nothing, and is refused.

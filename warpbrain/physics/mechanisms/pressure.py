@@ -14,7 +14,7 @@ acts along the rim alone:
 
     K_ab = -p/2 int N_a N_b [dx]                        along the rim, as the triangles run along it
 
-It is left out: every linear solver here is one for symmetric matrices, and it is small, about the pressure beside the
+Linear solvers of the equilibrium are for symmetric matrices and leave it out; it is about the pressure beside the
 shear modulus. Forces are exact, so the equilibrium is. Newton's method learns what is missing from the steps that it
 has taken (`warpbrain.simulation.multisecant`): -1.2 kPa on the wall of 0529's resection take 8 iterations, 10 without
 that. The line search takes the work along a step for the change of energy. No cap is put on an opening: its pressure
@@ -50,6 +50,7 @@ from warpbrain.physics.triangle_term import TriangleTerm
 from warpbrain.physics.words import HARDLY, Values, measured, unsure
 
 Ints = NDArray[np.int32]
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,6 +176,32 @@ class PressureTerm(TriangleTerm):
             ramp,
         )
         self.conservative = value == 0.0 or not body.movable[rim].any()
+        self._rim = np.unique(rim)
+
+    def skew_stiffness(self, u: Floats) -> Any:
+        """See `Term`: of the nodes of the rim alone. Forces are quadratic in `u`, so that differences are exact."""
+        from scipy.sparse import coo_matrix
+
+        components = (3 * self._rim[:, None] + np.arange(3)).ravel()
+        step = float(np.ptp(self.body.mesh.points, axis=0).max())
+        columns = []
+        for component in components.tolist():
+            sides = []
+            for sign in (1.0, -1.0):
+                beside = u.copy()
+                beside.ravel()[component] += sign * step
+                sides.append(self._nodal_forces(beside).ravel()[components])
+            columns.append((sides[0] - sides[1]) / (2.0 * step))
+        skew = 0.5 * (np.column_stack(columns) - np.array(columns))
+        rows, others = np.meshgrid(components, components, indexing="ij")
+        return coo_matrix((skew.ravel(), (rows.ravel(), others.ravel())), shape=(u.size, u.size)).tocsr()
+
+    def _nodal_forces(self, u: Floats) -> Floats:
+        """Internal forces (n, 3) [N] at a displacement."""
+        self.evaluate_forces(self.array(u, self.body.precision.vec3))
+        found = np.zeros(u.shape)
+        np.add.at(found, self.stencils, self.forces.numpy())
+        return found
 
 
 @cache

@@ -26,7 +26,7 @@ _TOGETHER = 16
 
 
 class Factors:
-    """Factors of a symmetric positive definite matrix.
+    """Factors of a positive definite matrix, symmetric if they are on a GPU, all but symmetric on the host.
 
     Parameters
     ----------
@@ -49,11 +49,14 @@ class Factors:
         except RuntimeError as error:
             raise SolveError(f"the state is unstable: its tangent stiffness cannot be factorised ({error})") from None
 
-    def solve(self, columns: Any) -> Floats:
-        """What answers to columns (n, k), an array or SciPy sparse: (n, k), column after column in memory."""
+    def solve(self, columns: Any, transposed: bool = False) -> Floats:
+        """What answers to columns (n, k), an array or SciPy sparse: (n, k), column after column in memory.
+
+        `transposed`: of the matrix the other way round.
+        """
         if self._dense is not None:
             return self._dense.solve(columns)
-        return self._filled(columns, columns.shape[0], lambda found: found)
+        return self._filled(columns, columns.shape[0], lambda found: found, "T" if transposed else "N")
 
     def between(self, left: Any, columns: Any) -> Floats:
         """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k), dense a block at a time only."""
@@ -61,7 +64,7 @@ class Factors:
             return self._dense.between(left, columns)
         return self._filled(columns, left.shape[0], lambda found: left @ found)
 
-    def _filled(self, columns: Any, rows: int, of: Callable[[Floats], Floats]) -> Floats:
+    def _filled(self, columns: Any, rows: int, of: Callable[[Floats], Floats], trans: str = "N") -> Floats:
         """What is made of the answers to each block, beside each other."""
         from scipy.sparse import issparse
 
@@ -71,7 +74,7 @@ class Factors:
         def solve_block(some: slice) -> Floats:
             block = columns[:, some]
             block = block.toarray() if issparse(block) else block
-            return of(self._factors.solve(np.asfortranarray(block, dtype=np.float64)))
+            return of(self._factors.solve(np.asfortranarray(block, dtype=np.float64), trans))
 
         fill_columns(made, solve_block, _TOGETHER)
         return made

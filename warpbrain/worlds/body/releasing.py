@@ -64,7 +64,7 @@ class HeldSurface:
         own = np.repeat(members, 3)
         towards = stiffness[free][:, own].tocsc()
         whole = np.asarray(stiffness[own][:, own].todense())
-        whole -= factors.between(towards.T, towards)
+        whole -= factors.between(stiffness[own][:, free], towards)
         self._towards = towards
         # two tangents and the normal
         along = tangents(normals[self.members])
