@@ -1,7 +1,7 @@
 """What a device is told of a mesh and of a pattern: made once for each mesh, and read by every system of it.
 
-Nothing here changes with a model's numbers, and no system writes to it. Meshes that differ in their node sets only share
-it, and it lives as long as one of them does.
+Nothing here changes with a model's numbers, and no system writes to it. Meshes that differ in their node sets only
+share it, and it lives as long as one of them does.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
-from typing import Any
 
 import numpy as np
 import warp as wp

@@ -207,14 +207,14 @@ class HypothesisSearch:
 
     def _wanted(self) -> Weighed | None:
         """The set to be fitted, or looked beside, next; None if the verdict does not depend on any."""
-        verdict = self._verdict()
+        verdict = self._losses()[0]
         spoken = [one for one in self.weighed if frozenset(one.mechanisms) == frozenset(verdict.causes)]
         if spoken[:1] and spoken[0].mechanisms and not self._done(spoken):
             return next((one for one in spoken if one.refit is not None), spoken[0])
         chances = zip(self.weighed, self.probabilities.tolist(), strict=True)
         waiting = [(chance, one) for one, chance in chances if chance > _WORTH and one.refit is None and not one.why]
         waiting.sort(key=lambda each: -each[0])
-        return next((one for _, one in waiting if self._may_change(one, verdict)), None)
+        return next((one for _, one in waiting if self._matters(one, verdict)), None)
 
     def _done(self, spoken: list[Weighed]) -> bool:
         """Whether nothing is left to do about sets of what is named: one is fitted and looked beside."""
@@ -223,18 +223,20 @@ class HypothesisSearch:
             return all(one.why for one in spoken)
         return any(one.names in self._spread or len(one.names) > 2 for one in fitted)
 
-    def _verdict(self, other: Weighed | None = None, change: float = 0.0) -> Decision:
-        """What is decided; as it would be if the evidence of a set was another."""
-        each = [
-            one if one is not other else one.with_evidence(one.hypothesis.log_evidence + change) for one in self.weighed
-        ]
-        hypotheses = [one.hypothesis for one in each]
-        return decide(hypotheses, calibration().probabilities(hypotheses), calibration().losses)[0]
+    def _losses(self, other: Weighed | None = None, change: float = 0.0) -> tuple[Decision, dict[Decision, float]]:
+        """The verdict and expected losses of all; as they would be if the evidence of a set was another."""
+        hypotheses = [one.hypothesis for one in self.weighed if one is not other]
+        if other is not None:
+            hypotheses.append(other.with_evidence(other.hypothesis.log_evidence + change).hypothesis)
+        return decide(hypotheses, calibration().probabilities(hypotheses), calibration().losses)
 
-    def _may_change(self, one: Weighed, verdict: Decision) -> bool:
-        """Whether the verdict depends on what a fit of a set may find."""
-        change = belief("fits.change")
-        return any(self._verdict(one, sign * change) != verdict for sign in (-1.0, 1.0))
+    def _matters(self, one: Weighed, verdict: Decision) -> bool:
+        """Whether the verdict would be regretted if a fit found what it may find of a set."""
+        for sign in (-1.0, 1.0):
+            other, losses = self._losses(one, sign * belief("fits.change"))
+            if losses.get(verdict, np.inf) - losses[other] > belief("fits.regret"):
+                return True
+        return False
 
     def _first_for(self, one: Weighed) -> frozenset[str]:
         """The set itself, or one of a cause less that is to be fitted, or looked beside, before it.
@@ -298,16 +300,17 @@ class HypothesisSearch:
         self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
         one = self._placed(one) if one.refit is None and len(names) <= 2 else one
         begins = [one.coordinates]
-        nothing = self._weighed[frozenset()].refit
+        nothing, smaller = self._weighed[frozenset()].refit, self._smaller(one)
         near = None
-        if nothing is not None:
+        if nothing is not None and smaller is None:
             q = len(nothing.nuisances)
             beside = np.column_stack([nothing.columns, one.columns[:, q:]])
             model = GaussianModel(one.marginal.noise.noise_factor, beside)
             begins.append(model.coefficients(nothing.linear + one.residual - self.base.residual)[0])
             near = nothing.state
+        about = None if smaller is None else (smaller, one.columns)
         try:
-            refit = self.fits.fit(one.effects, one.extra, begins, one.marginal, near)
+            refit = self.fits.fit(one.effects, one.extra, begins, one.marginal, near, about)
         except (SolveError, InputError) as error:
             self._weighed[names] = replace(one, why=str(error))
             return
@@ -322,6 +325,11 @@ class HypothesisSearch:
                     self._weighed[other.names] = replace(gained, inherited=gain)
         fitted = replace(one, residual=refit.linear, columns=refit.columns, marginal=refit.marginal, refit=refit)
         self._weighed[names] = fitted.with_evidence(one.hypothesis.log_evidence - one.inherited + gain)
+
+    def _smaller(self, one: Weighed) -> Refit | None:
+        """The fit that a set is linear about, of all its causes but one; None if it is about the base."""
+        names = next((names for names in self._spread if names < one.names), None)
+        return None if names is None or one.refit is not None else self._weighed[names].refit
 
     def _placed(self, one: Weighed) -> Weighed:
         """A set with its mechanisms at the best places of their cells."""
