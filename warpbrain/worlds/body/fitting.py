@@ -264,8 +264,12 @@ class _Search:
                 self.columns, self._made_at = self._columns_here(), self.z
                 if solved:
                     self.columns = self._columns_solved()
-            step = self._step()
+            step, here = self._step(), np.array_equal(self._made_at, self.z)
             if not self._stepped(step):
+                if anew and not here and np.abs(step).max() >= 2.0 * _SHORT:
+                    # columns made elsewhere point elsewhere
+                    self._made_at = np.full(len(self.z), np.inf)
+                    continue
                 # what is left is rounding, or nothing better lies this way: the last good point stands
                 self.converged = bool(np.abs(step).max() < 2.0 * _SHORT)
                 if self.converged or solved or not anew or not any(one.proposed.history for one in self._effects):
@@ -391,10 +395,6 @@ class _Search:
     def begin_about(self, smaller: Refit, columns: Floats) -> None:
         """Take columns about a fit with the first of the effects, and what that knows of the mesh's error."""
         self.columns = columns
-        first, coefficients = self._U.shape[1], np.concatenate(smaller.coefficients)
-        self._made_at = np.zeros(len(self.z))
-        self._made_at[: len(smaller.nuisances)] = smaller.nuisances
-        self._made_at[first : first + len(coefficients)] = coefficients
         if smaller.share is not None:
             self._share = smaller.share.among(len(self.z) - self._U.shape[1])
 
