@@ -23,7 +23,7 @@ from warpbrain.simulation.extrapolated import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, Effects, parts_of
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected, expected_answer
+from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected, expected_answer
 from warpbrain.worlds.body.nuisances import field_columns, mesh_by_tissue, registration_sd, tissue_columns
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
 
@@ -385,7 +385,7 @@ class _Search:
         if (length < 1e-6 and any(sized)) or changing:
             return False
         try:
-            error = self._fits.finer.of_fit(self.state.hypothesis, self.state)
+            error = self._fits.finer.error(self.state.hypothesis, self.state, ENOUGH)
         except SolveError:
             return False
         answer = self._fits.beyond(known, error, self.state)
