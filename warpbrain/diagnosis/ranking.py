@@ -133,9 +133,11 @@ def _place(member: _Member, scanned: tuple[Effect, ...], weights: Floats) -> tup
         return proposed.place(member.effect.coefficients(member.mean))
     if proposed.centre is None:
         return None, None
-    located = [k for k, effect in enumerate(scanned) if effect.proposed.centre is not None]
+    located = [k for k, effect in enumerate(scanned) if effect.proposed.centre is not None and weights[k] > 0.0]
+    if not located:
+        return proposed.centre, proposed.radius
     sites = np.array([scanned[k].proposed.centre for k in located])
-    centre, radius = ball_of(sites, weights[located] / max(float(weights[located].sum()), 1e-300))
+    centre, radius = ball_of(sites, weights[located])
     return centre, max(radius, float(proposed.radius or 0.0))
 
 
