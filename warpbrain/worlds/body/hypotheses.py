@@ -126,7 +126,9 @@ class HypothesisSearch:
     @property
     def weighed(self) -> tuple[Weighed, ...]:
         """The most probable first."""
-        return tuple(sorted(self._weighed.values(), key=lambda one: -_log_posterior(one)))
+        found = list(self._weighed.values())
+        chances = calibration().probabilities([one.hypothesis for one in found])
+        return tuple(found[k] for k in np.argsort(-chances, kind="stable").tolist())
 
     @property
     def probabilities(self) -> Floats:
@@ -377,6 +379,3 @@ def _worth_looking_at(found: Posterior, singles: bool = True) -> list[Hypothesis
     best = list(found.hypotheses[:_SETS])
     return best + [one for one in found.hypotheses[_SETS:] if not one.causes or (singles and len(one.causes) == 1)]
 
-
-def _log_posterior(one: Weighed) -> float:
-    return one.hypothesis.log_evidence + one.hypothesis.log_prior
