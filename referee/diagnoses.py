@@ -23,6 +23,7 @@ UNKNOWN = "unknown"
 NOT_PHYSICS = "not physics"
 _UNITS = {"": 1.0, "1": 1.0, "%": 0.01, "mm": 1e-3, "m": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N": 1.0, "s": 1.0} | {
     "1/Pa": 1.0,
+    "kg/m3": 1.0,
     "1/(Pa s)": 1.0,
     "m4/(N s)": 1.0,
 }
@@ -106,7 +107,7 @@ class Diagnosis:
     heldout : dict of str to float
         Error at what was not fitted [m]: declared, refitted, explained, as far as it is told.
     hypotheses : tuple of Tried
-        Every set of causes that has a probability.
+        Sets of causes that are told, the most probable first.
     """
 
     verdict: str

@@ -15,6 +15,7 @@ from referee.intervals import Share
 from referee.outcomes import read_outcomes
 from referee.scores import amounts, calibration, confusion, shares
 from warpbrain.errors import InputError
+from warpbrain.physics.mechanisms import mechanisms
 
 
 @pytest.mark.parametrize(("hits", "of"), [(0, 24), (1, 24), (23, 24), (24, 24), (5, 9)])
@@ -26,6 +27,14 @@ def test_intervals_are_exact(hits, of):
         # by definition: as few, and as many, are just plausible at the ends
         assert binom.sf(hits - 1, of, low) == pytest.approx(0.025)
         assert binom.cdf(hits, of, high) == pytest.approx(0.025)
+
+
+def test_the_unit_of_every_parameter_is_known(tmp_path):
+    for kind, mechanism in mechanisms().items():
+        told = {name: {"value": 2.0, "sd": 1.0, "unit": says.unit} for name, says in mechanism.parameters().items()}
+        found = outcome(tmp_path, label("c"), diagnosis("named", kind, 0.9, parameters=told)).said.parameters
+        for name, says in mechanism.parameters().items():
+            assert found[name] == pytest.approx((2.0 * says.si, says.si)), (kind, name)
 
 
 @pytest.fixture
