@@ -63,7 +63,7 @@ def test_the_referee_reads_all_of_it(small_diagnosis, verdict, tmp_path):
     kinds = {Kind.UNKNOWN: "unknown", Kind.NOT_PHYSICS: "not physics"}
     for tried, one in zip(read.hypotheses, told.combinations, strict=True):
         assert tried.causes == {kinds.get(kind, name) for name, kind in zip(one.causes, one.kinds, strict=True)}
-        assert tried.log_density == one.log_evidence + one.log_prior
+        assert (tried.log_density, tried.probability) == (one.log_evidence + one.log_prior, one.probability)
     ranked = {one.kind: one.probability for one in told.ranking}
     assert {row.name: row.probability for row in read.tried} == {n: ranked[n] for n in (r.name for r in read.tried)}
     assert {row.name for row in read.ranking if row.alternative} == {
