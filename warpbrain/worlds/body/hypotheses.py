@@ -378,4 +378,3 @@ def _worth_looking_at(found: Posterior, singles: bool = True) -> list[Hypothesis
     """The most probable sets, none, and every single cause if asked for."""
     best = list(found.hypotheses[:_SETS])
     return best + [one for one in found.hypotheses[_SETS:] if not one.causes or (singles and len(one.causes) == 1)]
-
