@@ -29,15 +29,12 @@ class HeldOutErrors:
         Of the error that is gone.
     patterns : (low, high)
         Errors [m] between which nine of ten patterns that mean nothing are.
-    patterns_p : float
-        Probability that one of them does as well.
     """
 
     without: Prediction
     explained: Prediction
     improvement: tuple[float, float, float]
     patterns: tuple[float, float]
-    patterns_p: float
 
 
 class Confirming:
@@ -132,7 +129,6 @@ class Confirming:
             explained,
             way.improvement(explained, without, self._random),
             (low, high),
-            share_of_patterns(explained, patterns),
         )
 
     def ceiling(self, nothing: Weighed, way: HeldOut) -> float:
