@@ -135,6 +135,16 @@ class HypothesisSearch:
         """Of `weighed`."""
         return calibration().probabilities([one.hypothesis for one in self.weighed])
 
+    @property
+    def log_bayes_factor(self) -> float:
+        """Of anything that may act over nothing, summed over all sets that were weighed, each as probable as it was."""
+        sets = [one.hypothesis for one in self._weighed.values()]
+        something = [one.log_evidence + one.log_prior for one in sets if one.causes]
+        nothing = next(one.log_evidence for one in sets if not one.causes)
+        # odds that any of them acts, before anything was recorded
+        odds = np.expm1(np.sum(np.log1p(np.exp([cause.log_prior for cause in self.causes.causes]))))
+        return float(np.logaddexp.reduce(something) - np.log(odds) - nothing) if something else 0.0
+
     def get(self, names: Iterable[str]) -> Weighed | None:
         """A set, if it was weighed."""
         return self._weighed.get(frozenset(names))
