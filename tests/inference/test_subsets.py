@@ -9,7 +9,7 @@ from scipy.special import logsumexp
 
 from warpbrain.inference.causes import Cause, Place
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.subsets import Search, posterior
+from warpbrain.inference.subsets import Search, likely_places, posterior
 
 N = 30
 SCALES = Search(np.array([0.8, 1.25]), np.log([0.4, 0.6]), negligible=1e-12, beam=10_000)
@@ -119,3 +119,24 @@ def test_probabilities_are_calibrated_over_draws_of_the_model(verify) -> None:
         3.0,
         "standard deviations",
     )
+
+
+def test_likely_places_are_those_of_the_greatest_density():
+    random = np.random.default_rng(11)
+    one, causes, residual = model(random), some_causes(random), 2.0 * random.normal(size=N)
+    found = likely_places(one, residual, causes, 2)
+    for cause in causes:
+        total = sum(place.weight for place in cause.places)
+        density = [
+            logsumexp(
+                [
+                    one.with_columns(size * place.columns).log_density(
+                        residual - (0.0 if place.mean is None else place.mean)
+                    )
+                    for size in cause.sizes
+                ]
+            )
+            + np.log(place.weight / total)
+            for place in cause.places
+        ]
+        assert set(found[cause.name].tolist()) == set(np.argsort(density)[-2:].tolist())

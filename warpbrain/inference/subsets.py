@@ -183,6 +183,25 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
     return Posterior(tuple(sorted(found, key=lambda one: -(one.log_evidence + one.log_prior))))
 
 
+def likely_places(
+    model: GaussianModel, residual: Floats, causes: Sequence[Cause], most: int
+) -> dict[str, NDArray[np.int64]]:
+    """Numbers of the most probable places of each cause by its name, alone and at the scale of a model.
+
+    Parameters
+    ----------
+    model : GaussianModel
+        Of rows (n,) on which no cause acts.
+    residual : (n,) array
+    causes : sequence of Cause
+    most : int
+        Places of each cause at most.
+    """
+    blocks = Blocks(model, residual, causes)
+    chosen = _best_places(blocks, blocks.log_factors() + blocks.log_weights, most)
+    return {cause.name: blocks.place[chosen[blocks.cause[chosen] == c]] for c, cause in enumerate(causes)}
+
+
 def _best_places(blocks: Blocks, logs: Floats, most: int) -> NDArray[np.int64]:
     """Numbers of the best blocks of each cause."""
     of_block = np.logaddexp.reduce(logs, axis=1)

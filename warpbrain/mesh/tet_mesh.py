@@ -202,6 +202,11 @@ class TetMesh:
         """Meshes made of this one, which others share that differ in their node sets only."""
         return {}
 
+    @property
+    def shared(self) -> dict[str, Any]:
+        """What was made of its elements, of all meshes alike that differ from it in their node sets only."""
+        return self._made
+
     @cached_property
     def finer(self) -> tuple[TetMesh, Ints]:
         """The mesh with every tetrahedron cut into eight, and between which nodes its own lie; made once.

@@ -1,6 +1,7 @@
 """What a device is told of a mesh and of a pattern: made once for each mesh, and read by every system of it.
 
-Nothing here changes with a model's numbers, and no system writes to it. It lives as long as the mesh does.
+Nothing here changes with a model's numbers, and no system writes to it. Meshes that differ in their node sets only
+share it, and it lives as long as one of them does.
 """
 
 from __future__ import annotations
@@ -8,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
-from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import warp as wp
@@ -60,12 +59,13 @@ class PlacedPattern:
     corners: wp.array
 
 
-_placed: WeakKeyDictionary[TetMesh, dict[Any, Any]] = WeakKeyDictionary()
+#: Patterns of one mesh at most: those of a finer mesh take a tenth of a gigabyte.
+_PATTERNS = 6
 
 
 def placed_mesh(mesh: TetMesh, device: wp.Device, precision: Precision) -> PlacedMesh:
     """The elements of a mesh on a device."""
-    known, key = _placed.setdefault(mesh, {}), (device.alias, precision.name)
+    known, key = mesh.shared.setdefault("placed", {}), (device.alias, precision.name)
     if key not in known:
         tetrahedra = np.sort(mesh.tetrahedra, axis=1)
         edges = mesh.points[tetrahedra[:, 1:]] - mesh.points[tetrahedra[:, :1]]
@@ -83,8 +83,10 @@ def placed_pattern(
     for nodes in stencils:
         said.update(str((nodes.shape, nodes.dtype)).encode())
         said.update(np.ascontiguousarray(nodes).tobytes())
-    known, key = _placed.setdefault(mesh, {}), (device.alias, count, said.digest())
+    known, key = mesh.shared.setdefault("patterns", {}), (device.alias, count, said.digest())
     if key not in known:
+        for oldest in list(known)[: max(len(known) + 1 - _PATTERNS, 0)]:
+            known.pop(oldest, None)
         pattern = build_pattern(stencils, count)
         kinds = {"pairs": wp.vec2i, "positions": wp.vec2i}
         known[key] = PlacedPattern(

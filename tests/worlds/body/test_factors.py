@@ -34,3 +34,12 @@ def test_equilibria_are_the_same_in_any_number_of_threads(monkeypatch):
 def test_a_singular_matrix_is_said():
     with pytest.raises(SolveError, match="unstable"):
         Factors(csr_array(np.ones((3, 3))))
+
+
+def test_the_transposed_of_a_matrix_that_is_not_symmetric():
+    dense, rng = _matrix()
+    dense[3, 5:9] += 0.5
+    columns = rng.normal(size=(60, 20))
+    factors = Factors(csr_array(dense), symmetric=False)
+    np.testing.assert_allclose(dense @ factors.solve(columns), columns, atol=1e-10)
+    np.testing.assert_allclose(dense.T @ factors.solve(columns, transposed=True), columns, atol=1e-10)

@@ -7,6 +7,7 @@ import pytest
 from sinking_block import OPTIONS, write_sinking
 
 from warpbrain.inference import GaussianModel
+from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import NAMED, decide
 from warpbrain.inference.marginal import marginal
@@ -58,3 +59,17 @@ def test_sets_say_what_they_are(search):
         assert one.columns.shape[0] == len(one.residual) == len(search.base.residual)
         widths = sum(effect.columns.shape[1] for effect in one.effects) + one.extra.shape[1]
         assert one.columns.shape[1] == search.base.nuisances.columns.shape[1] + widths
+
+
+def test_no_set_that_is_not_fitted_would_change_the_verdict(search):
+    verdict, _ = decide([one.hypothesis for one in search.weighed], search.probabilities, calibration().losses)
+    for one in search.weighed:
+        if one.refit is not None or one.why:
+            continue
+        for change in (-belief("fits.change"), belief("fits.change")):
+            others = [
+                other.with_evidence(other.hypothesis.log_evidence + change * (other is one)).hypothesis
+                for other in search.weighed
+            ]
+            best, losses = decide(others, calibration().probabilities(others), calibration().losses)
+            assert losses[verdict] - losses[best] <= belief("fits.regret")

@@ -1,11 +1,13 @@
 """The state that everything is compared at: the case as declared, its tissue refitted beside any smooth force.
 
 Nuisances fitted as if nothing were missing imitate what is missing; fitted beside a force that may be anything they do
-not. Where the load is large one round from the declared state is not enough: columns there are off by a third.
+not. Where the load is large one round from the declared state is not enough: columns there are off by a third. In the
+rounds after it they serve as well, since residuals are those of the state that was reached.
 """
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -155,9 +157,8 @@ class BaseFinder:
         self._listener.stage("the case as declared")
         first = self.states.solve(self._declared())
         self._listener.stage("tissue beside any smooth force")
-        state = first
+        state, rough = first, _Linear(self, first, None)
         for _ in range(_ROUNDS):
-            rough = _Linear(self, state, None)
             hypothesis = self._freed(rough)
             before, after = (rough.nuisances.coordinates(self.prior, one) for one in (state.hypothesis, hypothesis))
             try:
@@ -168,6 +169,7 @@ class BaseFinder:
                 break
             if np.abs(after - before).max() < _NEAR:
                 break
+            rough = rough.moved(state)
         self._listener.stage("the error of the mesh, and the compliance of the body at the sensors")
         errors = self._errors_of_mesh(state)
         if errors is not None:
@@ -250,9 +252,8 @@ class _Linear:
         nuisances = nuisances_at(self.at, states, state.hypothesis.theta, finder.prior, self.effects, errors)
         self.nuisances = nuisances.weakened() if finder._bare else nuisances
         # what the state has of tissue and field is given back, so that their middle is that of their prior
-        z = self.nuisances.coordinates(finder.prior, state.hypothesis)
-        z[self.nuisances.part("registration")] = states.motion / registration_sd()
-        self.residual = sensors.residual + self.nuisances.columns @ z
+        self._finder = finder
+        self.residual = self._without(state)
         rows = sensors.is_displacement
         size = float(np.sqrt(np.mean(self.residual[rows] ** 2))) if rows.any() else 1.0
         #: Columns of smooth forces as large as the residuals.
@@ -261,6 +262,18 @@ class _Linear:
         self.noise_factor = noise_factor(sensors.positions, sensors.directions, sensors.times, self.noise)
         self.typical_noise = float(np.median(self.noise[rows] if rows.any() else self.noise))
         self.points = tuple(rows for alike in rows_of_points(sensors) for rows in alike)
+
+    def _without(self, state: SolvedState) -> Floats:
+        """What is recorded less what a state has, its tissue, field and motion given back."""
+        z = self.nuisances.coordinates(self._finder.prior, state.hypothesis)
+        z[self.nuisances.part("registration")] = self._finder.states.motion / registration_sd()
+        return np.asarray(state.sensors.residual + self.nuisances.columns @ z)
+
+    def moved(self, state: SolvedState) -> _Linear:
+        """The same columns with the residuals of a state nearby: a compliance takes as long as many states."""
+        other = copy.copy(self)
+        other.residual = self._without(state)
+        return other
 
 
 def _with_likely_fraction(nuisances: Nuisances, factor: Floats, residual: Floats, smooth: Floats) -> Nuisances:

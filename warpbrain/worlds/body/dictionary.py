@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -225,11 +225,25 @@ def _tried(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | Inp
     return [by_proposal[id(proposal)] for proposal in proposals]
 
 
-def candidates_beside(state: SolvedState, acting: Sequence[Effect], candidates: Candidates) -> Candidates:
+def candidates_beside(
+    state: SolvedState,
+    acting: Sequence[Effect],
+    candidates: Candidates,
+    places: Mapping[str, NDArray[np.int64]],
+) -> Candidates:
     """The effects of a dictionary at another state, in which some act.
 
-    What is solved as a whole or over time keeps the columns that it has at the base, as has what is no physics. A kind
-    of which a case has only one is left out where it acts already.
+    What is solved as a whole or over time keeps the columns that it has at the base, as has what is no physics, and
+    what is at places where it is improbable. A kind of which a case has only one is left out where it acts already.
+
+    Parameters
+    ----------
+    state : SolvedState
+    acting : sequence of Effect
+    candidates : Candidates
+        At the base.
+    places : mapping of str to int array
+        Of each kind, numbers of the places where it is made anew.
     """
     known = None if candidates.makes is None else candidates.makes.mesh_errors
     effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=known)
@@ -241,7 +255,7 @@ def candidates_beside(state: SolvedState, acting: Sequence[Effect], candidates: 
         if kind in there:
             continue
         own = [candidates.effects[k] for k in numbers.tolist()]
-        smooth = [k for k, effect in enumerate(own) if _is_smooth(effect)]
+        smooth = [k for k in places[kind].tolist() if _is_smooth(own[k])]
         for k, effect in zip(smooth, effects.of([own[k].proposed for k in smooth]), strict=True):
             own[k] = effect
         of_kind[kind] = np.arange(len(found), len(found) + len(own))

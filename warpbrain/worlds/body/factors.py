@@ -9,6 +9,7 @@ number of threads.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,8 @@ class Factors:
     matrix : SciPy sparse matrix (n, n)
     device : warp.Device, optional
         A GPU that may hold them; the host unless given.
+    symmetric : bool
+        Whether the matrix is exactly that.
 
     Raises
     ------
@@ -40,7 +43,8 @@ class Factors:
         If it is singular.
     """
 
-    def __init__(self, matrix: Any, device: Any = None) -> None:
+    def __init__(self, matrix: Any, device: Any = None, symmetric: bool = True) -> None:
+        self._skew = None if symmetric else matrix
         self._dense = None if device is None else dense_factors(matrix, device)
         if self._dense is not None:
             return
@@ -54,9 +58,20 @@ class Factors:
 
         `transposed`: of the matrix the other way round.
         """
+        if transposed and self._skew is not None:
+            return self._other_way.solve(columns)
         if self._dense is not None:
             return self._dense.solve(columns)
-        return self._filled(columns, columns.shape[0], lambda found: found, "T" if transposed else "N")
+        return self._filled(columns, columns.shape[0], lambda found: found)
+
+    @cached_property
+    def _other_way(self) -> Factors:
+        """Factors of the transposed: SuperLU answers by the transposed of its factors one column after the other.
+
+        That takes three times as long, which a sensor's equilibria make up for many times over.
+        """
+        assert self._skew is not None
+        return Factors(self._skew.T)
 
     def between(self, left: Any, columns: Any) -> Floats:
         """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k), dense a block at a time only."""
@@ -64,7 +79,7 @@ class Factors:
             return self._dense.between(left, columns)
         return self._filled(columns, left.shape[0], lambda found: left @ found)
 
-    def _filled(self, columns: Any, rows: int, of: Callable[[Floats], Floats], trans: str = "N") -> Floats:
+    def _filled(self, columns: Any, rows: int, of: Callable[[Floats], Floats]) -> Floats:
         """What is made of the answers to each block, beside each other."""
         from scipy.sparse import issparse
 
@@ -74,7 +89,7 @@ class Factors:
         def solve_block(some: slice) -> Floats:
             block = columns[:, some]
             block = block.toarray() if issparse(block) else block
-            return of(self._factors.solve(np.asfortranarray(block, dtype=np.float64), trans))
+            return of(self._factors.solve(np.asfortranarray(block, dtype=np.float64)))
 
         fill_columns(made, solve_block, _TOGETHER)
         return made

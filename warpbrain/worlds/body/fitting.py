@@ -23,7 +23,7 @@ from warpbrain.simulation.extrapolated import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, Effects, parts_of
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected, expected_answer
+from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected, expected_answer
 from warpbrain.worlds.body.nuisances import field_columns, mesh_by_tissue, registration_sd, tissue_columns
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
 
@@ -32,6 +32,8 @@ Floats = NDArray[np.float64]
 _ITERATIONS, _HALVINGS = 20, 6
 #: How often at most a fit goes on with gross errors and noise as it has found them itself.
 _ROUNDS = 3
+#: Change of the log evidence below which that is no other fit.
+_SAME = 0.1
 #: How far [standard deviations] coordinates go until columns are made anew.
 _ANEW = 0.3
 #: Change of the mesh's error [standard deviations of the noise, all sensors together] with which a fit goes on.
@@ -68,6 +70,8 @@ class Refit:
     marginal : Marginal
         Its evidence, the scale of the noise and gross errors.
     converged : bool
+    share : Share or None
+        Of its mechanisms in the mesh's error, if that is known.
     """
 
     effects: tuple[Effect, ...]
@@ -80,6 +84,7 @@ class Refit:
     columns: Floats
     marginal: Marginal
     converged: bool
+    share: Share | None = None
 
     @property
     def log_evidence(self) -> float:
@@ -88,7 +93,7 @@ class Refit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Share:
+class Share:
     """What of the mesh's error belongs to mechanisms: `answer (constant + along z)`.
 
     Attributes
@@ -107,6 +112,10 @@ class _Share:
     def at(self, z: Floats) -> Floats:
         """Of coefficients (k,): (n,)."""
         return self.answer * (self.constant + float(self.along @ z))
+
+    def among(self, count: int) -> Share:
+        """The same beside further mechanisms, `count` coefficients in all."""
+        return replace(self, along=np.append(self.along, np.zeros(count - len(self.along))))
 
 
 class Refitting:
@@ -130,6 +139,7 @@ class Refitting:
         begins: Sequence[Floats],
         within: Marginal,
         near: SolvedState | None = None,
+        smaller: tuple[Refit, Floats] | None = None,
     ) -> Refit:
         """Fit one.
 
@@ -147,6 +157,9 @@ class Refitting:
             Scale of the noise and gross errors of the hypothesis.
         near : SolvedState, optional
             Nearer to the beginning than the base.
+        smaller : (Refit, (n, q + e + k) array), optional
+            The fit with the first of the effects alone: nearer still, and with the error of the mesh as it has it; and
+            columns of all about it.
 
         Raises
         ------
@@ -154,7 +167,11 @@ class Refitting:
             If there is no equilibrium near the beginning.
         """
         search = _Search(self, effects, extra, within)
+        if smaller is not None:
+            near = smaller[0].state
+            search.begin_about(*smaller)
         search.begin(begins, near or self.base.state)
+        search.draw_back()
         search.descend(anew=True)
         if self.mesh_errors is not None:
             if not effects:
@@ -169,7 +186,9 @@ class Refitting:
             if not search.take_noise(fit.marginal):
                 break
             search.descend(anew=True)
-            fit = search.result()
+            before, fit = fit, search.result()
+            if abs(fit.log_evidence - before.log_evidence) < _SAME:
+                break
         return fit
 
     def _settle(self, state: SolvedState, before: MeshErrors, within: Marginal) -> bool:
@@ -209,7 +228,9 @@ class _Search:
         self._moving[: len(self._linear)] = ~self._linear
         # coordinates that move the body, of states of this fit, and where it was
         self._known: list[tuple[Floats, Floats]] = []
-        self._share: _Share | None = None
+        self._share: Share | None = None
+        # where columns were made
+        self._made_at = np.full(len(self._moving), np.inf)
         # of the last state of this fit that was followed over time
         self._course: tuple[Floats, ...] = ()
         self.columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
@@ -229,27 +250,28 @@ class _Search:
 
     def descend(self, anew: bool) -> None:
         """Go to the best point near; `anew`: whether columns are made anew."""
-        if anew:
-            self._draw_back()
         self.converged, solved = False, False
-        made_at = np.full(len(self.z), np.inf)
         for iteration in range(_ITERATIONS):
-            if anew and iteration > 0 and np.abs(self.z - made_at)[self._moving].max(initial=0.0) > _ANEW:
-                self.columns, made_at = self._columns_here(), self.z
+            if anew and iteration > 0 and np.abs(self.z - self._made_at)[self._moving].max(initial=0.0) > _ANEW:
+                self.columns, self._made_at = self._columns_here(), self.z
                 if solved:
                     self.columns = self._columns_solved()
-            step = self._step()
+            step, here = self._step(), np.array_equal(self._made_at, self.z)
             if not self._stepped(step):
+                if anew and not here and np.abs(step).max() >= 2.0 * _SHORT:
+                    # columns made elsewhere point elsewhere
+                    self._made_at = np.full(len(self.z), np.inf)
+                    continue
                 # what is left is rounding, or nothing better lies this way: the last good point stands
                 self.converged = bool(np.abs(step).max() < 2.0 * _SHORT)
                 if self.converged or solved or not anew or not any(one.proposed.history for one in self._effects):
                     return
                 # tissue that is several times as stiff at first is no small change of what it is in the end
-                solved, made_at = True, np.full(len(self.z), np.inf)
+                solved, self._made_at = True, np.full(len(self.z), np.inf)
             if self.converged:
                 return
 
-    def _draw_back(self) -> None:
+    def draw_back(self) -> None:
         """Toward the base where that is better: far from it the linear model may have gone too far."""
         base = self.z.copy()
         known = self._base.nuisances.coordinates(self._base.prior, self._base.state.hypothesis)
@@ -354,15 +376,28 @@ class _Search:
         if (length < 1e-6 and any(sized)) or changing:
             return False
         try:
-            error = self._fits.finer.error(self.state.hypothesis, self.state)
+            error = self._fits.finer.error(self.state.hypothesis, self.state, ENOUGH)
         except SolveError:
             return False
         answer = self._fits.beyond(known, error, self.state)
         along = scaled / length if any(sized) else np.zeros(len(scaled))
-        self._share = _Share(answer, along, float(along @ mean) if any(sized) else 1.0)
-        self.columns = self.columns.copy()
-        self.columns[:, self._U.shape[1] :] += np.outer(answer, along)
+        self._know(Share(answer, along, float(along @ mean) if any(sized) else 1.0))
         return True
+
+    def begin_about(self, smaller: Refit, columns: Floats) -> None:
+        """Take columns about a fit with the first of the effects, and what that knows of the mesh's error."""
+        self.columns = columns
+        if smaller.share is not None:
+            self._share = smaller.share.among(len(self.z) - self._U.shape[1])
+
+    def _know(self, share: Share) -> None:
+        """Take a share of all mechanisms in the place of that which was known."""
+        own, before = slice(self._U.shape[1], None), self._share
+        self.columns = self.columns.copy()
+        if before is not None:
+            self.columns[:, own] -= np.outer(before.answer, before.along)
+        self.columns[:, own] += np.outer(share.answer, share.along)
+        self._share = share
 
     def _columns_solved(self) -> Floats:
         """Columns with those of tissue and mechanisms from states that are solved beside this one."""
@@ -397,6 +432,11 @@ class _Search:
             elif at is not None and not effect.proposed.is_there_or_not:
                 made = Effects(at, mesh_errors=mesh)
                 columns[:, own] = made.of([_about(effect.proposed, here)], effect.proposed.make(here))[0].columns
+            else:
+                continue
+            if self._share is not None:
+                along = self._share.along[own.start - self._own[0].start : own.stop - self._own[0].start]
+                columns[:, own] += np.outer(self._share.answer, along)
         return columns
 
     def _early(self) -> Floats:
@@ -431,6 +471,7 @@ class _Search:
             self.columns,
             evidence,
             self.converged,
+            self._share,
         )
 
     def _unsure(self, z: Floats) -> list[Floats]:

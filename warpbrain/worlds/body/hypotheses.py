@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.inference import GaussianModel, Kind, Posterior, Search, posterior
+from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
+from warpbrain.inference.decide import Decision, decide
 from warpbrain.inference.marginal import Marginal, marginal
 from warpbrain.inference.noise import scales
-from warpbrain.inference.subsets import Hypothesis
+from warpbrain.inference.subsets import Hypothesis, likely_places
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses, causes_of
@@ -33,8 +35,10 @@ Floats = NDArray[np.float64]
 
 #: Places of each cause of which pairs are made, and sets that are looked at with gross errors of their own.
 _PLACES, _SETS = 20, 12
-#: Probability below which a set or a cause is not fitted, and how many are at most.
-_WORTH, _MOST = 0.02, 8
+#: Places of each cause that are made anew about a fit.
+_BESIDE = 8
+#: Probability below which a set is not fitted, and how often at most sets are fitted or looked beside.
+_WORTH, _MOST = 0.005, 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,16 +168,17 @@ class HypothesisSearch:
                 self._take(one)
 
     def fit(self) -> None:
-        """Fit the best sets without linearising, and weigh what may act beside them."""
+        """Fit sets without linearising until no fit can be expected to change the verdict.
+
+        The most probable set is fitted, and what may act beside it is weighed; then sets on which the verdict depends.
+        """
         self._fit(frozenset())
-        for name in self._likely():
-            self._fit(frozenset((name,)))
         for _ in range(_MOST):
-            waiting = [one for one in self._probable() if not self._done(one)]
-            if not waiting:
+            wanted = self._wanted()
+            if wanted is None:
                 return
-            names = waiting[0].names
-            if waiting[0].refit is None:
+            names = self._first_for(wanted)
+            if self._weighed[names].refit is None:
                 self._fit(names)
             else:
                 self._spread_from(names)
@@ -212,27 +217,49 @@ class HypothesisSearch:
         effects = one.effects[:number] + one.effects[number + 1 :]
         return Weighed(hypothesis, effects, one.extra, residual, columns, weighed)
 
-    def _done(self, one: Weighed) -> bool:
-        """Whether nothing is left to do: fitted and looked beside, or linear about a fit that is."""
-        if one.why:
-            return True
-        if one.refit is not None:
-            return one.names in self._spread or len(one.names) > 2 or not one.mechanisms
-        best = one is self.weighed[0]
-        return not best and any(one.names > names for names in self._spread)
-
-    def _probable(self) -> list[Weighed]:
+    def _wanted(self) -> Weighed | None:
+        """The set to be fitted, or looked beside, next; None if the verdict does not depend on any."""
+        verdict = self._losses()[0]
+        spoken = [one for one in self.weighed if frozenset(one.mechanisms) == frozenset(verdict.causes)]
+        if spoken[:1] and spoken[0].mechanisms and not self._done(spoken):
+            return next((one for one in spoken if one.refit is not None), spoken[0])
         chances = zip(self.weighed, self.probabilities.tolist(), strict=True)
-        return [one for one, chance in chances if chance > _WORTH]
+        waiting = [(chance, one) for one, chance in chances if chance > _WORTH and one.refit is None and not one.why]
+        waiting.sort(key=lambda each: -each[0])
+        return next((one for _, one in waiting if self._matters(one, verdict)), None)
 
-    def _likely(self) -> list[str]:
-        """Mechanisms that are in probable sets, and were weighed alone."""
-        chances: dict[str, float] = {}
-        for one, chance in zip(self.weighed, self.probabilities.tolist(), strict=True):
-            for name in one.mechanisms:
-                chances[name] = chances.get(name, 0.0) + chance
-        likely = [name for name in sorted(chances, key=lambda name: -chances[name]) if chances[name] > _WORTH]
-        return [name for name in likely if frozenset((name,)) in self._weighed][:4]
+    def _done(self, spoken: list[Weighed]) -> bool:
+        """Whether nothing is left to do about sets of what is named: one is fitted and looked beside."""
+        fitted = [one for one in spoken if one.refit is not None]
+        if not fitted:
+            return all(one.why for one in spoken)
+        return any(one.names in self._spread or len(one.names) > 2 for one in fitted)
+
+    def _losses(self, other: Weighed | None = None, change: float = 0.0) -> tuple[Decision, dict[Decision, float]]:
+        """The verdict and expected losses of all; as they would be if the evidence of a set was another."""
+        hypotheses = [one.hypothesis for one in self.weighed if one is not other]
+        if other is not None:
+            hypotheses.append(other.with_evidence(other.hypothesis.log_evidence + change).hypothesis)
+        return decide(hypotheses, calibration().probabilities(hypotheses), calibration().losses)
+
+    def _matters(self, one: Weighed, verdict: Decision) -> bool:
+        """Whether the verdict would be regretted if a fit found what it may find of a set."""
+        for sign in (-1.0, 1.0):
+            other, losses = self._losses(one, sign * belief("fits.change"))
+            if losses.get(verdict, np.inf) - losses[other] > belief("fits.regret"):
+                return True
+        return False
+
+    def _first_for(self, one: Weighed) -> frozenset[str]:
+        """The set itself, or one of a cause less that is to be fitted, or looked beside, before it.
+
+        Two causes that are linear about the base are often one that is not.
+        """
+        fewer = [self._weighed.get(one.names - {name}) for name in one.hypothesis.causes]
+        smaller = [fitted for fitted in fewer if fitted is not None and fitted.mechanisms and not fitted.why]
+        if one.refit is not None or not smaller or any(fitted.names in self._spread for fitted in smaller):
+            return one.names
+        return max(smaller, key=_log_posterior).names
 
     def _take(self, one: Weighed) -> None:
         known = self._weighed.get(one.names)
@@ -285,16 +312,17 @@ class HypothesisSearch:
         self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
         one = self._placed(one) if one.refit is None and len(names) <= 2 else one
         begins = [one.coordinates]
-        nothing = self._weighed[frozenset()].refit
+        nothing, smaller = self._weighed[frozenset()].refit, self._smaller(one)
         near = None
-        if nothing is not None:
+        if nothing is not None and smaller is None:
             q = len(nothing.nuisances)
             beside = np.column_stack([nothing.columns, one.columns[:, q:]])
             model = GaussianModel(one.marginal.noise.noise_factor, beside)
             begins.append(model.coefficients(nothing.linear + one.residual - self.base.residual)[0])
             near = nothing.state
+        about = None if smaller is None else (smaller, one.columns)
         try:
-            refit = self.fits.fit(one.effects, one.extra, begins, one.marginal, near)
+            refit = self.fits.fit(one.effects, one.extra, begins, one.marginal, near, about)
         except (SolveError, InputError) as error:
             self._weighed[names] = replace(one, why=str(error))
             return
@@ -309,6 +337,11 @@ class HypothesisSearch:
                     self._weighed[other.names] = replace(gained, inherited=gain)
         fitted = replace(one, residual=refit.linear, columns=refit.columns, marginal=refit.marginal, refit=refit)
         self._weighed[names] = fitted.with_evidence(one.hypothesis.log_evidence - one.inherited + gain)
+
+    def _smaller(self, one: Weighed) -> Refit | None:
+        """The fit that a set is linear about, of all its causes but one; None if it is about the base."""
+        names = next((names for names in self._spread if names < one.names), None)
+        return None if names is None or one.refit is not None else self._weighed[names].refit
 
     def _placed(self, one: Weighed) -> Weighed:
         """A set with its mechanisms at the best places of their cells."""
@@ -343,7 +376,9 @@ class HypothesisSearch:
         assert one.refit is not None
         self._spread.add(names)
         self._listener.stage(f"what acts beside {' and '.join(sorted(names))}")
-        candidates = candidates_beside(one.refit.state, one.effects, self.candidates)
+        noise = GaussianModel(one.marginal.noise.noise_factor, one.columns)
+        places = likely_places(noise, one.residual, self.causes.causes, _BESIDE)
+        candidates = candidates_beside(one.refit.state, one.effects, self.candidates, places)
         causes = causes_of(self.base, candidates)
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in names))
         louder = GaussianModel(one.marginal.noise.noise_factor / one.marginal.scale, one.columns)

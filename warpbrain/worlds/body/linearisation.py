@@ -89,7 +89,7 @@ class Linearisation:
         self.stiffness: Any = K
         self._free, self._held_free = free, K[~free][:, free]
         # factors on a GPU are Cholesky's
-        self._factors = Factors(K[free][:, free], system.device if skew is None else None)
+        self._factors = Factors(K[free][:, free], system.device if skew is None else None, symmetric=skew is None)
 
     def with_sensors(self, sensors: Sensors) -> Linearisation:
         """The same state with other sensors; nothing is factorised again."""

@@ -34,8 +34,9 @@ from warpbrain.worlds.body.states import TOLERANCE, Hypothesis, SolvedState, Sta
 
 Floats = NDArray[np.float64]
 
-#: Out-of-balance force of the finer state, relative: far below the error that is looked for.
-_ROUGH = 10.0 * TOLERANCE
+#: Out-of-balance force of the finer state, relative: far below the error that is looked for, and where nothing is
+#: derived from it, still a hundredth of that which the state of the coarser mesh has there.
+_ROUGH, ENOUGH = 10.0 * TOLERANCE, 1e-3
 #: Iterations of conjugate gradients at most, where the two levels are of no help.
 _MOST = 10_000
 #: States that are remembered beside the last one.
@@ -141,7 +142,7 @@ class FinerStates:
         by_volume = other.less(own).times(1.0 / float(volume.sd[0]))
         return MeshErrors(own, volume_of(self.states.materials(here)), by_volume, tuple(by_tissue), self)
 
-    def error(self, hypothesis: Hypothesis, near: SolvedState) -> Difference:
+    def error(self, hypothesis: Hypothesis, near: SolvedState, tolerance: float = _ROUGH) -> Difference:
         """The error of a hypothesis without its stiffness field, which it hardly depends on.
 
         Parameters
@@ -149,6 +150,8 @@ class FinerStates:
         hypothesis : Hypothesis
         near : SolvedState
             A state near to it.
+        tolerance : float
+            Out-of-balance force of the finer state, relative.
 
         Raises
         ------
@@ -162,7 +165,7 @@ class FinerStates:
         external = model.external_forces()
         system = self._system_of(model)
         linear = self._two_level(system, coarse, finer.prolongation)
-        solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=_ROUGH), linear=linear)
+        solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=tolerance), linear=linear)
         flat = finer.prolongation @ coarse.u
         acting = frozenset(mechanism.kind for mechanism in even.mechanisms)
         # what another mechanism has at its edges is not here: begun from that, elements are nearly inside out
