@@ -259,7 +259,7 @@ class HypothesisSearch:
         smaller = [fitted for fitted in fewer if fitted is not None and fitted.mechanisms and not fitted.why]
         if one.refit is not None or not smaller or any(fitted.names in self._spread for fitted in smaller):
             return one.names
-        return max(smaller, key=_log_posterior).names
+        return min(smaller, key=self.weighed.index).names
 
     def _take(self, one: Weighed) -> None:
         known = self._weighed.get(one.names)
