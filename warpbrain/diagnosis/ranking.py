@@ -131,11 +131,13 @@ def _place(member: _Member, scanned: tuple[Effect, ...], weights: Floats) -> tup
     proposed = member.effect.proposed
     if proposed.centre is None:
         return None, None
-    located = [k for k, effect in enumerate(scanned) if effect.proposed.centre is not None and weights[k] > 0.0]
-    if not located:
+    located = [k for k, effect in enumerate(scanned) if effect.proposed.centre is not None]
+    total = float(weights[located].sum())
+    if not total > 0.0:
+        # about the base it would rather act everywhere
         return proposed.centre, proposed.radius
     sites = np.array([scanned[k].proposed.centre for k in located])
-    centre, radius = ball_of(sites, weights[located])
+    centre, radius = ball_of(sites, weights[located] / total)
     return centre, max(radius, float(proposed.radius or 0.0))
 
 

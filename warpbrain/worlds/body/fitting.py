@@ -23,7 +23,7 @@ from warpbrain.simulation.extrapolated import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, Effects, parts_of
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected, expected_answer
+from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected, expected_answer
 from warpbrain.worlds.body.nuisances import field_columns, mesh_by_tissue, registration_sd, tissue_columns
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
 
@@ -169,9 +169,10 @@ class Refitting:
         search = _Search(self, effects, extra, within)
         if smaller is not None:
             near = smaller[0].state
-            search.begin_about(*smaller)
+            begins = [*begins, search.begin_about(*smaller)]
         search.begin(begins, near or self.base.state)
-        search.draw_back()
+        if smaller is None:
+            search.draw_back()
         search.descend(anew=True)
         if self.mesh_errors is not None:
             if not effects:
@@ -376,7 +377,7 @@ class _Search:
         if (length < 1e-6 and any(sized)) or changing:
             return False
         try:
-            error = self._fits.finer.error(self.state.hypothesis, self.state, ENOUGH)
+            error = self._fits.finer.of_fit(self.state.hypothesis, self.state)
         except SolveError:
             return False
         answer = self._fits.beyond(known, error, self.state)
@@ -384,11 +385,22 @@ class _Search:
         self._know(Share(answer, along, float(along @ mean) if any(sized) else 1.0))
         return True
 
-    def begin_about(self, smaller: Refit, columns: Floats) -> None:
-        """Take columns about a fit with the first of the effects, and what that knows of the mesh's error."""
-        self.columns = columns
+    def begin_about(self, smaller: Refit, columns: Floats) -> Floats:
+        """Take columns about a fit with the first of the effects, and what it knows of the mesh's error.
+
+        Returns
+        -------
+        (q + e + k,) array
+            Where that fit is.
+        """
+        first, coefficients = self._U.shape[1], np.concatenate(smaller.coefficients)
+        at = np.zeros(len(self.z))
+        at[: len(smaller.nuisances)] = smaller.nuisances
+        at[first : first + len(coefficients)] = coefficients
+        self.columns, self._made_at = columns, at
         if smaller.share is not None:
-            self._share = smaller.share.among(len(self.z) - self._U.shape[1])
+            self._share = smaller.share.among(len(self.z) - first)
+        return at
 
     def _know(self, share: Share) -> None:
         """Take a share of all mechanisms in the place of that which was known."""

@@ -125,7 +125,7 @@ class HypothesisSearch:
         self.causes = causes_of(base, candidates)
         self.fits = Refitting(base)
         self._weighed: dict[frozenset[str], Weighed] = {}
-        self._spread: set[frozenset[str]] = set()
+        self._spread: list[frozenset[str]] = []
 
     @property
     def weighed(self) -> tuple[Weighed, ...]:
@@ -310,9 +310,10 @@ class HypothesisSearch:
         """Fit a set; one that cannot be says why."""
         one = self._weighed[names]
         self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
+        smaller = self._smaller(one)
         one = self._placed(one) if one.refit is None and len(names) <= 2 else one
         begins = [one.coordinates]
-        nothing, smaller = self._weighed[frozenset()].refit, self._smaller(one)
+        nothing = self._weighed[frozenset()].refit
         near = None
         if nothing is not None and smaller is None:
             q = len(nothing.nuisances)
@@ -340,8 +341,8 @@ class HypothesisSearch:
 
     def _smaller(self, one: Weighed) -> Refit | None:
         """The fit that a set is linear about, of all its causes but one; None if it is about the base."""
-        names = next((names for names in self._spread if names < one.names), None)
-        return None if names is None or one.refit is not None else self._weighed[names].refit
+        fitted = [self._weighed[names] for names in self._spread if names < one.names and one.refit is None]
+        return next((other.refit for other in fitted if other.effects == one.effects[: len(other.effects)]), None)
 
     def _placed(self, one: Weighed) -> Weighed:
         """A set with its mechanisms at the best places of their cells."""
@@ -374,7 +375,7 @@ class HypothesisSearch:
         """Weigh every set of one cause more than a fitted one, linear about that fit."""
         one = self._weighed[names]
         assert one.refit is not None
-        self._spread.add(names)
+        self._spread.append(names)
         self._listener.stage(f"what acts beside {' and '.join(sorted(names))}")
         noise = GaussianModel(one.marginal.noise.noise_factor, one.columns)
         places = likely_places(noise, one.residual, self.causes.causes, _BESIDE)

@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 
 #: Out-of-balance force of the finer state, relative: far below the error that is looked for, and where nothing is
 #: derived from it, still a hundredth of that which the state of the coarser mesh has there.
-_ROUGH, ENOUGH = 10.0 * TOLERANCE, 1e-3
+_ROUGH, _ENOUGH = 10.0 * TOLERANCE, 1e-3
 #: Iterations of conjugate gradients at most, where the two levels are of no help.
 _MOST = 10_000
 #: States that are remembered beside the last one.
@@ -100,7 +100,7 @@ class FinerStates:
     """Solves hypotheses on elements of half the size, each from what others near to it were beyond their mesh.
 
     On the CPU the mesh that there was, factorised at the first of them, preconditions all of them: see
-    `warpbrain.kernels.two_level`. It is factorised anew when it helps less.
+    `warpbrain.kernels.two_level`. It is factorised anew when it helps less, and for a fit of other mechanisms.
 
     Parameters
     ----------
@@ -113,6 +113,7 @@ class FinerStates:
         self._beyond: list[tuple[frozenset[str], Floats, Floats]] = []
         self._system: System | None = None
         self._factors: tuple[Factors, NDArray[np.bool_]] | None = None
+        self._sharing: frozenset[str] = frozenset()
         # of the system and the factors that there are
         self._linear: TwoLevelGradient | None = None
 
@@ -141,6 +142,15 @@ class FinerStates:
             by_tissue.append(beside.less(own).times(1.0 / _STEP))
         by_volume = other.less(own).times(1.0 / float(volume.sd[0]))
         return MeshErrors(own, volume_of(self.states.materials(here)), by_volume, tuple(by_tissue), self)
+
+    def of_fit(self, hypothesis: Hypothesis, near: SolvedState) -> Difference:
+        """The `error` of a fit with mechanisms, from which nothing is derived."""
+        acting = frozenset(mechanism.kind for mechanism in hypothesis.mechanisms)
+        if acting != self._sharing:
+            # factors of a state without them are of little help where they act
+            self._factors = self._linear = None
+        self._sharing = acting
+        return self.error(hypothesis, near, _ENOUGH)
 
     def error(self, hypothesis: Hypothesis, near: SolvedState, tolerance: float = _ROUGH) -> Difference:
         """The error of a hypothesis without its stiffness field, which it hardly depends on.
