@@ -97,5 +97,5 @@ def _diagnosis(draw: Mapping[str, Any], losses: Mapping[str, float]) -> Diagnosi
         parameters={},
         centre=None,
         heldout={},
-        hypotheses=tuple(Tried(frozenset(causes), float(np.log(p))) for causes, p in draw["sets"]),
+        hypotheses=tuple(Tried(frozenset(causes), float(np.log(p)), p) for causes, p in draw["sets"]),
     )

@@ -66,7 +66,7 @@ def loss(decision: Decision, true: Causes, losses: Mapping[str, float]) -> float
     if decision.verdict == "not physics" or not physical:
         return losses["name where nothing is"] * (decision.verdict != "not physics" or not true)
     if decision.verdict == "unknown":
-        return losses["unknown for a mechanism"] * (not unknown)
+        return losses["name left out" if unknown else "unknown for a mechanism"] * bool(mechanisms)
     left = losses["name left out"] * len(mechanisms.difference(decision.causes))
     if decision.verdict == "group":
         holds = bool(true.intersection(decision.causes))

@@ -23,6 +23,7 @@ UNKNOWN = "unknown"
 NOT_PHYSICS = "not physics"
 _UNITS = {"": 1.0, "1": 1.0, "%": 0.01, "mm": 1e-3, "m": 1.0, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N": 1.0, "s": 1.0} | {
     "1/Pa": 1.0,
+    "kg/m3": 1.0,
     "1/(Pa s)": 1.0,
     "m4/(N s)": 1.0,
 }
@@ -59,6 +60,10 @@ class Ranked:
         """Whether it is no physics."""
         return not self.physics and self.name != UNKNOWN
 
+    def acts(self, tried: Tried) -> bool:
+        """Whether it acts in a set of causes."""
+        return NOT_PHYSICS in tried.causes if self.alternative else tried.causes.issuperset(self.parts)
+
 
 @dataclass(frozen=True)
 class Tried:
@@ -70,10 +75,12 @@ class Tried:
         Names of physics, `UNKNOWN`, and `NOT_PHYSICS` whichever of it; the empty set is that nothing acts.
     log_density : float
         Log evidence and log prior together.
+    probability : float
     """
 
     causes: frozenset[str]
     log_density: float
+    probability: float = 0.0
 
     @property
     def physics(self) -> frozenset[str]:
@@ -94,7 +101,7 @@ class Diagnosis:
     names : tuple of str
         What it names: several if it says that several act.
     probability : float or None
-        Of what it names.
+        That all acts that it names.
     group : tuple of str
         What it cannot tell apart.
     ranking : tuple of Ranked
@@ -106,7 +113,7 @@ class Diagnosis:
     heldout : dict of str to float
         Error at what was not fitted [m]: declared, refitted, explained, as far as it is told.
     hypotheses : tuple of Tried
-        Every set of causes that has a probability.
+        Sets of causes that are told, the most probable first.
     """
 
     verdict: str
@@ -142,11 +149,12 @@ class Diagnosis:
 
     @property
     def label_set(self) -> tuple[Ranked, ...]:
-        """The fewest candidates whose probabilities are 0.9 together."""
-        total = 0.0
+        """The fewest candidates, in their order, one of which acts with a probability of 0.9 if anything does."""
+        left = [tried for tried in self.hypotheses if tried.causes]
+        total = sum(tried.probability for tried in left)
         for count, row in enumerate(self.ranking, start=1):
-            total += row.probability
-            if total >= TOGETHER:
+            left = [tried for tried in left if not row.acts(tried)]
+            if sum(tried.probability for tried in left) <= (1.0 - TOGETHER) * total:
                 return self.ranking[:count]
         return self.ranking
 
@@ -177,13 +185,15 @@ def _diagnosis(data: dict[str, Any]) -> Diagnosis:
     # all that are named, the first of which stands alone as well
     mechanism = [one["mechanism"] for one in data.get("mechanisms") or ()] or data.get("mechanism") or []
     names = [mechanism] if isinstance(mechanism, str) else mechanism
+    names = tuple(part.strip() for name in names for part in name.split("+"))
     where = data.get("where") or {}
     centre = where.get("centre_m")
+    hypotheses = tuple(_tried(row) for row in data.get("hypotheses") or ())
     return Diagnosis(
         verdict=verdict,
         p_value=float(data["p_value"]),
-        names=tuple(part.strip() for name in names for part in name.split("+")),
-        probability=data.get("probability"),
+        names=names,
+        probability=_joint(names, hypotheses) if hypotheses and len(names) > 1 else data.get("probability"),
         group=tuple(data.get("group") or ()),
         ranking=tuple(
             Ranked(
@@ -198,14 +208,19 @@ def _diagnosis(data: dict[str, Any]) -> Diagnosis:
         parameters={name: _parameter(said) for name, said in (data.get("parameters") or {}).items()},
         centre=None if centre is None else (float(centre[0]), float(centre[1]), float(centre[2])),
         heldout=_heldout(data.get("fit") or {}),
-        hypotheses=tuple(_tried(row) for row in data.get("hypotheses") or ()),
+        hypotheses=hypotheses,
     )
+
+
+def _joint(names: tuple[str, ...], hypotheses: tuple[Tried, ...]) -> float:
+    """Probability that all of these act: that of each alone is said of each, and is more."""
+    return sum(tried.probability for tried in hypotheses if tried.causes.issuperset(names))
 
 
 def _tried(row: dict[str, Any]) -> Tried:
     kinds = {"physics": None, UNKNOWN: UNKNOWN, NOT_PHYSICS: NOT_PHYSICS}
     causes = frozenset(kinds[kind] or name for name, kind in zip(row["causes"], row["kinds"], strict=True))
-    return Tried(causes, float(row["log_evidence"]) + float(row["log_prior"]))
+    return Tried(causes, float(row["log_evidence"]) + float(row["log_prior"]), float(row["probability"]))
 
 
 def _parameter(said: dict[str, Any]) -> tuple[float, float | None]:

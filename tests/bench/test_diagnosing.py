@@ -23,7 +23,8 @@ def test_every_stage_is_written(monkeypatch, capsys, tmp_path):
     assert file.name.startswith("diagnose_cpu_20")
     written = json.loads(file.read_text(encoding="utf-8"))
     [run] = written["seconds"]
-    stages = ["base", "candidates", "screening", "refit", "significance", "held out", "beside", "virtual cases"]
+    stages = ["base", "candidates", "screening", "significance", "fits", "checks", "where", "what would be seen"]
+    stages.append("next measurement")
     assert list(run) == [*stages, "total"] and sum(run[stage] for stage in stages) <= run["total"]
     printed = capsys.readouterr().out
     assert all(f"  {stage} " in printed for stage in run)

@@ -79,6 +79,7 @@ def hypotheses(**logs):
             "kinds": [] if name == "nothing" else [kinds.get(cause, "physics") for cause in name.split("_")],
             "log_evidence": log,
             "log_prior": -1.0,
+            "probability": 0.1,
         }
         for name, log in logs.items()
     ]

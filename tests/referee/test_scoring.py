@@ -15,6 +15,7 @@ from referee.intervals import Share
 from referee.outcomes import read_outcomes
 from referee.scores import amounts, calibration, confusion, shares
 from warpbrain.errors import InputError
+from warpbrain.physics.mechanisms import mechanisms
 
 
 @pytest.mark.parametrize(("hits", "of"), [(0, 24), (1, 24), (23, 24), (24, 24), (5, 9)])
@@ -26,6 +27,14 @@ def test_intervals_are_exact(hits, of):
         # by definition: as few, and as many, are just plausible at the ends
         assert binom.sf(hits - 1, of, low) == pytest.approx(0.025)
         assert binom.cdf(hits, of, high) == pytest.approx(0.025)
+
+
+def test_the_unit_of_every_parameter_is_known(tmp_path):
+    for kind, mechanism in mechanisms().items():
+        told = {name: {"value": 2.0, "sd": 1.0, "unit": says.unit} for name, says in mechanism.parameters().items()}
+        found = outcome(tmp_path, label("c"), diagnosis("named", kind, 0.9, parameters=told)).said.parameters
+        for name, says in mechanism.parameters().items():
+            assert found[name] == pytest.approx((2.0 * says.si, says.si)), (kind, name)
 
 
 @pytest.fixture
@@ -119,10 +128,31 @@ def test_every_stated_probability_counts_after_an_alarm(tmp_path):
         for name, p, e in (("gravity", 0.7, 3.0), ("pressure", 0.25, 1.0), ("unknown", 0.05, 0.0), ("falx", 0.0, None))
     ]
     true = label("g", "effect", ("pressure",), 6.0)
+    # of what acts, gravity does with 0.85 and gravity or pressure with 0.95
+    sets = [
+        (("gravity",), 0.6),
+        (("pressure",), 0.1),
+        (("gravity", "pressure"), 0.08),
+        (("unknown",), 0.04),
+        ((), 0.18),
+    ]
+    tried = [
+        {
+            "causes": causes,
+            "kinds": ["unknown" if name == "unknown" else "physics" for name in causes],
+            "log_evidence": 0.0,
+            "log_prior": 0.0,
+            "probability": p,
+        }
+        for causes, p in sets
+    ]
     pairs = [
-        (true, diagnosis("group", p_value=0.01, ranking=ranking)),
+        (true, diagnosis("group", p_value=0.01, ranking=ranking, hypotheses=tried)),
         (label("n"), diagnosis(p_value=0.3, ranking=ranking)),
-        (label("o", "outside", ("tether",), 6.0), diagnosis("unknown", p_value=0.01, ranking=ranking)),
+        (
+            label("o", "outside", ("tether",), 6.0),
+            diagnosis("unknown", p_value=0.01, ranking=ranking, hypotheses=tried),
+        ),
     ]
     found = [outcome(tmp_path, *pair) for pair in pairs]
     told = calibration(found)["all"]
@@ -132,6 +162,9 @@ def test_every_stated_probability_counts_after_an_alarm(tmp_path):
     assert found[0].covered and not found[2].covered
     of_effects = shares(found)["90 % label set holds the truth"]
     assert (of_effects.hits, of_effects.of) == (1, 1)
+    # of two names what is stated is that both act
+    both = diagnosis("named", ["gravity", "pressure"], 0.78, hypotheses=tried)
+    assert outcome(tmp_path, label("b"), both).said.probability == pytest.approx(0.08)
 
 
 def test_confusion_counts_every_case_once(outcomes):

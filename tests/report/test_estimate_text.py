@@ -24,11 +24,11 @@ def averaged(nothing: float) -> AveragedTissue:
 
 def test_what_is_more_probable_than_nothing_is_printed():
     first, causes, _, row = averaged_lines(averaged(0.0))
-    assert first.endswith("case says: below 0.01")
-    assert causes == "  what may act: pressure above 0.99"
+    assert first.endswith("case says: below 3 %")
+    assert causes == "  what may act: pressure above 97 %"
     assert row.split()[:3] == ["brain", "shear", "modulus"] and row.split()[-1] == "Pa"
     assert [float(word) for word in row.split()[3:5]] == pytest.approx([2000.0, 200.0])
 
 
 def test_where_nothing_is_the_most_probable_only_that_is_printed():
-    assert averaged_lines(averaged(0.6)) == ["  probability that nothing acts but what the case says: 0.60"]
+    assert averaged_lines(averaged(0.6)) == ["  probability that nothing acts but what the case says: 60 %"]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from warpbrain.diagnosis.held_out import HeldOut, share_of_patterns, tries_of
 from warpbrain.inference import GaussianModel, Kind
 from warpbrain.inference.beliefs import beliefs
+from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import Confirmation
-from warpbrain.inference.marginal import Marginal
 from warpbrain.inference.predict import Prediction, predictive_p
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
 
@@ -29,15 +29,12 @@ class HeldOutErrors:
         Of the error that is gone.
     patterns : (low, high)
         Errors [m] between which nine of ten patterns that mean nothing are.
-    patterns_p : float
-        Probability that one of them does as well.
     """
 
     without: Prediction
     explained: Prediction
     improvement: tuple[float, float, float]
     patterns: tuple[float, float]
-    patterns_p: float
 
 
 class Confirming:
@@ -61,15 +58,13 @@ class Confirming:
     def p_of_nothing(self, nothing: Weighed) -> float:
         """Probability of rows of which any cause explains as much, if none acts.
 
-        It is asked with all points sound and with those that are gross errors if nothing acts: what is wrong with few
-        points alone is no alarm, and a cause that moves few points is one.
+        It is asked of draws of nothing, with the gross errors that it has; what a local cause moves may be among these,
+        and then the Bayes factor of all that may act, each with gross errors of its own, tells. Of data without any the
+        chance that it is `b` or more is `1 / b` at most (Markov's inequality). Twice asked, it is twice as easily said.
         """
-        marginal = nothing.marginal
-        models = [marginal.model]
-        if marginal.gross.any():
-            models.append(_sound(marginal))
-        # twice asked, it is twice as easily found
-        return min(1.0, len(models) * min(self._p(model, nothing.residual, physics=True) for model in models))
+        drawn = self._p(nothing.marginal.model, nothing.residual, physics=True)
+        bound = float(np.exp(-max(self.search.log_bayes_factor, 0.0) / calibration().temperature))
+        return min(1.0, 2.0 * min(drawn, bound))
 
     def p_left(self, one: Weighed) -> float:
         """Probability of rows of which a field without a name explains as much, if a set is all that acts."""
@@ -132,7 +127,6 @@ class Confirming:
             explained,
             way.improvement(explained, without, self._random),
             (low, high),
-            share_of_patterns(explained, patterns),
         )
 
     def ceiling(self, nothing: Weighed, way: HeldOut) -> float:
@@ -143,9 +137,3 @@ class Confirming:
 
 def _with_mean(columns: Floats, mean: Floats | None) -> Floats:
     return columns if mean is None else np.column_stack([mean, columns])
-
-
-def _sound(marginal: Marginal) -> GaussianModel:
-    """The model of a marginal with all points sound."""
-    model = marginal.model
-    return GaussianModel(model.noise_factor, model.columns[:, : model.columns.shape[1] - marginal.louder], model.scale)

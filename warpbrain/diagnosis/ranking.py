@@ -129,8 +129,6 @@ def member_of(one: Weighed, name: str) -> tuple[GaussianModel, Floats]:
 def _place(member: _Member, scanned: tuple[Effect, ...], weights: Floats) -> tuple[Floats | None, float | None]:
     """Where it acts, and the radius of a ball that holds 90 % of where it may."""
     proposed = member.effect.proposed
-    if proposed.place is not None:
-        return proposed.place(member.effect.coefficients(member.mean))
     if proposed.centre is None:
         return None, None
     located = [k for k, effect in enumerate(scanned) if effect.proposed.centre is not None]

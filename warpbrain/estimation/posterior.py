@@ -207,14 +207,3 @@ class Posterior:
     def together(self) -> tuple[Together, ...]:
         """Errors over all rows of points and surfaces, of those that were fitted and of those that check."""
         return Together.of(self.predictions)
-
-    @property
-    def fitted_case(self) -> Case:
-        """The case with the most probable laws."""
-        return self.parameters.applied(self.case, self.theta)
-
-    @property
-    def displacement(self) -> Floats:
-        """Of each node [m], shape (n, 3): of the most probable state, less the error of the mesh."""
-        point = self.best.estimate.point
-        return self.best.estimate.problem.nuisances.observed(point.state, point.nuisances)[0]

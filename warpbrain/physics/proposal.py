@@ -147,18 +147,10 @@ class Proposal:
         Where it does nothing, `start` if not said.
     patch : Patch or None
         What the case's own boundaries no longer hold.
-    of_patch : callable, or None
-        Of what lets go: from another patch to the same there.
     elsewhere : callable, or None
         Of what acts in one place: from another centre (3,) [m] and radius [m] to the same there.
     on_surface : bool
         Whether that place is one of the surface.
-    place : callable, or None
-        Of what was refined between the places of a scan: from coefficients to the centre (3,) [m] and radius [m].
-    placing : int
-        How many of the last coefficients say where it is, and have no size.
-    log_covered : float
-        Logarithm of how many places of a scan they are as wide as.
     history : callable, or None
         Of a fading one: from coefficients (k,) and the time since the load came [s] to how many times what it does at
         once at `start` is there, in proportion to the first of them; nothing is left in the end.
@@ -177,12 +169,8 @@ class Proposal:
     start: Floats = field(default_factory=lambda: np.zeros(0))
     nothing: Floats = field(default_factory=lambda: np.zeros(0))
     patch: Patch | None = None
-    of_patch: Callable[[Patch], Proposal] | None = None
     elsewhere: Callable[[Floats, float], Proposal] | None = None
     on_surface: bool = False
-    place: Callable[[Floats], tuple[Floats, float]] | None = None
-    placing: int = 0
-    log_covered: float = 0.0
     history: Callable[[Floats, float], float] | None = None
     pace: Callable[[Floats], float] | None = None
     centre: Floats | None = None

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from sinking_block import OPTIONS
 
+from referee.diagnoses import read_diagnosis
+from warpbrain.inference import Kind
 from warpbrain.inference.decide import VERDICTS, Decision
 from warpbrain.report.diagnosis.description import describe_diagnosis, noise_distance
 from warpbrain.report.files import write_summary
@@ -47,6 +49,30 @@ def test_keys_are_complete(small_diagnosis, verdict, tmp_path):
     assert all(set(one) == RANKED for one in read["ranking"])
     assert [one["mechanism"] for one in read["mechanisms"]] == (["gravity"] if verdict.startswith("named") else [])
     assert (read["mechanism"] == "gravity") == verdict.startswith("named")
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_the_referee_reads_all_of_it(small_diagnosis, verdict, tmp_path):
+    """What it scores by and calibrates from, key by key."""
+    told = verdict_of(small_diagnosis, verdict)
+    write_summary(tmp_path / "diagnosis.json", describe_diagnosis(told, OPTIONS, "cpu"))
+    read = read_diagnosis(tmp_path / "diagnosis.json")
+    assert (read.verdict, read.p_value, read.group) == (verdict, told.p_value, told.group)
+    assert read.names == tuple(one.kind for one in told.named)
+    assert read.spoken == bool(told.named)
+    kinds = {Kind.UNKNOWN: "unknown", Kind.NOT_PHYSICS: "not physics"}
+    for tried, one in zip(read.hypotheses, told.combinations, strict=True):
+        assert tried.causes == {kinds.get(kind, name) for name, kind in zip(one.causes, one.kinds, strict=True)}
+        assert (tried.log_density, tried.probability) == (one.log_evidence + one.log_prior, one.probability)
+    ranked = {one.kind: one.probability for one in told.ranking}
+    assert {row.name: row.probability for row in read.tried} == {n: ranked[n] for n in (r.name for r in read.tried)}
+    assert {row.name for row in read.ranking if row.alternative} == {
+        one.kind for one in told.ranking if not one.physics and one.kind != "unknown"
+    }
+    assert read.first == ("" if verdict == "nothing missing" else told.ranking[0].kind)
+    assert set(read.heldout) == {"declared", "refitted"} | ({"explained"} if told.fit.explained else set())
+    if told.named:
+        assert {value.name for value in told.named[0].values} == set(read.parameters)
 
 
 def test_what_was_not_tried_is_in_the_ranking(diagnosed):

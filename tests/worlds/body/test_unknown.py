@@ -35,6 +35,17 @@ def test_a_uniform_pressure_of_it_is_the_load_on_the_surface(at):
     np.testing.assert_allclose(nodal, on_surface, atol=1e-12 * np.abs(on_surface).max())
 
 
+def test_a_uniform_pressure_of_it_moves_what_it_does_on_the_surface(at):
+    """The answer of the sensors to it is that to its nodal forces, whatever the order of the corners of elements."""
+    mesh = at.system.model.mesh
+    forces = _unit_stresses((mesh.points + at.u)[at.system.tetrahedra])[:3].sum(axis=0)
+    nodal = np.zeros(mesh.points.shape)
+    corners = (mesh.points + at.u)[mesh.tetrahedra]
+    np.add.at(nodal, mesh.tetrahedra, _unit_stresses(corners)[:3].sum(axis=0))
+    [answer] = at.answers_of_elements(forces, np.ones((len(forces), 1))).T
+    np.testing.assert_allclose(answer, at.answers(-nodal[None])[:, 0], atol=1e-9 * np.abs(answer).max())
+
+
 def test_fields_are_of_one_metre(at):
     rows = at.sensors.is_displacement
     every = fields(at, 0.01)

@@ -23,7 +23,7 @@ repeated until they are those of the state to 0.1 %, or of the last time step: s
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -158,7 +158,6 @@ class Contact(Mechanism):
             0.5,
             "release",
             patch=patch,
-            of_patch=partial(cls._let_go, state),
             centre=patch.centre,
             radius=patch.radius,
             region=patch.name,

@@ -145,7 +145,6 @@ class Gravity(BodyForce, Mechanism):
 
             return [Proposal(anywhere, np.zeros(3), np.full(3, 0.5), region="all tissue")]
         down = unit_vector("gravity_axis", situation.gravity_axis)
-        lowest = float((-points @ down).min())
         height = float(np.ptp(points @ down))
         across = tangents(down)
         found = []
@@ -153,6 +152,8 @@ class Gravity(BodyForce, Mechanism):
 
             def drained(c: NDArray[np.float64], level: float = float(level)) -> Gravity:
                 direction = down + c[1] * across[0] + c[2] * across[1]
+                # of a head that is tilted another point is the lowest one, as for a case that is read
+                lowest = float((-points @ unit_vector("direction", tuple(direction.tolist()))).min())
                 return cls(
                     direction=tuple(direction.tolist()),
                     density=situation.density,

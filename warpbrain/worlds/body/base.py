@@ -176,10 +176,6 @@ class BaseFinder:
             state = self.states.corrected(state, expected(errors.own))
         return self._base(first, state, errors)
 
-    def moved(self, base: Base, fit: SolvedState, errors: MeshErrors | None) -> Base:
-        """The same at another state: one that a fit has found far from the base, where all that is linear is wrong."""
-        return self._base(base.declared, fit, errors)
-
     def _base(self, first: SolvedState, state: SolvedState, errors: MeshErrors | None) -> Base:
         linear = _Linear(self, state, errors)
         unknown = fields(linear.at, self._spacing)

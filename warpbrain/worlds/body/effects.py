@@ -75,10 +75,8 @@ class Effect:
         return self.proposed.mean + self.proposed.sd * z
 
     def away(self, z: Floats) -> Floats:
-        """How far (k,) [standard deviations] coefficients are from doing nothing; zero where they say a place."""
-        proposed = self.proposed
-        has_size = np.arange(len(z)) < len(z) - proposed.placing
-        return np.asarray(has_size * (self.coefficients(z) - proposed.without) / proposed.sd)
+        """How far (k,) [standard deviations] coefficients are from doing nothing."""
+        return np.asarray((self.coefficients(z) - self.proposed.without) / self.proposed.sd)
 
 
 class Effects:

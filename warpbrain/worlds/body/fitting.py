@@ -91,14 +91,6 @@ class Refit:
         """Laplace's."""
         return self.marginal.log_evidence
 
-    @property
-    def with_own_columns(self) -> tuple[Effect, ...]:
-        """Its effects with the columns that they have at the best point."""
-        return tuple(replace(effect, columns=self.columns[:, own]) for effect, own in self._parts())
-
-    def _parts(self) -> list[tuple[Effect, slice]]:
-        return list(zip(self.effects, _slices(self.effects, len(self.nuisances)), strict=True))
-
 
 @dataclass(frozen=True, eq=False)
 class Share:

@@ -130,12 +130,24 @@ class HypothesisSearch:
     @property
     def weighed(self) -> tuple[Weighed, ...]:
         """The most probable first."""
-        return tuple(sorted(self._weighed.values(), key=lambda one: -_log_posterior(one)))
+        found = list(self._weighed.values())
+        chances = calibration().probabilities([one.hypothesis for one in found])
+        return tuple(found[k] for k in np.argsort(-chances, kind="stable").tolist())
 
     @property
     def probabilities(self) -> Floats:
         """Of `weighed`."""
         return calibration().probabilities([one.hypothesis for one in self.weighed])
+
+    @property
+    def log_bayes_factor(self) -> float:
+        """Of anything that may act over nothing, summed over all sets that were weighed, each as probable as it was."""
+        sets = [one.hypothesis for one in self._weighed.values()]
+        something = [one.log_evidence + one.log_prior for one in sets if one.causes]
+        nothing = next(one.log_evidence for one in sets if not one.causes)
+        # odds that any of them acts, before anything was recorded
+        odds = np.expm1(np.sum(np.log1p(np.exp([cause.log_prior for cause in self.causes.causes]))))
+        return float(np.logaddexp.reduce(something) - np.log(odds) - nothing) if something else 0.0
 
     def get(self, names: Iterable[str]) -> Weighed | None:
         """A set, if it was weighed."""
@@ -247,7 +259,7 @@ class HypothesisSearch:
         smaller = [fitted for fitted in fewer if fitted is not None and fitted.mechanisms and not fitted.why]
         if one.refit is not None or not smaller or any(fitted.names in self._spread for fitted in smaller):
             return one.names
-        return max(smaller, key=_log_posterior).names
+        return min(smaller, key=self.weighed.index).names
 
     def _take(self, one: Weighed) -> None:
         known = self._weighed.get(one.names)
@@ -412,7 +424,3 @@ def _worth_looking_at(found: Posterior, singles: bool = True) -> list[Hypothesis
     """The most probable sets, none, and every single cause if asked for."""
     best = list(found.hypotheses[:_SETS])
     return best + [one for one in found.hypotheses[_SETS:] if not one.causes or (singles and len(one.causes) == 1)]
-
-
-def _log_posterior(one: Weighed) -> float:
-    return one.hypothesis.log_evidence + one.hypothesis.log_prior

@@ -13,9 +13,6 @@ from warpbrain.worlds.body.effects import Effect
 
 Floats = NDArray[np.float64]
 
-#: Detectability at which an effect is found nearly always.
-SEEN = 5.0
-
 
 def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, ...]:
     """Parameters that differ among proposals, such as a level or a radius: mean and spread over them.
@@ -46,7 +43,7 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
     The length of a vector follows its components, as `value_size`; of several numbers the first is `moduli_1`, and
     `moduli` what they are together, if that means anything.
     """
-    if effect.proposed.is_there_or_not and effect.proposed.place is None:
+    if effect.proposed.is_there_or_not:
         return ()
     here = numbers_of(effect, z)
     # a covariance that rounding has left not quite positive is no reason to fail
@@ -64,8 +61,8 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
 
 def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
     """Numbers of the mechanism at coordinates (k,), by name, with units; of what lets go its place."""
-    if effect.proposed.is_there_or_not and effect.proposed.place is not None:
-        centre, radius = effect.proposed.place(effect.coefficients(z))
+    centre, radius = effect.proposed.centre, effect.proposed.radius
+    if effect.proposed.is_there_or_not and centre is not None and radius is not None:
         return {
             **{f"centre_{axis}": (x, "m") for axis, x in zip("xyz", centre.tolist(), strict=True)},
             "radius": (1e3 * radius, "mm"),

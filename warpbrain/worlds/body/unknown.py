@@ -68,22 +68,24 @@ def eigenstresses(at: Linearisation, length: float) -> Floats:
     sites = mesh.centres[spread_points(mesh.centres, length, 700)]
     weights = np.exp(-0.5 * (cdist(mesh.centres, sites) / length) ** 2)
     # where the elements are now: there a symmetric stress has no moment
-    forces = _unit_stresses((mesh.points + at.u)[mesh.tetrahedra])
+    forces = _unit_stresses((mesh.points + at.u)[at.system.tetrahedra])
     columns = [at.answers_of_elements(forces[component], weights) for component in range(len(_PAIRS))]
     return _seen(np.concatenate(columns, axis=1), at.sensors.is_displacement)
 
 
 def _unit_stresses(corners: Floats) -> Floats:
-    """Internal forces (6, m, 4, 3) of stresses of 1 Pa in elements with these corners (m, 4, 3)."""
+    """Internal forces (6, m, 4, 3) of stresses of 1 Pa (Frobenius) in elements with these corners (m, 4, 3)."""
     edges = corners[:, 1:] - corners[:, :1]
     volumes = np.abs(np.linalg.det(edges)) / 6.0
     gradients = np.linalg.inv(edges).transpose(0, 2, 1)
     shapes = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1) * volumes[:, None, None]
     found = np.zeros((len(_PAIRS), *shapes.shape))
     for number, (i, j) in enumerate(_PAIRS):
-        found[number, :, :, i] += shapes[:, :, j]
-        if i != j:
-            found[number, :, :, j] += shapes[:, :, i]
+        # all of the same Frobenius norm, so that no direction is another than others
+        found[number, :, :, i] += np.sqrt(0.5) * shapes[:, :, j]
+        found[number, :, :, j] += np.sqrt(0.5) * shapes[:, :, i]
+        if i == j:
+            found[number] *= np.sqrt(0.5)
     return found
 
 
