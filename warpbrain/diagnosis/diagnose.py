@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,7 +24,16 @@ from warpbrain.diagnosis.telling_apart import imitations, smallest
 from warpbrain.diagnosis.traits import Traits, traits_of
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import Confirmation, after_checks
-from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN, Decision, decide
+from warpbrain.inference.decide import (
+    CANNOT_SAY,
+    NAMED,
+    NAMED_AND_REST,
+    NOT_PHYSICS,
+    NOTHING,
+    UNKNOWN,
+    Decision,
+    decide,
+)
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
 from warpbrain.worlds.body.observable import require_observable
@@ -38,6 +47,22 @@ from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 _TOLD = 20
 #: Size of a patch of the map, in spacings of the scan.
 _PATCH = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class _Checked:
+    """A verdict after its checks, what failed in words, the set that is spoken of and its checks."""
+
+    decision: Decision
+    doubts: tuple[str, ...]
+    best: Weighed
+    confirmations: tuple[Confirmation, ...]
+    p_left: float | None
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Mechanisms that are named."""
+        return self.decision.causes if self.decision.verdict in (NAMED, NAMED_AND_REST) else ()
 
 
 class Diagnosing:
@@ -97,25 +122,14 @@ class Diagnosing:
         nothing = _of(search, ())
         with self._timed("significance"):
             p_value = confirming.p_of_nothing(nothing)
-        if p_value <= options.alpha:
-            with self._timed("fits"):
-                search.fit()
+        with self._timed("fits"):
+            search.fit(alone=p_value > options.alpha)
         nothing = _of(search, ())
         by_posterior = self._decided(search, p_value)
-        best = nothing
-        if by_posterior.verdict in (NAMED, NAMED_AND_REST):
-            with self._timed("fits"):
-                best = search.explaining(frozenset(by_posterior.causes))
         self.listener.stage("checks")
         with self._timed("checks"):
-            confirmations = confirming.confirmations(best)
-            p_left = confirming.p_left(best) if best is not nothing else None
-            decision, doubts = after_checks(by_posterior, confirmations, p_left, options.alpha)
-            named = decision.causes if decision.verdict in (NAMED, NAMED_AND_REST) else ()
-            if named and set(named) != set(by_posterior.causes):
-                best = search.explaining(frozenset(named))
-            elif not named:
-                best = nothing
+            checked = self._checked(search, confirming, by_posterior)
+            best, named = checked.best, checked.named
             held_out = confirming.held_out(nothing, best) if named else None
             ranking = Ranking(search, confirming)
             ranked = ranking.all()
@@ -123,7 +137,7 @@ class Diagnosing:
             model, residual = nothing.marginal.model, nothing.residual
             draws = model.draws(options.draws, random)
             where = score_map(search.base.at, model, residual, draws, _PATCH * spacing, spacing, options.alpha)
-            unknown = self._traits(decision, search, best, where)
+            unknown = self._traits(checked.decision, search, best, where)
         with self._timed("what would be seen"):
             confusion = imitations(search.causes, model)
             seen = smallest(search.causes, model, confusion)
@@ -136,17 +150,17 @@ class Diagnosing:
             predictions = {REFITTED: held_out.without, EXPLAINED: held_out.explained}
         return Diagnosis(
             case=self.case,
-            decision=decision,
+            decision=checked.decision,
             by_posterior=by_posterior,
-            doubts=doubts,
+            doubts=checked.doubts,
             p_value=p_value,
-            p_left=p_left,
+            p_left=checked.p_left,
             named=ranking.named(best, named),
             ranking=ranked,
             rejected=search.candidates.rejected,
             combinations=_combinations(search),
             map=where,
-            when=_onset(search, decision, best),
+            when=_onset(search, checked.decision, best),
             search=search,
             weighed=weighed,
             held_out=predictions,
@@ -154,8 +168,8 @@ class Diagnosing:
             smallest=seen,
             confusion=confusion,
             next_measurement=measurements,
-            fit=self._fit(confirming, weighed, held_out, confirmations),
-            confirmations=confirmations,
+            fit=self._fit(confirming, weighed, held_out, checked.confirmations),
+            confirmations=checked.confirmations,
             assumptions=assumptions_of(self.case, search.base, best),
             remarks=search.base.remarks,
             seconds=self.seconds,
@@ -168,6 +182,25 @@ class Diagnosing:
             return Decision(NOTHING)
         hypotheses = [one.hypothesis for one in search.weighed]
         return decide(hypotheses, search.probabilities, calibration().losses)[0]
+
+    def _checked(self, search: HypothesisSearch, confirming: Confirming, by_posterior: Decision) -> _Checked:
+        """The verdict after its checks, and the set that is spoken of."""
+        nothing, alpha = _of(search, ()), self.options.alpha
+        if by_posterior.verdict not in (NAMED, NAMED_AND_REST):
+            return _Checked(by_posterior, (), nothing, (), None)
+        best = search.explaining(frozenset(by_posterior.causes))
+        if best is None:
+            return _not_fitted(search, by_posterior.causes)
+        confirmations, p_left = confirming.confirmations(best), confirming.p_left(best)
+        decision, doubts = after_checks(by_posterior, confirmations, p_left, alpha)
+        if decision.verdict not in (NAMED, NAMED_AND_REST):
+            return _Checked(decision, doubts, nothing, confirmations, p_left)
+        if set(decision.causes) != set(by_posterior.causes):
+            best = search.explaining(frozenset(decision.causes))
+            if best is None:
+                return _not_fitted(search, decision.causes)
+            p_left = confirming.p_left(best)
+        return _Checked(decision, doubts, best, confirmations, p_left)
 
     @staticmethod
     def _traits(decision: Decision, search: HypothesisSearch, best: Weighed, where: ScoreMap) -> Traits | None:
@@ -264,6 +297,14 @@ def _of(search: HypothesisSearch, names: tuple[str, ...]) -> Weighed:
     one = search.get(names)
     assert one is not None
     return one
+
+
+def _not_fitted(search: HypothesisSearch, causes: tuple[str, ...]) -> _Checked:
+    """What cannot be simulated as large as it is seen has no name."""
+    said = (
+        f"{' and '.join(causes)}, as large as it is seen, could not be simulated: {search.why_not(frozenset(causes))}"
+    )
+    return _Checked(Decision(CANNOT_SAY, causes), (said,), _of(search, ()), (), None)
 
 
 def _combinations(search: HypothesisSearch) -> tuple[Combination, ...]:

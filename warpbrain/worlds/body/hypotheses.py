@@ -167,13 +167,13 @@ class HypothesisSearch:
             for one in in_threads(partial(self._linear, model=model), _worth_looking_at(found)):
                 self._take(one)
 
-    def fit(self) -> None:
-        """Fit sets without linearising until no fit can be expected to change the verdict.
+    def fit(self, alone: bool = False) -> None:
+        """Fit sets without linearising until no fit can be expected to change the verdict; `alone`: only nothing.
 
         The most probable set is fitted, and what may act beside it is weighed; then sets on which the verdict depends.
         """
         self._fit(frozenset())
-        for _ in range(_MOST):
+        for _ in range(0 if alone else _MOST):
             wanted = self._wanted()
             if wanted is None:
                 return
@@ -183,18 +183,19 @@ class HypothesisSearch:
             else:
                 self._spread_from(names)
 
-    def explaining(self, mechanisms: frozenset[str]) -> Weighed:
-        """The most probable fitted set with just these mechanisms, fitted if none was."""
+    def explaining(self, mechanisms: frozenset[str]) -> Weighed | None:
+        """The most probable fitted set with just these mechanisms, fitted if none was; None if none can be."""
         sets = [one for one in self.weighed if frozenset(one.mechanisms) == mechanisms]
         known = next((one for one in sets if one.refit is not None), None)
         for one in sets if known is None else []:
             self._fit(one.names)
-            known = self._weighed[one.names]
-            if known.refit is not None:
-                break
-        if known is None:
-            raise SolveError(f"no set of causes with {' and '.join(sorted(mechanisms))} was weighed")
+            if self._weighed[one.names].refit is not None:
+                return self._weighed[one.names]
         return known
+
+    def why_not(self, mechanisms: frozenset[str]) -> str:
+        """What kept the most probable set with just these mechanisms from being fitted."""
+        return next((one.why for one in self.weighed if frozenset(one.mechanisms) == mechanisms and one.why), "")
 
     def without(self, one: Weighed, name: str) -> Weighed:
         """A set less one of its mechanisms, linear about the same point; its evidence is comparable with the set's."""
