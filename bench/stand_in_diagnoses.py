@@ -1,0 +1,81 @@
+"""What `warpbrain diagnose` says of the eight stand-ins, beside what their truths hold (docs/stand-ins.md).
+
+    python bench/stand_in_diagnoses.py [NAME ...]   # writes results/stand_in_diagnoses.json, and goes on
+
+The tool never opens a truth: this script does, once the verdict is written. A name is right if that kind acted.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import platform
+import sys
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from warpbrain.atomic import whole_file
+from warpbrain.cases.shipped import SHIPPED, find_case
+from warpbrain.diagnosis.diagnose import Diagnosing
+
+ROOT = Path(__file__).resolve().parents[1]
+FILE = ROOT / "bench" / "results" / "stand_in_diagnoses.json"
+#: What a truth calls what it drew, and what the tool calls the same.
+KINDS = {"cavity pressure": "pressure", "slip": "contact"}
+
+
+def diagnosed(name: str) -> dict[str, Any]:
+    """Of one case."""
+    began, worked = time.perf_counter(), time.process_time()
+    found = Diagnosing(find_case(name, "multi"), device="cpu").run()
+    return {
+        "case": name,
+        "verdict": found.verdict,
+        "named": [one.kind for one in found.named],
+        "group": list(found.group),
+        "sentence": found.sentence,
+        "by_posterior": list(found.by_posterior.causes),
+        "sets": [{"causes": list(one.causes), "probability": one.probability} for one in found.combinations[:4]],
+        "declared_mm": 1e3 * found.fit.declared[0],
+        "refitted_heldout_mm": 1e3 * found.fit.refitted[1],
+        "explained_heldout_mm": None if found.fit.explained is None else 1e3 * found.fit.explained[1],
+        "seconds": time.perf_counter() - began,
+        "processor_seconds": time.process_time() - worked,
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        "machine": platform.processor() or platform.machine(),
+    }
+
+
+def truth(name: str) -> list[str]:
+    """Kinds of what acted, the first the one that moves the cavity."""
+    text = gzip.decompress((ROOT / "concealed" / "truth" / f"{name}.json.gz").read_bytes())
+    kinds = [effect["kind"] for effect in json.loads(text)["effects"]]
+    return [KINDS.get(kind, kind) for kind in kinds]
+
+
+def main() -> None:
+    """All that are asked for."""
+    names = sys.argv[1:] or [name for name in SHIPPED if not name.startswith("phantom")]
+    done = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else []
+    for name in names:
+        if any(one["case"] == name for one in done):
+            continue
+        done.append(diagnosed(name))
+        with whole_file(FILE) as temporary:
+            temporary.write_text(json.dumps(done, indent=1) + "\n", encoding="utf-8")
+    print("| case | what acted | verdict | named | held out without -> with it, mm | s |")
+    print("|---|---|---|---|---|---|")
+    for one in done:
+        acted, named = truth(one["case"]), one["named"] or one["group"]
+        explained = one["explained_heldout_mm"]
+        held = "" if explained is None else f"{one['refitted_heldout_mm']:.2f} -> {explained:.2f}"
+        print(
+            f"| {one['case']} | {' and '.join(acted)} | {one['verdict']} | {' and '.join(named)} | {held} "
+            f"| {one['seconds']:.0f} |"
+        )
+
+
+if __name__ == "__main__":
+    main()
