@@ -116,12 +116,16 @@ def priced(
 ) -> tuple[dict[str, float], Share]:
     """The least price of a false name at which spoken names are right as often as is asked; the highest if none is.
 
-    All that is false costs in proportion; silence, what is left out and groups cost what they did.
+    All that is false costs in proportion; silence, what is left out and groups cost what they did. Of fewer names than
+    one wrong one among them would show, the price stays what it was.
     """
     for price in PRICES:
         factor = price / losses["false name"]
         now = {name: round(value * factor, 3) if name in _FALSE else value for name, value in losses.items()}
         spoken = share(_spoken(outcomes, ballots, probabilities, now))
+        # the least price has the most names
+        if price == PRICES[0] and spoken.of < 1.0 / WRONG:
+            return dict(losses), share(_spoken(outcomes, ballots, probabilities, losses))
         if spoken.hits >= (1.0 - WRONG) * spoken.of:
             break
     return now, spoken

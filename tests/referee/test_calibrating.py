@@ -113,11 +113,13 @@ def test_the_command_writes_what_the_tool_reads(tmp_path, capsys):
 def test_a_false_name_costs_more_where_names_are_often_false(tmp_path):
     losses = json.loads(FILE.read_text())["losses"]
     tried = (Tried(frozenset({"gravity"}), 0.0), Tried(frozenset({"pressure"}), 0.0))
-    given = [Ballot(tried, np.array([True, False]))] * 20
-    stated = [np.array([0.95, 0.05])] * 20
-    right = [outcome(tmp_path, label(f"r{k}", "effect", ("gravity",), 9.0), diagnosis()) for k in range(20)]
-    wrong = [outcome(tmp_path, label(f"w{k}", "effect", ("pressure",), 9.0), diagnosis()) for k in range(4)]
+    given = [Ballot(tried, np.array([True, False]))] * 40
+    stated = [np.array([0.95, 0.05])] * 40
+    right = [outcome(tmp_path, label(f"r{k}", "effect", ("gravity",), 9.0), diagnosis()) for k in range(40)]
+    wrong = [outcome(tmp_path, label(f"w{k}", "effect", ("pressure",), 9.0), diagnosis()) for k in range(8)]
     cheap, _ = priced(right, given, stated, losses)
-    dear, spoken = priced([*right[4:], *wrong], given, stated, losses)
+    dear, spoken = priced([*right[8:], *wrong], given, stated, losses)
     assert dear["false name"] > cheap["false name"] and spoken.of == 0
     assert dear["false group"] / cheap["false group"] == pytest.approx(dear["false name"] / cheap["false name"])
+    few, counted = priced(right[:20], given[:20], stated[:20], losses)
+    assert few == losses and counted.of <= 20
