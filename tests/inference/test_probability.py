@@ -7,7 +7,7 @@ from warpbrain.inference.calibration import calibration
 from warpbrain.inference.probability import percent
 
 
-@pytest.mark.parametrize(("probability", "said"), [(0.5, "50 %"), (0.969, "97 %"), (0.031, "3 %")])
+@pytest.mark.parametrize(("probability", "said"), [(0.5, "50 %"), (0.944, "94 %"), (0.056, "6 %")])
 def test_percent(probability, said):
     assert percent(probability) == said
 
