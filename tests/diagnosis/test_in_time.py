@@ -142,9 +142,9 @@ def test_with_one_time_nothing_is_said(small_diagnosis: Diagnosis) -> None:
 
 
 def test_when_in_words() -> None:
-    said = {"seconds": [5.0, 20.0], "probability": 0.944, "course": AT_ONCE, "intervals": []}
-    assert when_in_words(said) == "it set in between 5 and 20 s (probability 94 %), all at once"
-    assert when_in_words({**said, "seconds": [0.0, 5.0], "course": ""}) == "it set in by 5 s (probability 94 %)"
+    said = {"seconds": [5.0, 20.0], "probability": 0.934, "course": AT_ONCE, "intervals": []}
+    assert when_in_words(said) == "it set in between 5 and 20 s (probability 93 %), all at once"
+    assert when_in_words({**said, "seconds": [0.0, 5.0], "course": ""}) == "it set in by 5 s (probability 93 %)"
     assert when_in_words({"seconds": [0.0, 5.0]}) == "0 to 5 s"
 
 

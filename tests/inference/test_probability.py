@@ -7,7 +7,7 @@ from warpbrain.inference.calibration import calibration
 from warpbrain.inference.probability import percent
 
 
-@pytest.mark.parametrize(("probability", "said"), [(0.5, "50 %"), (0.944, "94 %"), (0.056, "6 %")])
+@pytest.mark.parametrize(("probability", "said"), [(0.5, "50 %"), (0.934, "93 %"), (0.066, "7 %")])
 def test_percent(probability, said):
     assert percent(probability) == said
 

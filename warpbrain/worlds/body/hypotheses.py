@@ -60,8 +60,9 @@ class Weighed:
     refit : Refit or None
     why : str
         What kept it from being fitted.
-    inherited : float
-        Part of its evidence that it has from the fit of nothing, until it is fitted itself.
+    inherited : float or None
+        Part of its evidence that it has from the last fit of some of its causes, or of none, until it is fitted itself;
+        None of what is linear about a fit.
     """
 
     hypothesis: Hypothesis
@@ -72,7 +73,7 @@ class Weighed:
     marginal: Marginal
     refit: Refit | None = None
     why: str = ""
-    inherited: float = 0.0
+    inherited: float | None = 0.0
 
     @property
     def names(self) -> frozenset[str]:
@@ -333,12 +334,13 @@ class HypothesisSearch:
             # what the fit without any cause gains is of tissue and registration, which all others gain by, too; and a
             # search that ended too early must not make everything else look better
             gain = max(gain, 0.0)
-            for other in list(self._weighed.values()):
-                if other.names:
-                    gained = other.with_evidence(other.hypothesis.log_evidence + gain)
-                    self._weighed[other.names] = replace(gained, inherited=gain)
         fitted = replace(one, residual=refit.linear, columns=refit.columns, marginal=refit.marginal, refit=refit)
-        self._weighed[names] = fitted.with_evidence(one.hypothesis.log_evidence - one.inherited + gain)
+        self._weighed[names] = fitted.with_evidence(one.hypothesis.log_evidence - (one.inherited or 0.0) + gain)
+        for other in list(self._weighed.values()):
+            # what some of its causes explain already a set does not gain once more
+            if names < other.names and other.refit is None and other.inherited is not None:
+                gained = other.with_evidence(other.hypothesis.log_evidence - other.inherited + gain)
+                self._weighed[other.names] = replace(gained, inherited=gain)
 
     def _smaller(self, one: Weighed) -> Refit | None:
         """The fit that a set is linear about, of all its causes but one; None if it is about the base."""
@@ -405,7 +407,7 @@ class HypothesisSearch:
             ordered = _in_order(replace(beside, hypothesis=total))
             known = self._weighed.get(ordered.names)
             if known is None or known.refit is None:
-                self._weighed[ordered.names] = ordered
+                self._weighed[ordered.names] = replace(ordered, inherited=None)
 
 
 def _in_order(one: Weighed) -> Weighed:
