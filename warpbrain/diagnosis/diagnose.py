@@ -17,7 +17,7 @@ from warpbrain.diagnosis.locating import ScoreMap, score_map
 from warpbrain.diagnosis.measuring import next_measurements
 from warpbrain.diagnosis.onset import Onset, onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions
-from warpbrain.diagnosis.ranking import Ranking, member_of
+from warpbrain.diagnosis.ranking import Ranking, about_base
 from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Measurement, Ranked
 from warpbrain.diagnosis.sentences import assumptions_of
 from warpbrain.diagnosis.telling_apart import imitations, smallest
@@ -330,7 +330,7 @@ def _onset(search: HypothesisSearch, decision: Decision, best: Weighed) -> Onset
         return onset_of(search.base, None, False, best.marginal.model, best.residual)
     name = best.mechanisms[0]
     effect = best.effects[0]
-    model, residual = member_of(best, name)
+    model, residual = about_base(search, best, name)
     return onset_of(search.base, search.causes.named(name), effect.proposed.changes_in_time, model, residual)
 
 

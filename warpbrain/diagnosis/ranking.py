@@ -67,7 +67,7 @@ class Ranking:
             why = "no physics" if cause.kind is Kind.NOT_PHYSICS else ""
             return Ranked(cause.name, False, gained, chance, 0.0, None, (), None, None, "", why)
         member = _member(one, cause.name)
-        weights = self._weights(cause, one, member)
+        weights = self._weights(cause, one)
         scanned = self._search.causes.effects[cause.name]
         values = values_of(member.effect, member.mean, member.covariance)
         known = {value.name for value in values}
@@ -93,21 +93,27 @@ class Ranking:
             why,
         )
 
-    def _weights(self, cause: Cause, one: Weighed, member: _Member) -> Floats:
+    def _weights(self, cause: Cause, one: Weighed) -> Floats:
         """Probabilities (p,) of the places of a scan beside all else that acts in a set."""
         from scipy.special import softmax
 
-        model, residual = rest_of(one, member.own, member.effect)
+        model, residual = about_base(self._search, one, cause.name)
         blocks = Blocks(model, residual, [cause])
         logs = np.logaddexp.reduce(blocks.log_factors() + blocks.log_weights, axis=1)
         return np.asarray(softmax(logs))
 
 
-def rest_of(one: Weighed, own: slice, effect: Effect) -> tuple[GaussianModel, Floats]:
-    """The model and residual (n,) of all else that acts in a set."""
-    model = one.marginal.model
-    columns = np.delete(model.columns, np.r_[own], axis=1)
-    return GaussianModel(model.noise_factor, columns, model.scale), one.residual + effect.mean
+def about_base(search: HypothesisSearch, one: Weighed, name: str) -> tuple[GaussianModel, Floats]:
+    """The model and residual (n,) of all else that acts in a set but one mechanism, linear about the base.
+
+    There the columns of all its places are known; about a fit, far from the base, they are others.
+    """
+    base, model = search.base, one.marginal.model
+    others = [effect for kind, effect in zip(one.mechanisms, one.effects, strict=True) if kind != name]
+    louder = model.columns[:, model.columns.shape[1] - one.marginal.louder :]
+    columns = np.column_stack([base.nuisances.columns, *(effect.columns for effect in others), louder])
+    residual = base.residual - sum((effect.mean for effect in others), start=np.zeros(len(base.residual)))
+    return GaussianModel(base.model.noise_factor, columns, model.scale), residual
 
 
 def _member(one: Weighed, name: str) -> _Member:
@@ -118,12 +124,6 @@ def _member(one: Weighed, name: str) -> _Member:
     effect = one.effects[number]
     mean, covariance = one.coefficients[number]
     return _Member(effect, slice(at, at + effect.columns.shape[1]), mean, covariance)
-
-
-def member_of(one: Weighed, name: str) -> tuple[GaussianModel, Floats]:
-    """The model and residual (n,) of all else in a set but one mechanism."""
-    member = _member(one, name)
-    return rest_of(one, member.own, member.effect)
 
 
 def _place(member: _Member, scanned: tuple[Effect, ...], weights: Floats) -> tuple[Floats | None, float | None]:
