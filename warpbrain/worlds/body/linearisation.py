@@ -203,10 +203,15 @@ class Linearisation:
             fill_columns(found, lambda some: rows @ forces[:, some], together)
             return found[which]
         forces = forces.toarray() if issparse(forces) else forces
-        du = np.zeros((len(self._free), count))
-        du[self._free] = self._factors.solve(forces[self._free])
+        du = self.displacements(forces)
         dR = np.where(self._free[:, None], 0.0, self.stiffness @ du - forces)
         return np.asarray(self.sensors.by_displacement @ du + self.sensors.by_reactions @ dR)
+
+    def displacements(self, forces: Floats) -> Floats:
+        """Of all components (3 N, k) [m] under nodal forces (3 N, k) [N]."""
+        du = np.zeros(forces.shape)
+        du[self._free] = self._factors.solve(forces[self._free])
+        return du
 
     def answers_of_elements(self, element_forces: Floats, weights: Any) -> Floats:
         """What internal forces of elements (m, 4, 3) [N], times weights (m, k), change: (n, k).

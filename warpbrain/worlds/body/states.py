@@ -36,8 +36,6 @@ Floats = NDArray[np.float64]
 
 #: Out-of-balance force of an equilibrium, relative.
 TOLERANCE = 1e-6
-#: The same of a course in time, whose steps are less exact than that.
-_COURSE = 1e-5
 #: Short steps after a load has come, as parts of the first time that counts.
 _SHORT = (1e-3, 0.1, 0.4)
 
@@ -201,33 +199,6 @@ class States:
             ]
         parts = zip(self.times, self.observations, moments, strict=True)
         return sensors_at([(time, observations, *moment) for time, observations, moment in parts], self.centre)
-
-    def course(self, hypothesis: Hypothesis, times: Sequence[float], start: Floats) -> list[tuple[Floats, Floats]]:
-        """Displacement and reactions (N, 3) under a hypothesis at increasing times [s] after all loads came at once.
-
-        Parameters
-        ----------
-        hypothesis : Hypothesis
-        times : sequence of float
-        start : (N, 3) array
-            A displacement [m] that is near to the first.
-
-        Raises
-        ------
-        SolveError
-            If there is no equilibrium at one of the times.
-        """
-        self.solves += 1
-        system = self._system(hypothesis)
-        external = system.model.external_forces()
-        solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=_COURSE), factors=self._factors_of(system))
-        system.forget()
-        u, now, found = start, 0.0, []
-        for time in (*(times[0] * part for part in _SHORT), *times):
-            state = solver.step(u, time - now)
-            u, now = state.u, time
-            found.append((u, system.model.reactions(state.internal, external)))
-        return found[len(_SHORT) :]
 
     def _factors_of(self, system: System) -> KeptFactors | None:
         """Kept while the same mechanisms act: a fit has many states of those, one after the other.
