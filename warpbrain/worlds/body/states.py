@@ -143,6 +143,7 @@ class States:
         start: Floats | None = None,
         expected: Difference | None = None,
         course: Sequence[Floats] = (),
+        iterations: int = EquilibriumOptions.max_total_newton,
     ) -> SolvedState:
         """The equilibrium under a hypothesis.
 
@@ -155,6 +156,8 @@ class States:
             What it lacks of the state without the error of the mesh; sensors are there.
         course : sequence of (N, 3) arrays, optional
             Of a state that is near to it, if it is followed over time.
+        iterations : int
+            Of Newton's method in all, after which there is taken to be none.
 
         Raises
         ------
@@ -166,7 +169,7 @@ class States:
         self.solves += 1
         system = self._system(hypothesis)
         model, external = system.model, system.model.external_forces()
-        options = EquilibriumOptions(tolerance=TOLERANCE)
+        options = EquilibriumOptions(tolerance=TOLERANCE, max_total_newton=iterations)
         # relaxing stress or fluid of its own: what a term has in its memory beside that changes no state in time
         in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
         if in_time and np.isfinite(self.times[0]):

@@ -13,6 +13,9 @@ from warpbrain.worlds.body.states import SolvedState, States
 
 Floats = NDArray[np.float64]
 
+#: Iterations after which a state beside the base is taken not to exist: those that do take 3 to 18.
+_ITERATIONS = 30
+
 
 class Solving:
     """Answers of the sensors to what is solved anew beside a state.
@@ -36,6 +39,7 @@ class Solving:
         """Of the state with the mechanism, less those without it: (n,)."""
         key, state = repr(mechanism), self._state
         if key not in self.known:
-            self.known[key] = self._states.solve(replace(state.hypothesis, mechanisms=(mechanism,)), state.u)
+            asked = replace(state.hypothesis, mechanisms=(mechanism,))
+            self.known[key] = self._states.solve(asked, state.u, iterations=_ITERATIONS)
         solved = self.known[key]
         return self._sensors.answer(solved.u - state.u, solved.reactions - state.reactions)
