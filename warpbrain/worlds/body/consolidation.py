@@ -1,6 +1,6 @@
 """Fluid that flows out of tissue until a state is reached, linear about that state, at all times and paces at once.
 
-A term with unknowns `p` of its own (`warpbrain.physics.term.Coupling`) and the displacement obey, about a state with the
+Unknowns `p` of a term's own (`warpbrain.physics.term.Coupling`) and the displacement obey, about a state with the
 tangent stiffness `K` in which `p` is zero,
 
     K du = B^T p,        d/dt (b + B du + N p) = -H p,
