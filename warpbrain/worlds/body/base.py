@@ -178,7 +178,7 @@ class BaseFinder:
 
     def _base(self, first: SolvedState, state: SolvedState, errors: MeshErrors | None) -> Base:
         linear = _Linear(self, state, errors)
-        unknown = fields(linear.at, self._spacing)
+        unknown = fields(linear.at, linear.lengths, linear.body_forces)
         nuisances, factor = linear.nuisances, linear.noise_factor
         if errors is not None and not self._bare:
             smooth = unknown[next(iter(unknown))]
@@ -247,8 +247,9 @@ class _Linear:
         self.known: dict[str, SolvedState] = {}
         self.effects = Effects(self.at, Solving(states, state, sensors, self.known), errors)
         # which makes the compliance: with it nuisances are products, where each would have an equilibrium of its own
-        lengths = finder._spacing * beliefs("unknown.lengths")
-        smooth = np.column_stack(body_forces(self.at, lengths.tolist()))
+        self.lengths = (finder._spacing * beliefs("unknown.lengths")).tolist()
+        self.body_forces = body_forces(self.at, self.lengths)
+        smooth = np.column_stack(self.body_forces)
         nuisances = nuisances_at(self.at, states, state.hypothesis.theta, finder.prior, self.effects, errors)
         self.nuisances = nuisances.weakened() if finder._bare else nuisances
         # what the state has of tissue and field is given back, so that their middle is that of their prior

@@ -28,6 +28,7 @@ from warpbrain.simulation.model import Material
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
+from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import Sensors, sensors_at
 from warpbrain.worlds.body.stiffness_field import StiffnessField, stiffness_modes
 from warpbrain.worlds.body.surfaces import with_free_surfaces
@@ -144,6 +145,7 @@ class States:
         expected: Difference | None = None,
         course: Sequence[Floats] = (),
         iterations: int = EquilibriumOptions.max_total_newton,
+        nearby: Linearisation | None = None,
     ) -> SolvedState:
         """The equilibrium under a hypothesis.
 
@@ -158,6 +160,8 @@ class States:
             Of a state that is near to it, if it is followed over time.
         iterations : int
             Of Newton's method in all, after which there is taken to be none.
+        nearby : Linearisation, optional
+            Of a state that is near to it.
 
         Raises
         ------
@@ -182,6 +186,8 @@ class States:
             course = ()
             # on a CPU conjugate gradients have found a single state as soon as factors are made
             factors = None if system.device.is_cpu else self._factors_of(system)
+            if nearby is not None and start is not None:
+                start = nearby.toward_equilibrium(system, external, start, TOLERANCE)
             solver = EquilibriumSolver(system, options, factors=factors)
             states = [solver.solve(external, start)] * len(self.times)
         reactions = [model.reactions(state.internal, external) for state in states]
