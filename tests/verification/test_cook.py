@@ -85,7 +85,10 @@ def test_mixed_ones(poisson, verify):
     )
 
 
-@pytest.mark.parametrize(("poisson", "n"), QUADRATIC)
+@pytest.mark.parametrize(
+    ("poisson", "n"),
+    [pytest.param(*key, marks=[pytest.mark.slow] if key == (0.49, 16) else []) for key in QUADRATIC],
+)
 def test_quadratic_ones(poisson: float, n: int, verify: Row) -> None:
     """The quadrature of DOLFINx has more points."""
     tip, _ = bent(n, poisson, "tet10")
