@@ -73,7 +73,7 @@ sigma = 0.02
 
 def write_slow(folder: Path, cause: Mechanism) -> Case:
     """Write the case with recordings of what the cause makes of it, in steps of a thirtieth of an order of time."""
-    mesh = box((4, 4, 4), (_SIDE, _SIDE, _SIDE))
+    mesh = box((5, 5, 5), (_SIDE, _SIDE, _SIDE))
     z = mesh.points[:, 2]
     one = np.ones(len(mesh.tetrahedra), dtype=np.int32)
     mesh = TetMesh(mesh.points, mesh.tetrahedra, one, {"bottom": z == 0.0, "top": z == z.max()}, {})
