@@ -25,7 +25,7 @@ from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.estimation.estimate import Estimation
-from warpbrain.estimation.gauss_newton import Estimate, GaussNewton, GaussNewtonOptions
+from warpbrain.estimation.gauss_newton import Estimate, GaussNewton
 from warpbrain.estimation.laplace import Laplace
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
@@ -118,7 +118,7 @@ def again(first: Posterior, case: Case) -> Estimate:
     problem = first.best.estimate.problem
     other = Problem(problem.forward, Observations.to_fit(case), problem.mode, problem.likelihood, problem.nuisances)
     start = first.best.estimate.point
-    return GaussNewton(other, GaussNewtonOptions(3e-3)).solve(start.state, start.nuisances)
+    return GaussNewton(other, 3e-3).solve(start.state, start.nuisances)
 
 
 def described(

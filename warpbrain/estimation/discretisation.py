@@ -260,7 +260,7 @@ class FinerMesh:
         """
         start = self._prolong @ state.u
         try:
-            finer = _solve(self._forward, state.theta, start + self._last)
+            finer = self._forward.solve_from(state.theta, (start + self._last, None), ROUGH)
             by_theta = self._forward.differentiate(finer)
         except SolveError as error:
             raise SolveError(
@@ -280,14 +280,6 @@ class FinerMesh:
         both = [restricted(self._prolong, du, dR) for du, dR in pairs]
         du, dR = (np.array([one[k] for one in both]) for k in range(2))
         return *restricted(self._prolong, finer.u, finer.reactions), du, dR
-
-
-def _solve(forward: Forward, theta: Floats, start: Floats) -> State:
-    """From a start that may turn elements inside out, or be of another branch; from rest, if it is."""
-    try:
-        return forward.solve(theta, start, ROUGH)
-    except SolveError:
-        return forward.solve(theta, None, ROUGH)
 
 
 def _shared_forces(case: Case) -> Floats:

@@ -15,7 +15,7 @@ from warpbrain.errors import SolveError
 from warpbrain.estimation.chain import Chain, run_chain
 from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, FinerMesh
 from warpbrain.estimation.forward import Forward
-from warpbrain.estimation.gauss_newton import GaussNewton, GaussNewtonOptions, GaussNewtonStep, require_explained
+from warpbrain.estimation.gauss_newton import GaussNewton, GaussNewtonStep, require_explained
 from warpbrain.estimation.importance import Importance, importance_sampling
 from warpbrain.estimation.modes import Mode
 from warpbrain.estimation.nuisances import Nuisances
@@ -204,7 +204,7 @@ class Estimation:
         # what is only the start of something better need not be exact
         final = self.options.discretisation is None or nuisances.error is not None
         tolerance = self.options.tolerance if final else max(self.options.tolerance, _BEFORE)
-        search = GaussNewton(problem, GaussNewtonOptions(tolerance), self.listener.step)
+        search = GaussNewton(problem, tolerance, self.listener.step)
         if start is None:
             found = search.solve()
         else:
@@ -214,7 +214,7 @@ class Estimation:
             found = search.solve(start.estimate.point.state, values)
         if not found.converged:
             self._remarks.append(f"{text}: not converged")
-        return Mode.of(found)
+        return Mode(found)
 
     def _without_error_of_mesh(
         self,
@@ -234,8 +234,7 @@ class Estimation:
             errors.append(finer.error(best.estimate.point.state, derivatives))
             nuisances = Nuisances(believed, errors[-1], self.options.registration)
             modes = self.fit(nuisances, modes)
-            moved = modes[0].estimate.theta - errors[-1].theta
-            if np.sqrt(moved @ np.linalg.solve(modes[0].laplace.covariance, moved)) <= _SETTLED:
+            if np.sqrt(2.0 * modes[0].laplace.posterior.negative_log(errors[-1].theta)) <= _SETTLED:
                 break
         else:
             self._remarks.append("the error of the mesh was still changing when it was last computed")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
+from warpbrain.errors import SolveError
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
@@ -113,6 +115,15 @@ class Forward:
         reactions = self.system.model.reactions(found.internal, self._external)
         self._last = State(theta.copy(), found.u, reactions, len(found.history), found.unstable_iterations > 0)
         return self._last
+
+    def solve_from(self, theta: Floats, starts: Sequence[Floats | None], tolerance: float = EXACT) -> State:
+        """The same from the first of some starts that leads to it; a bold one may turn elements inside out."""
+        for start in starts[:-1]:
+            try:
+                return self.solve(theta, start, tolerance)
+            except SolveError:
+                pass
+        return self.solve(theta, starts[-1], tolerance)
 
     def differentiate(self, state: State) -> Sensitivities:
         """Derivatives of a state by its parameters; `SolveError` if it is unstable."""

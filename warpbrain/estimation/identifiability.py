@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from warpbrain.estimation.gauss_newton import Estimate
 from warpbrain.estimation.laplace import Laplace
 from warpbrain.estimation.parameters import Parameter
+from warpbrain.physics.words import enumerated
 
 Floats = NDArray[np.float64]
 #: Parameters with their weights in a direction.
@@ -65,11 +66,11 @@ class Identifiability:
         else:
             said = []
             if self.informed:
-                said.append(f"The recordings inform {_enumerated(self.informed)}.")
+                said.append(f"The recordings inform {enumerated(self.informed)}.")
             if self.weakly_informed:
-                said.append(f"They inform a little {_enumerated(self.weakly_informed)}.")
+                said.append(f"They inform a little {enumerated(self.weakly_informed)}.")
             if self.hidden:
-                said.append(f"They do not see {_enumerated(self.hidden)}: there the estimate is the prior.")
+                said.append(f"They do not see {enumerated(self.hidden)}: there the estimate is the prior.")
         if self.scale_is_hidden:
             said.append(
                 "Absolute stiffness cannot be told from displacements that displacements cause: a recorded force, or a "
@@ -119,7 +120,7 @@ def combination(parts: Parts) -> str:
     """A combination of parameters in words."""
     if len(parts) == 1:
         return f"the {_noun(parts[0][0])}"
-    tissues = _enumerated([parameter.tissue for parameter, _ in parts])
+    tissues = enumerated([parameter.tissue for parameter, _ in parts])
     if _are_opposite(parts):
         return f"the ratio of the shear moduli of {tissues}"
     if _are_alike(parts):
@@ -131,7 +132,7 @@ def change(parts: Parts) -> str:
     """A change of parameters, in words."""
     if len(parts) == 1:
         return f"a change of the {_noun(parts[0][0])}"
-    tissues = _enumerated([parameter.tissue for parameter, _ in parts])
+    tissues = enumerated([parameter.tissue for parameter, _ in parts])
     if _are_alike(parts):
         return f"a change of the shear moduli of {tissues} by one factor"
     if _are_opposite(parts):
@@ -158,7 +159,3 @@ def _noun(parameter: Parameter) -> str:
         parameter.coordinate.name, f"ratio {parameter.coordinate.name}"
     )
     return f"{what} of {parameter.tissue}"
-
-
-def _enumerated(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

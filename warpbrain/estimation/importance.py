@@ -81,7 +81,7 @@ def importance_sampling(
     unstable, failed = target.unstable, target.failed
     logs = np.empty(count)
     for number, point in enumerate(theta):
-        logs[number] = target.at(point).log_density
+        logs[number] = target.log_density(point)
         if on_draw is not None:
             on_draw(number + 1)
     smoothed = pareto_smoothed(logs - proposal.log_density(theta))

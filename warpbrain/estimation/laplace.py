@@ -45,12 +45,11 @@ class Laplace:
         """The posterior at an estimate."""
         problem = estimate.problem
         p = len(problem.parameters)
-        joint = estimate.linearised.information
-        information = joint[:p, :p]
+        information, joint = estimate.linearised.information[:p, :p], estimate.linearised.hessian
         if len(problem.nuisances):
             # metres, radians and plain numbers: one size for all
-            size = np.sqrt(np.diag(joint[p:, p:] + problem.nuisances.precision))
-            nuisances = (joint[p:, p:] + problem.nuisances.precision) / np.outer(size, size)
+            size = np.sqrt(np.diag(joint[p:, p:]))
+            nuisances = joint[p:, p:] / np.outer(size, size)
             mixed = joint[p:, :p] / size[:, None]
             information = information - mixed.T @ np.linalg.solve(nuisances, mixed)
         return cls(problem.parameters, estimate.theta, problem.mode.gaussian, information)
@@ -63,15 +62,15 @@ class Laplace:
         basis = self.prior.factor @ vectors
         return np.asarray(basis / (1.0 + values) @ basis.T)
 
+    @cached_property
+    def posterior(self) -> Gaussian:
+        """As a distribution."""
+        return Gaussian(self.theta, self.covariance)
+
     @property
     def standard_deviations(self) -> Floats:
         """Of each parameter, shape (p,)."""
-        return np.sqrt(np.diag(self.covariance))
-
-    @property
-    def correlation(self) -> Floats:
-        """Shape (p, p)."""
-        return self.covariance / np.outer(self.standard_deviations, self.standard_deviations)
+        return self.posterior.standard_deviations
 
     def interval(self, probability: float = 0.95) -> Floats:
         """Central interval of each parameter, shape (p, 2), no farther than its range goes."""

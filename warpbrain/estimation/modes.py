@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +23,14 @@ class Mode:
     Attributes
     ----------
     estimate : Estimate
-    laplace : Laplace
     """
 
     estimate: Estimate
-    laplace: Laplace
 
-    @classmethod
-    def of(cls, estimate: Estimate) -> Mode:
-        """The top at an estimate."""
-        return cls(estimate, Laplace.of(estimate))
+    @cached_property
+    def laplace(self) -> Laplace:
+        """The normal distribution that fits the posterior there."""
+        return Laplace.of(self.estimate)
 
     @property
     def log_evidence(self) -> float:

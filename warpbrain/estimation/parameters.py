@@ -14,6 +14,7 @@ from warpbrain.gp.coordinates import Coordinate, coordinates, from_coordinates, 
 from warpbrain.physics.laws import Law, NeoHookean
 from warpbrain.physics.laws.stability import require_stable
 from warpbrain.physics.mechanism import Substituting
+from warpbrain.physics.words import enumerated
 from warpbrain.simulation.model import Material
 
 Floats = NDArray[np.float64]
@@ -97,7 +98,7 @@ class Parameters:
                     )
         return cls(
             tuple(tuple(labels) for labels in members.values()),
-            tuple(_listed([case.tissues[label].name for label in labels]) for labels in members.values()),
+            tuple(enumerated([case.tissues[label].name for label in labels]) for labels in members.values()),
             tuple(tissue.prior for tissue in first),
             tuple(tissue.model for tissue in first),
             tuple(tissue.formulation for tissue in first),
@@ -205,7 +206,3 @@ def _poisson(case: Case) -> float:
                     "estimate: leave it out, or write its law into the tissues"
                 )
     return poisson
-
-
-def _listed(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

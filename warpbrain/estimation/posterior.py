@@ -171,10 +171,7 @@ class Posterior:
     @cached_property
     def joint_covariance(self) -> Floats:
         """Of parameters and nuisances by Laplace, shape (p + q, p + q)."""
-        p = len(self.parameters)
-        problem, information = self.best.estimate.problem, self.best.estimate.linearised.information.copy()
-        information[:p, :p] += problem.mode.gaussian.precision
-        information[p:, p:] += problem.nuisances.precision
+        information = self.best.estimate.linearised.hessian
         # metres, radians and plain numbers: one size for all
         size = np.sqrt(np.diag(information))
         return np.asarray(np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size))

@@ -45,11 +45,6 @@ class Point:
     objective: float
 
     @property
-    def given_noise(self) -> Noise | None:
-        """The noise, if it is known."""
-        return self.noise if isinstance(self.noise, Noise) else None
-
-    @property
     def known_noise(self) -> Noise:
         """The noise of an estimate, where it is always known."""
         assert isinstance(self.noise, Noise)
@@ -110,7 +105,7 @@ class Problem:
         """What `theta` means."""
         return self.forward.parameters
 
-    def at(self, state: State, nuisances: Floats, noise: Noise | None = None) -> Point:
+    def at(self, state: State, nuisances: Floats, noise: Noise | Rough | None = None) -> Point:
         """The objective at a state; noise that is as large as the residuals are, unless it is known."""
         motion = self.nuisances.motion(nuisances)
         parts = self.observations.at(*self.nuisances.observed(state, nuisances), motion=motion)

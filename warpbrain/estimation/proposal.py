@@ -62,9 +62,8 @@ class Proposal:
 
         terms = []
         for mode, share, mass in zip(self.modes, self.shares, self._masses, strict=True):
-            factor = np.linalg.cholesky(mode.laplace.covariance)
-            away = np.linalg.solve(factor, (theta - mode.estimate.theta).T)
-            squares = np.sum(away**2, axis=0)
+            factor = mode.laplace.posterior.factor
+            squares = np.sum(np.linalg.solve(factor, (theta - mode.estimate.theta).T) ** 2, axis=0)
             logs = -0.5 * (_NU + theta.shape[1]) * np.log1p(squares / _NU) - float(np.log(np.diag(factor)).sum())
             logs += float(np.log(share / mass))
             terms.append(np.where(self._inside(mode, theta), logs, -np.inf))
@@ -78,7 +77,7 @@ class Proposal:
 
     @staticmethod
     def _t(rng: np.random.Generator, mode: Mode, count: int) -> Floats:
-        factor = np.linalg.cholesky(mode.laplace.covariance)
+        factor = mode.laplace.posterior.factor
         scale = np.sqrt(rng.chisquare(_NU, size=(count, 1)) / _NU)
         return np.asarray(mode.estimate.theta + rng.normal(size=(count, len(factor))) / scale @ factor.T)
 

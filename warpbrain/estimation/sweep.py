@@ -131,10 +131,7 @@ def sweep(
         try:
             parameters.require_possible(theta)
             forward = forward or Forward(case, theta, device)
-            try:
-                state = forward.solve(theta, near)
-            except SolveError:
-                state = forward.solve(theta)
+            state = forward.solve_from(theta, (near, None))
             if not state.passed_unstable:
                 near = state.u
             beside = compared(case, state.u, state.reactions)
