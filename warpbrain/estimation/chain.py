@@ -12,13 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
 from warpbrain.estimation.proposal import Proposal
 from warpbrain.estimation.target import Target
-
-Floats = NDArray[np.float64]
 
 #: Steps a solve at most, that a chain may end which finds nothing.
 _STEPS_A_SOLVE = 50

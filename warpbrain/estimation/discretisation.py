@@ -28,8 +28,8 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import ROUGH, Forward, State
@@ -39,8 +39,6 @@ from warpbrain.physics.force import NodalForce
 from warpbrain.simulation.finer import FinerCase, restricted
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.sensitivity import Sensitivities
-
-Floats = NDArray[np.float64]
 
 #: Of the range of `b` in which the error of the stiffness is finite: beyond, `a` goes on along its tangent.
 _WHOLE = 0.8

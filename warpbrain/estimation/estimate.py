@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
@@ -30,8 +29,6 @@ from warpbrain.estimation.target import Target
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
 from warpbrain.simulation.locking import on_linear_elements
-
-Floats = NDArray[np.float64]
 
 #: The error of the mesh is computed again until the estimate moves by no more than this, in standard deviations.
 _SETTLED = 0.2

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
 from warpbrain.estimation.parameters import Parameters
@@ -17,8 +15,6 @@ from warpbrain.simulation.model import Model
 from warpbrain.simulation.of_case import plain_model_of
 from warpbrain.simulation.sensitivity import Sensitivities, SensitivitySolver
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: Out-of-balance force of an equilibrium, relative: where differences of residuals must mean something, and where what
 #: is left of it need only be far below any noise.

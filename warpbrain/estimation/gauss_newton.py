@@ -17,14 +17,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import State
 from warpbrain.estimation.likelihood import Noise
 from warpbrain.estimation.problem import Linearised, Point, Problem
-
-Floats = NDArray[np.float64]
 
 #: How often a first state is tried at moduli larger by a factor of e.
 _STIFFER = 4

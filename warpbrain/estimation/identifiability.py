@@ -10,14 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.gauss_newton import Estimate
 from warpbrain.estimation.laplace import Laplace
 from warpbrain.estimation.parameters import Parameter
 from warpbrain.physics.words import enumerated
 
-Floats = NDArray[np.float64]
 #: Parameters with their weights in a direction.
 Parts = Sequence[tuple[Parameter, float]]
 

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.laplace import Laplace
 from warpbrain.estimation.pareto import RELIABLE, Smoothed, pareto_smoothed
 from warpbrain.estimation.proposal import Proposal
 from warpbrain.estimation.target import Target
-
-Floats = NDArray[np.float64]
 
 #: Laplace holds if weighted draws put the mean no farther away than this, in standard deviations, and the standard
 #: deviations in this ratio or its inverse.

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.forward import State
 from warpbrain.estimation.gauss_newton import Estimate
 from warpbrain.estimation.laplace import Laplace
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.discretisation import NAMES as DISCRETISATION_NAMES
 from warpbrain.estimation.discretisation import Discretisation, DiscretisationError
 from warpbrain.estimation.forward import State
 from warpbrain.estimation.observations import Residuals
 from warpbrain.estimation.registration import NAMES as REGISTRATION_NAMES
 from warpbrain.estimation.registration import Registration
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

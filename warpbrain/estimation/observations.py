@@ -13,8 +13,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
@@ -26,9 +26,6 @@ from warpbrain.recordings.comparison import faces_of_set
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
 from warpbrain.recordings.times import rows_at
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 #: Noise can be estimated from no fewer residuals than this.
 _FEWEST = 10
@@ -89,7 +86,7 @@ class Observation:
     name: str
     kind: str
     unit: str
-    rows: Rows
+    rows: Ints
     sigma: Floats | None
     weights: Floats
     size: int
@@ -301,7 +298,7 @@ def _force(case: Case, recording: ForceRecording, time: float | None) -> Observa
     return Observation(recording.name, recording.kind, "N", rows, sigma, ones, size, np.empty((0, 3)), at)
 
 
-def _sigma(recording: Recording, rows: Rows, weights: Floats) -> Floats | None:
+def _sigma(recording: Recording, rows: Ints, weights: Floats) -> Floats | None:
     """Standard deviation of each row, None if it is to be estimated."""
     sigmas = getattr(recording, "sigmas", None)
     if sigmas is None and recording.sigma is None:

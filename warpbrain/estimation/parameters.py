@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.gp.coordinates import Coordinate, coordinates, from_coordinates, to_coordinates
@@ -16,9 +17,6 @@ from warpbrain.physics.laws.stability import require_stable
 from warpbrain.physics.mechanism import Substituting
 from warpbrain.physics.words import enumerated
 from warpbrain.simulation.model import Material
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: How far one step of an estimation may go, by what a coordinate is: a factor of e in a modulus, so that the next
 #: equilibrium is within reach of the last.

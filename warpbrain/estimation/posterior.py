@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.estimation.chain import Chain
 from warpbrain.estimation.discretisation import DiscretisationError
@@ -20,8 +20,6 @@ from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.prediction import Prediction, Together, predictions
 from warpbrain.gp.prior import Prior
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

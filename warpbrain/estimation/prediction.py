@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.case import Case
 from warpbrain.estimation.likelihood import Noise, Rows
 from warpbrain.estimation.modes import Mode
@@ -19,9 +19,6 @@ from warpbrain.mesh import TetMesh
 from warpbrain.recordings.agreement import by_unit
 from warpbrain.recordings.comparison import Comparison
 from warpbrain.simulation.observation import observe
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: Probabilities of the intervals whose coverage is told.
 INTERVALS = (0.5, 0.95)
@@ -55,7 +52,7 @@ class Prediction:
     kind: str
     role: str
     unit: str
-    rows: NDArray[np.int64]
+    rows: Ints
     before: Floats
     after: Floats
     sigma: Floats | None

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups
 from warpbrain.errors import InputError
@@ -19,8 +19,6 @@ from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
-
-Floats = NDArray[np.float64]
 
 #: Draws on which the prior rests.
 DRAWS = 500

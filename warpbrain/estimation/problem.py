@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.forward import Forward, State
 from warpbrain.estimation.likelihood import Likelihood, Noise, Rough, Rows
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations, Residuals
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.prior_modes import PriorMode
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.estimation.modes import Mode, probabilities
-
-Floats = NDArray[np.float64]
 
 #: Degrees of freedom of the Student t around each estimate.
 _NU = 7.0
@@ -82,6 +80,6 @@ class Proposal:
         return np.asarray(mode.estimate.theta + rng.normal(size=(count, len(factor))) / scale @ factor.T)
 
     @staticmethod
-    def _inside(mode: Mode, theta: Floats) -> NDArray[np.bool_]:
+    def _inside(mode: Mode, theta: Floats) -> Bools:
         prior = mode.estimate.problem.mode
         return np.asarray(((theta >= prior.low) & (theta <= prior.high)).all(axis=1))

@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups
 from warpbrain.errors import InputError, SolveError
@@ -23,7 +23,6 @@ from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import law_of_curve
 from warpbrain.recordings.agreement import by_unit
 
-Floats = NDArray[np.float64]
 #: Steps of each tissue.
 Steps = tuple[float, ...]
 

@@ -7,15 +7,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import ROUGH, State
 from warpbrain.estimation.modes import Mode
 from warpbrain.estimation.problem import Point
 from warpbrain.gp.prior import Prior
-
-Floats = NDArray[np.float64]
 
 
 class Target:

@@ -7,13 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.sweep import Sweep
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
-
-Floats = NDArray[np.float64]
 
 _SWEEP, _BEST, _ESTIMATE = "#0072B2", "#D55E00", "#000000"
 

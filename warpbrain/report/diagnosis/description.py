@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Combination, Diagnosis, Ranked
@@ -18,8 +18,6 @@ from warpbrain.physics.values import Value
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
 from warpbrain.worlds.body.sensors import Sensors
-
-Floats = NDArray[np.float64]
 
 
 def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:

@@ -11,14 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: States of a case in the order in which they are shown, and their names for people.
 STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what is named"}

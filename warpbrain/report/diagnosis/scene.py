@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.report.diagnosis.figures.drawing import COLOURS, shades
 from warpbrain.report.diagnosis.saved import STATES, Anatomy, Rows
 from warpbrain.report.files import MILLIMETRES
-
-Floats = NDArray[np.float64]
 
 
 def describe_scene(said: dict[str, Any], anatomy: Anatomy, rows: Rows | None) -> dict[str, Any]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.predict import Prediction
@@ -16,8 +16,6 @@ from warpbrain.worlds.specimen.measures import rms, score
 from warpbrain.worlds.specimen.protocol import Protocol
 from warpbrain.worlds.specimen.result import Score
 from warpbrain.worlds.specimen.search import Sets, names_of
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.causes import Cause, Place
@@ -19,9 +19,6 @@ from warpbrain.inference.predict import predictive_p
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.linear import Linear
 from warpbrain.worlds.specimen.protocol import Protocol
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: Parts of a test that are held out where it is the only one, and blocks of its rows for intervals.
 _BLOCKS = 4
@@ -53,7 +50,7 @@ def folds_of(protocol: Protocol) -> Folds:
     return Folds(tuple(fitted & (blocks == block) for block in np.unique(blocks[fitted])), False)
 
 
-def blocks_of(protocol: Protocol) -> NDArray[np.int64]:
+def blocks_of(protocol: Protocol) -> Ints:
     """Parts of tests by number (n,)."""
     each = [
         _BLOCKS * k + np.minimum((_BLOCKS * test.path / max(float(test.path[-1]), 1e-12)).astype(np.int64), _BLOCKS - 1)

@@ -10,16 +10,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.noise import scales
 from warpbrain.worlds.specimen.forward import Assumed, Forward
 from warpbrain.worlds.specimen.material import NoStateError
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: Steps at most, and the relative gain that ends them; how often a fit is repeated with the scale of the noise, and
 #: with the glued ends of the law, that it arrived at.

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.worlds.specimen.acting import Acting, Declared, Effect, Way
@@ -15,8 +15,6 @@ from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.material import HomogeneousMaterial
 from warpbrain.worlds.specimen.nuisances import Nuisances
 from warpbrain.worlds.specimen.protocol import Protocol
-
-Floats = NDArray[np.float64]
 
 #: Step of differences, in standard deviations.
 _STEP = 1e-3

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import SolveError
@@ -20,8 +20,6 @@ from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.specimen import Rig
 from warpbrain.worlds.specimen.material import HomogeneousMaterial, NoStateError
 from warpbrain.worlds.specimen.protocol import Protocol, radius_of, strain_of, stress_unit
-
-Floats = NDArray[np.float64]
 
 #: Steps of the rig to the farther extreme; the largest strain it is asked for, of a stretch and of a shear.
 _STEPS, _STRETCH, _SHEAR = 4, 0.6, 0.8

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Cause, Kind, Place
@@ -18,8 +18,6 @@ from warpbrain.worlds.specimen.acting import Effect, Way
 from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
 from warpbrain.worlds.specimen.forward import Assumed
 from warpbrain.worlds.specimen.noise import smooth_patterns
-
-Floats = NDArray[np.float64]
 
 _PRIORS = {Kind.PHYSICS: "causes.mechanism", Kind.NOT_PHYSICS: "causes.not_physics", Kind.UNKNOWN: "causes.unknown"}
 

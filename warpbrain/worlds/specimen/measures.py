@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.physics.values import Smallest, Value
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.linear import Linear
 from warpbrain.worlds.specimen.protocol import Protocol, Test
 from warpbrain.worlds.specimen.result import Score, Segment
-
-Floats = NDArray[np.float64]
 
 #: Movement between rows, over the largest strain, below which a test rests; step of differences.
 _STILL, _STEP = 0.002, 1e-3

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
 from warpbrain.worlds.specimen.noise import noise_factor
 from warpbrain.worlds.specimen.protocol import Test, protocol
 from warpbrain.worlds.specimen.result import Measurement
-
-Floats = NDArray[np.float64]
 
 #: Rows of a side of a test, largest strain of one, duration [s] where no test has times, and part of a modulus that
 #: differs from specimen to specimen and tells nothing.

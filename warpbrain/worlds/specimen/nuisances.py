@@ -10,14 +10,12 @@ the zero of a gauge and its drift.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.worlds.specimen.acting import Declared
 from warpbrain.worlds.specimen.effects.law_shape import excess_rows, invariant_rows
 from warpbrain.worlds.specimen.effects.not_physics import specimen_rows
-
-Floats = NDArray[np.float64]
 
 
 class Nuisances:

@@ -17,14 +17,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.specimen import Specimen
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.history import corners_of, history_of
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Steps from rest to the largest imposed value, rows of a test without times, and the part of a test's duration that
 #: the first step of a rest takes: how rows are chosen.
@@ -135,7 +132,7 @@ class Protocol:
         """Stress (n,) at all rows [Pa]."""
         return np.concatenate([test.stress for test in self.tests])
 
-    def mask(self, tests: Sequence[int]) -> NDArray[np.bool_]:
+    def mask(self, tests: Sequence[int]) -> Bools:
         """The rows (n,) of some tests."""
         found = np.zeros(len(self), dtype=bool)
         for number in tests:

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Kind
@@ -21,8 +20,6 @@ from warpbrain.inference.subsets import Hypothesis
 from warpbrain.worlds.specimen.acting import Effect
 from warpbrain.worlds.specimen.fit import Fit, Fitting
 from warpbrain.worlds.specimen.linear import Linear, linearise, log_odds
-
-Floats = NDArray[np.float64]
 
 #: Part of the probability that fitted sets have in the end, fits at most, causes of a set at most, and pairs to which a
 #: third cause is added.

@@ -10,16 +10,14 @@ What stiffens is all of the stress, what the tissue remembers among it. Small on
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.causes import Kind
 from warpbrain.physics.proposal import NotTestableError
 from warpbrain.worlds.specimen.acting import Acting, Declared, Effect, Way
 from warpbrain.worlds.specimen.protocol import Protocol
-
-Floats = NDArray[np.float64]
 
 STIFFENING, SECOND_INVARIANT = "stiffening", "second invariant"
 #: Beyond which no exponential is computed.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.causes import Kind
 from warpbrain.physics.mechanism import Mechanism
@@ -14,8 +14,6 @@ from warpbrain.simulation.history import corners_of
 from warpbrain.worlds.specimen.acting import Acting, Effect, Way
 from warpbrain.worlds.specimen.material import can_act
 from warpbrain.worlds.specimen.protocol import Protocol, Test
-
-Floats = NDArray[np.float64]
 
 #: Rates that differ less than this are one rate, relative; a share of the duration at rest that counts as a hold.
 _RATES, _HOLD = 1.5, 0.1

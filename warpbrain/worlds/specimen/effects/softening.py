@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.causes import Kind
@@ -19,7 +19,6 @@ from warpbrain.worlds.specimen.acting import Acting, Declared, Effect, Way
 from warpbrain.worlds.specimen.effects.law_shape import first_invariant
 from warpbrain.worlds.specimen.protocol import Chain, Protocol
 
-Floats = NDArray[np.float64]
 #: From a chain of a protocol to a pattern at its rows (n,).
 Pattern = Callable[[Protocol, Chain], Floats]
 
