@@ -127,7 +127,7 @@ def test_points_are_located_anew_where_they_or_the_mesh_are_others() -> None:
     larger = replace(case, mesh=TetMesh(1.1 * mesh.points, mesh.tetrahedra, mesh.tissue, mesh.node_sets))
     u = case.mesh.points**2
     for there, recording in ((case, seen), (case, moved), (larger, seen)):
-        [one] = Observations.to_fit(replace(there, recordings=(recording,))).each
+        [one] = Observations.to_fit(replace(there, recordings=(recording,))).recordings
         expected = locate(there.mesh.points, there.mesh.tetrahedra, recording.points).interpolate(u)
         values = one.at(u, np.zeros_like(u), np.zeros(3), np.zeros(6)).values
         np.testing.assert_allclose(values, recording.displacement - expected, atol=1e-15)

@@ -136,7 +136,7 @@ class Estimation:
         errors: list[DiscretisationError] = []
         if self.options.discretisation is not None:
             with self._timed("error of the mesh"):
-                modes = self._without_error_of_mesh(modes, self.options.discretisation, errors, solves)
+                modes = self._corrected_for_mesh(modes, self.options.discretisation, errors, solves)
         require_explained(modes[0].estimate)
         before = self.forward.solves
         with self._timed("check of the posterior"):
@@ -213,7 +213,7 @@ class Estimation:
             self._remarks.append(f"{text}: not converged")
         return Mode(found)
 
-    def _without_error_of_mesh(
+    def _corrected_for_mesh(
         self,
         modes: tuple[Mode, ...],
         believed: Discretisation,
@@ -271,7 +271,7 @@ class Estimation:
 
 def _where(parameters: Parameters, mode: PriorMode) -> str:
     """Which mode, in words: the signs of its exponents."""
-    ends = zip(parameters.each, mode.low, strict=True)
+    ends = zip(parameters, mode.low, strict=True)
     words = [
         f"{parameter.name} {'>' if low > 0.0 else '<'} 0" for parameter, low in ends if parameter.coordinate.signed
     ]

@@ -244,7 +244,7 @@ def require_explained(estimate: Estimate) -> None:
     gross = estimate.point.known_noise.gross
     explained = int(np.count_nonzero(~gross))
     if explained < _FEWEST_EXPLAINED * len(gross):
-        names = ", ".join(f"'{one.name}'" for one in estimate.problem.observations.each if one.unit == "m")
+        names = ", ".join(f"'{one.name}'" for one in estimate.problem.observations.recordings if one.unit == "m")
         raise SolveError(
             f"no estimate: {len(gross) - explained} of {len(gross)} rows recorded in {names} are gross errors, "
             "farther from what any parameters found make of them than their sigma allows; is the unit, the axes or "

@@ -80,7 +80,7 @@ class Identifiability:
 
 def identifiability(estimate: Estimate, posterior: Laplace) -> Identifiability:
     """What the data of an estimate inform."""
-    each, gains = posterior.parameters.each, posterior.gains
+    parameters, gains = tuple(posterior.parameters), posterior.gains
     told, between = gains >= TOLD, (gains < TOLD) & (gains >= HIDDEN)
     # one prior standard deviation of a parameter is the unit in which changes of different kinds compare
     unit = posterior.prior.standard_deviations
@@ -88,10 +88,14 @@ def identifiability(estimate: Estimate, posterior: Laplace) -> Identifiability:
     scale = posterior.parameters.is_modulus.astype(np.float64)
     moved = np.linalg.norm(np.tensordot(scale, estimate.linearised.du, axes=1))
     known = float(scale @ posterior.information @ scale) / float(scale @ posterior.prior.precision @ scale)
+    informed, weakly_informed = (
+        tuple(combination(_parts(parameters, row, 1.0 / unit)) for row in _reduced(posterior.combinations[rows] * unit))
+        for rows in (told, between)
+    )
     return Identifiability(
-        tuple(combination(_parts(each, row, 1.0 / unit)) for row in _reduced(posterior.told[told] * unit)),
-        tuple(combination(_parts(each, row, 1.0 / unit)) for row in _reduced(posterior.told[between] * unit)),
-        tuple(change(_parts(each, row, unit)) for row in _reduced(posterior.undone[gains < HIDDEN] / unit)),
+        informed,
+        weakly_informed,
+        tuple(change(_parts(parameters, row, unit)) for row in _reduced(posterior.directions[gains < HIDDEN] / unit)),
         known < HIDDEN and bool(moved <= _UNMOVED * np.linalg.norm(estimate.point.state.u)),
     )
 
@@ -107,12 +111,12 @@ def _reduced(rows: Floats) -> Floats:
     return rows
 
 
-def _parts(each: Sequence[Parameter], row: Floats, unit: Floats) -> Parts:
+def _parts(parameters: Sequence[Parameter], row: Floats, unit: Floats) -> Parts:
     """Parameters that count, in order; in their own units, the largest 1."""
     counted = np.flatnonzero(np.abs(row) >= _NEGLIGIBLE * np.abs(row).max()).tolist()
     weights = row * unit
     weights = weights / weights[counted][np.abs(weights[counted]).argmax()]
-    return [(each[k], float(weights[k])) for k in counted]
+    return [(parameters[k], float(weights[k])) for k in counted]
 
 
 def combination(parts: Parts) -> str:

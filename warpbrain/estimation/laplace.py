@@ -90,12 +90,12 @@ class Laplace:
         return self._eigen[0]
 
     @property
-    def told(self) -> Floats:
+    def combinations(self) -> Floats:
         """What the data told of each direction: combinations (p, p) of the parameters, one a row, largest entry 1."""
         return _normalised(np.linalg.inv(self.prior.factor).T @ self._eigen[1])
 
     @property
-    def undone(self) -> Floats:
+    def directions(self) -> Floats:
         """The change of all parameters along each direction, one a row (p, p), largest entry 1.
 
         Where the gain is small the data cannot tell the estimate from the estimate changed like this.

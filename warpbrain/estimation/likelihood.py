@@ -60,7 +60,7 @@ class Rows:
     def of(cls, observations: Observations, parts: tuple[Residuals, ...]) -> Rows:
         """Those of residuals at a state: surfaces are looked at along their normals there."""
         positions, sigma, points, first = [], [], [], 0
-        for one in observations.each:
+        for one in observations.recordings:
             count = len(one.rows)
             where = one.positions if len(one.positions) else np.full((count, 3), np.nan)
             positions.append(np.repeat(where, one.size, axis=0))
@@ -75,7 +75,7 @@ class Rows:
             np.concatenate([part.directions.reshape(-1, 3) for part in parts]),
             np.concatenate(sigma),
             np.repeat(np.arange(len(parts)), sizes),
-            np.array([one.sigma is not None for one in observations.each]),
+            np.array([one.sigma is not None for one in observations.recordings]),
             tuple(points),
         )
 
@@ -85,7 +85,7 @@ class Rows:
 
 
 @dataclass(frozen=True, eq=False)
-class Rough:
+class EmpiricalNoise:
     """Independent noise as large as the residuals of each recording are, for the way to the estimate."""
 
     rows: Rows
@@ -122,7 +122,7 @@ class Noise:
         Factor on all of it.
     inflation : (g,) array
         How many times larger the noise of each point is: 1 of a sound one, more of a gross error.
-    believed : Outliers or None
+    outliers : Outliers or None
         What was believed of them; None: there are none.
     """
 
@@ -130,7 +130,7 @@ class Noise:
     sigma: Floats
     scale: float
     inflation: Floats
-    believed: Outliers | None
+    outliers: Outliers | None
 
     @property
     def gross(self) -> Bools:
@@ -153,9 +153,9 @@ class Noise:
     def log_prior(self) -> float:
         """Of its scale and of its gross errors."""
         found = float(log_scale_density(np.array(self.scale)))
-        if self.believed is not None:
-            kinds = np.searchsorted(self.believed.inflations, self.inflation)
-            found += float(self.believed.log_probabilities[kinds].sum())
+        if self.outliers is not None:
+            kinds = np.searchsorted(self.outliers.inflations, self.inflation)
+            found += float(self.outliers.log_probabilities[kinds].sum())
         return found
 
     def negative_log(self, residual: Floats) -> float:

@@ -100,12 +100,12 @@ class Observations:
 
     Attributes
     ----------
-    each : tuple of Observation
+    recordings : tuple of Observation
     remarks : tuple of str
         Recordings that say nothing of tissue, and why.
     """
 
-    each: tuple[Observation, ...]
+    recordings: tuple[Observation, ...]
     remarks: tuple[str, ...]
 
     @classmethod
@@ -128,9 +128,9 @@ class Observations:
             checks = f"; its {len(case.recordings)} have role = 'check'" if case.recordings else ""
             raise InputError(f"{case.path}: no [[recording]] to estimate from{checks}")
         found = cls._of(case, "fit", time)
-        if not found.each:
+        if not found.recordings:
             raise InputError(f"{case.path}: nothing to estimate from: {'; '.join(found.remarks)}")
-        for observation in found.each:
+        for observation in found.recordings:
             count = observation.size * len(observation.rows)
             if observation.sigma is None and count < _FEWEST:
                 raise InputError(
@@ -161,7 +161,7 @@ class Observations:
     @property
     def centre(self) -> Floats:
         """Mean of all positions that were recorded [m], zero if there are none."""
-        positions = np.concatenate([observation.positions for observation in self.each])
+        positions = np.concatenate([observation.positions for observation in self.recordings])
         return positions.mean(axis=0) if len(positions) else np.zeros(3)
 
     def at(
@@ -182,7 +182,7 @@ class Observations:
         """
         about = self.centre if centre is None else centre
         by = np.zeros(6) if motion is None else motion
-        return tuple(observation.at(u, reactions, about, by) for observation in self.each)
+        return tuple(observation.at(u, reactions, about, by) for observation in self.recordings)
 
 
 def _observation(case: Case, recording: Recording, time: float | None) -> Observation:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -103,11 +103,11 @@ class Parameters:
             _poisson(case),
         )
 
-    @property
-    def each(self) -> tuple[Parameter, ...]:
+    def __iter__(self) -> Iterator[Parameter]:
         """Every number of `theta`, in order."""
-        pairs = zip(self.tissues, self.laws_of, strict=True)
-        return tuple(Parameter(tissue, coordinate) for tissue, law in pairs for coordinate in coordinates(law))
+        for tissue, law in zip(self.tissues, self.laws_of, strict=True):
+            for coordinate in coordinates(law):
+                yield Parameter(tissue, coordinate)
 
     def __len__(self) -> int:
         return sum(len(coordinates(law)) for law in self.laws_of)
@@ -115,27 +115,27 @@ class Parameters:
     @property
     def names(self) -> tuple[str, ...]:
         """With tissue and unit."""
-        return tuple(parameter.name for parameter in self.each)
+        return tuple(parameter.name for parameter in self)
 
     @property
     def low(self) -> Floats:
         """Where each ends, shape (p,)."""
-        return np.array([parameter.coordinate.low for parameter in self.each])
+        return np.array([parameter.coordinate.low for parameter in self])
 
     @property
     def high(self) -> Floats:
         """Where each ends, shape (p,)."""
-        return np.array([parameter.coordinate.high for parameter in self.each])
+        return np.array([parameter.coordinate.high for parameter in self])
 
     @property
     def reach(self) -> Floats:
         """How far one step of an estimation may go, shape (p,)."""
-        return np.array([_REACH[parameter.coordinate.name] for parameter in self.each])
+        return np.array([_REACH[parameter.coordinate.name] for parameter in self])
 
     @property
     def is_modulus(self) -> Bools:
         """Which are logarithms of shear moduli, shape (p,)."""
-        return np.array([parameter.is_modulus for parameter in self.each])
+        return np.array([parameter.is_modulus for parameter in self])
 
     def theta_of(self, laws: Sequence[Law]) -> Floats:
         """The vector (p,) of the law of each tissue.

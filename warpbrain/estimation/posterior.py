@@ -18,7 +18,7 @@ from warpbrain.estimation.modes import Mode, probabilities
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
-from warpbrain.estimation.prediction import Prediction, Together, predictions
+from warpbrain.estimation.prediction import OverallErrors, Prediction, predictions
 from warpbrain.gp.prior import Prior
 
 
@@ -163,7 +163,7 @@ class Posterior:
                 float(np.sqrt(self.prior.covariance[k, k])),
                 (float(prior[k, 0]), float(prior[k, 1])),
             )
-            for k, parameter in enumerate(self.parameters.each)
+            for k, parameter in enumerate(self.parameters)
         )
 
     @cached_property
@@ -199,6 +199,6 @@ class Posterior:
         )
 
     @property
-    def together(self) -> tuple[Together, ...]:
+    def overall_errors(self) -> tuple[OverallErrors, ...]:
         """Errors over all rows of points and surfaces, of those that were fitted and of those that check."""
-        return Together.of(self.predictions)
+        return OverallErrors.of(self.predictions)

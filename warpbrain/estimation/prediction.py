@@ -74,7 +74,7 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Together:
+class OverallErrors:
     """All points and surfaces of one role: root mean square of the 3-D distance over every row [m].
 
     Attributes
@@ -92,7 +92,7 @@ class Together:
     of_run: float
 
     @classmethod
-    def of(cls, each: Sequence[Prediction]) -> tuple[Together, ...]:
+    def of(cls, each: Sequence[Prediction]) -> tuple[OverallErrors, ...]:
         """Of each role that has any."""
         found = []
         for role in dict.fromkeys(one.role for one in each):
@@ -106,7 +106,7 @@ class Together:
 
 
 @dataclass(frozen=True, eq=False)
-class _Moved:
+class _DeformedState:
     """What recordings are compared with, see `warpbrain.simulation.observation.State`."""
 
     mesh: TetMesh
@@ -135,7 +135,7 @@ def predictions(case: Case, mode: Mode, role: str, observations: Observations, j
     run = compared(case, point.state.u, point.state.reactions)
     fitted = compared(realigned(case, motion, centre), *seen)
     found = []
-    for number, (observation, first, part) in enumerate(zip(observations.each, before, parts, strict=True)):
+    for number, (observation, first, part) in enumerate(zip(observations.recordings, before, parts, strict=True)):
         jacobian = problem.nuisances.jacobian(
             part, point.state.theta, point.nuisances, (derivatives.du, derivatives.dR)
         )
@@ -168,18 +168,18 @@ def predictions(case: Case, mode: Mode, role: str, observations: Observations, j
 def _unseen(observation: Observation, part: Residuals, jacobian: Floats, joint: Floats, fitted: Noise) -> Noise:
     """The noise of a recording that was not fitted, its gross errors beside what the estimate knows of it."""
     rows = Rows.of(Observations((observation,), ()), (part,))
-    noise = Noise(rows, rows.sigma, fitted.scale, np.ones(len(rows.points)), fitted.believed)
-    if observation.sigma is None or fitted.believed is None:
+    noise = Noise(rows, rows.sigma, fitted.scale, np.ones(len(rows.points)), fitted.outliers)
+    if observation.sigma is None or fitted.outliers is None:
         return noise
     columns = jacobian.reshape(-1, jacobian.shape[2]) @ np.linalg.cholesky(joint)
     model = GaussianModel(noise.factor, columns, noise.scale)
-    found = with_gross_errors(model, part.values.ravel(), rows.points, fitted.believed)
+    found = with_gross_errors(model, part.values.ravel(), rows.points, fitted.outliers)
     return replace(noise, inflation=found.inflation)
 
 
 def compared(case: Case, u: Floats, reactions: Floats) -> Mapping[str, Comparison]:
     """Recordings by name beside displacement and reactions (N, 3), as `warpbrain run` compares them."""
-    return {one.name: one for one in observe(case, _Moved(case.remaining[0], u, reactions)).comparisons}
+    return {one.name: one for one in observe(case, _DeformedState(case.remaining[0], u, reactions)).comparisons}
 
 
 def coverage(residuals: Floats, deviation: Floats, gross: Bools) -> tuple[float, ...] | None:

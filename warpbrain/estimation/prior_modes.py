@@ -86,7 +86,7 @@ def prior_modes(prior: Prior, parameters: Parameters) -> tuple[PriorMode, ...]:
     if prior.theta.shape[1] != len(parameters):
         names = ", ".join(parameters.names)
         raise InputError(f"prior: of {prior.theta.shape[1]} parameters; the case has {len(parameters)}: {names}")
-    signed = np.array([parameter.coordinate.signed for parameter in parameters.each])
+    signed = np.array([parameter.coordinate.signed for parameter in parameters])
     signs = np.sign(prior.theta[:, signed])
     kinds, cluster, counts = np.unique(signs, axis=0, return_inverse=True, return_counts=True)
     kept = np.flatnonzero(counts >= max(_LEAST_SHARE * len(signs), 5 * len(parameters)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.estimation.forward import Forward, State
-from warpbrain.estimation.likelihood import Likelihood, Noise, Rough, Rows
+from warpbrain.estimation.likelihood import EmpiricalNoise, Likelihood, Noise, Rows
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations, Residuals
 from warpbrain.estimation.parameters import Parameters
@@ -27,7 +27,7 @@ class Point:
         With a rigid motion of what was recorded taken off.
     residual : (n,) array
         All of them, one after the other.
-    noise : Noise or Rough
+    noise : Noise or EmpiricalNoise
     misfit : float
         `-ln` of the likelihood and of the nuisances' density.
     objective : float
@@ -38,7 +38,7 @@ class Point:
     nuisances: Floats
     parts: tuple[Residuals, ...]
     residual: Floats
-    noise: Noise | Rough
+    noise: Noise | EmpiricalNoise
     misfit: float
     objective: float
 
@@ -103,12 +103,12 @@ class Problem:
         """What `theta` means."""
         return self.forward.parameters
 
-    def at(self, state: State, nuisances: Floats, noise: Noise | Rough | None = None) -> Point:
+    def at(self, state: State, nuisances: Floats, noise: Noise | EmpiricalNoise | None = None) -> Point:
         """The objective at a state; noise that is as large as the residuals are, unless it is known."""
         motion = self.nuisances.motion(nuisances)
         parts = self.observations.at(*self.nuisances.observed(state, nuisances), motion=motion)
         residual = np.concatenate([part.values.ravel() for part in parts])
-        known = Rough(Rows.of(self.observations, parts)) if noise is None else noise
+        known = EmpiricalNoise(Rows.of(self.observations, parts)) if noise is None else noise
         misfit = known.negative_log(residual) + self.nuisances.negative_log(nuisances)
         objective = misfit + self.mode.gaussian.negative_log(state.theta)
         return Point(state, nuisances, parts, residual, known, misfit, objective)

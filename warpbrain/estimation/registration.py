@@ -50,15 +50,8 @@ class Registration:
         return np.diag(np.repeat([self.shift**-2, self.turn**-2], 3))
 
 
-def moved(positions: Floats, motion: Floats, centre: Floats) -> Floats:
-    """Positions (n, 3) after a rigid motion: shift [m] and turn [rad] (6,) about a centre (3,)."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_rotvec(motion[3:]).apply(positions - centre) + centre + motion[:3])
-
-
 def moved_back(positions: Floats, motion: Floats, centre: Floats) -> Floats:
-    """Positions (n, 3) that `moved` takes to these."""
+    """Positions (n, 3) without a rigid motion: shift [m] and turn [rad] (6,) about a centre (3,)."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_rotvec(motion[3:]).inv().apply(positions - centre - motion[:3]) + centre)

@@ -111,7 +111,7 @@ def sweep(
         If there is nothing to compare with, or a tissue has no group, or one that the model has seen no study of.
     """
     observations = Observations.to_fit(case)
-    unit = "m" if any(observation.unit == "m" for observation in observations.each) else "N"
+    unit = "m" if any(observation.unit == "m" for observation in observations.recordings) else "N"
     parameters = Parameters.of(case)
     require_groups(case, [label for labels in parameters.labels for label in labels], model)
     curves = [
@@ -134,7 +134,7 @@ def sweep(
             if not state.passed_unstable:
                 near = state.u
             beside = compared(case, state.u, state.reactions)
-            error = by_unit((one.unit, beside[one.name].residuals_after) for one in observations.each)[unit]
+            error = by_unit((one.unit, beside[one.name].residuals_after) for one in observations.recordings)[unit]
         except (InputError, SolveError) as failure:
             reason = str(failure)
         found[k] = SweepPoint(k, tuple(theta.tolist()), error, reason)

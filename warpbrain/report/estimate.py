@@ -11,7 +11,7 @@ import numpy as np
 from warpbrain.estimation.laplace import Laplace
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
-from warpbrain.estimation.prediction import INTERVALS, Prediction, Together
+from warpbrain.estimation.prediction import INTERVALS, OverallErrors, Prediction
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
@@ -65,7 +65,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
             for mode, probability in zip(posterior.modes, posterior.mode_probabilities, strict=True)
         ],
         "predictions": [_describe_prediction(prediction) for prediction in posterior.predictions],
-        "all_recordings": [_describe_together(together) for together in posterior.together],
+        "all_recordings": [_describe_overall(overall) for overall in posterior.overall_errors],
         "likelihood": _describe_likelihood(posterior),
         "discretisation": describe_discretisation(posterior),
         "registration": describe_registration(posterior),
@@ -139,7 +139,7 @@ def _shown(parameter: Parameter) -> Callable[[float], float]:
 
 def _describe_nothing_else(averaged: AveragedTissue) -> dict[str, Any]:
     deviations = np.sqrt(np.diag(averaged.covariance)).tolist()
-    each = zip(averaged.parameters.each, averaged.mean.tolist(), deviations, averaged.interval(0.95), strict=True)
+    each = zip(averaged.parameters, averaged.mean.tolist(), deviations, averaged.interval(0.95), strict=True)
     return {
         "probability": averaged.nothing,
         "causes": [
@@ -161,7 +161,7 @@ def _describe_nothing_else(averaged: AveragedTissue) -> dict[str, Any]:
 def _directions(laplace: Laplace) -> list[dict[str, Any]]:
     return [
         {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": told, "undone": undone}
-        for gain, told, undone in zip(laplace.gains.tolist(), laplace.told, laplace.undone, strict=True)
+        for gain, told, undone in zip(laplace.gains.tolist(), laplace.combinations, laplace.directions, strict=True)
     ]
 
 
@@ -206,19 +206,19 @@ def noise_of(prediction: Prediction) -> float | None:
     return SHOWN[prediction.unit][0] * math.sqrt(size * float(np.mean(prediction.sigma**2)))
 
 
-def _describe_together(together: Together) -> dict[str, Any]:
+def _describe_overall(overall: OverallErrors) -> dict[str, Any]:
     return {
-        "role": together.role,
-        "count": together.count,
-        "root_mean_square_before_mm": MILLIMETRES * together.before,
-        "root_mean_square_after_mm": MILLIMETRES * together.after,
-        "root_mean_square_of_run_mm": MILLIMETRES * together.of_run,
+        "role": overall.role,
+        "count": overall.count,
+        "root_mean_square_before_mm": MILLIMETRES * overall.before,
+        "root_mean_square_after_mm": MILLIMETRES * overall.after,
+        "root_mean_square_of_run_mm": MILLIMETRES * overall.of_run,
     }
 
 
 def _describe_likelihood(posterior: Posterior) -> dict[str, Any]:
     noise = posterior.best.estimate.point.known_noise
-    believed = noise.believed
+    believed = noise.outliers
     return {
         "density": "normal, shared by neighbours" + ("" if believed is None else ", with gross errors"),
         "degrees_of_freedom": None,
