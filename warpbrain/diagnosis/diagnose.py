@@ -18,7 +18,7 @@ from warpbrain.diagnosis.measuring import next_measurements
 from warpbrain.diagnosis.onset import Onset, onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.ranking import Ranking, about_base
-from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Measurement, Ranked
+from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Ranked
 from warpbrain.diagnosis.sentences import assumptions_of
 from warpbrain.diagnosis.telling_apart import imitations, smallest
 from warpbrain.diagnosis.traits import Traits, traits_of
@@ -34,6 +34,7 @@ from warpbrain.inference.decide import (
     Decision,
     decide,
 )
+from warpbrain.physics.values import Measurement
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
 from warpbrain.worlds.body.observable import require_observable

@@ -15,7 +15,7 @@ from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.confirm import after_checks
 from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, Decision, decide
-from warpbrain.physics.values import Value
+from warpbrain.physics.values import Measurement, Value
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.specimen import specimen_of
 from warpbrain.threads import one_thread_of_blas
@@ -30,7 +30,7 @@ from warpbrain.worlds.specimen.measures import score, smallest_of, values_of, wh
 from warpbrain.worlds.specimen.next_tests import next_measurements
 from warpbrain.worlds.specimen.noise import noise_factor
 from warpbrain.worlds.specimen.protocol import protocol_of
-from warpbrain.worlds.specimen.result import Combination, Measurement, Ranked, SpecimenDiagnosis
+from warpbrain.worlds.specimen.result import Combination, Ranked, SpecimenDiagnosis
 from warpbrain.worlds.specimen.search import Found, Sets, names_of
 from warpbrain.worlds.specimen.sentences import assumptions_of
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.physics.values import Measurement
 from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
 from warpbrain.worlds.specimen.noise import noise_factor
 from warpbrain.worlds.specimen.protocol import Test, protocol
-from warpbrain.worlds.specimen.result import Measurement
 
 #: Rows of a side of a test, largest strain of one, duration [s] where no test has times, and part of a modulus that
 #: differs from specimen to specimen and tells nothing.
