@@ -284,7 +284,7 @@ def diagnose(
     if case.specimen is None:
         return Diagnosing(case, options, device, listener).run()
     asked = (options or DiagnosisOptions()).of_specimen
-    return DiagnosingSpecimen(case, asked, device, (listener or Listener()).stage).run()
+    return DiagnosingSpecimen(case, asked, device, listener).run()
 
 
 def left_of(one: Weighed) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

@@ -72,8 +72,8 @@ def held_out(fit: Fit, folds: Folds) -> tuple[Floats, float]:
     rows = fit.rows
     predicted, total = np.full(len(rows), np.nan), 0.0
     for held in folds.held:
-        again = fit.given(rows & ~held)
-        columns = np.column_stack([fit.rest, again.columns])[rows]
+        again = fit.refitted_to(rows & ~held)
+        columns = np.column_stack([fit.unknown, again.columns])[rows]
         model = GaussianModel(fit.model.noise_factor, columns, fit.scale)
         observed = ~held[rows]
         mean, _ = model.conditional(again.residual[rows], observed)
@@ -85,7 +85,7 @@ def held_out(fit: Fit, folds: Folds) -> tuple[Floats, float]:
 def placebo_p(about: Linear, name: str, folds: Folds, rng: np.random.Generator) -> float:
     """Probability that a pattern that means nothing predicts held-out rows as well as a cause does.
 
-    A pattern is a random smooth function of stretch, shear, the way along a test and the logarithm of its time, the
+    A pattern is a random smooth function of stretch, shear, the path of a test and the logarithm of its time, the
     same in all tests, so that it can carry over to those that are held out as a cause does. It has as many places and
     columns as the cause, of the same sizes, and both are in the same model: about the fit without the cause.
 
@@ -138,7 +138,7 @@ def _pattern(where: Floats, count: int, rng: np.random.Generator) -> Floats:
 
 
 def _coordinates(protocol: Protocol) -> Floats:
-    """Stretch and shear over their largest, way along the test and logarithm of its time (n, 4)."""
+    """Stretch and shear over their largest, path of the test and logarithm of its time (n, 4)."""
     rows = []
     for test in protocol.tests:
         strain, zero = (test.strain - test.rest) / test.reach, np.zeros(len(test.strain))

@@ -34,8 +34,8 @@ def values_of(fit: Fit, number: int) -> tuple[Value, ...]:
     """Parameters of one of the causes of a fit, with standard deviations to first order."""
     one, part = fit.assumed[number], fit.part(number)
     z = fit.z[part]
-    here = np.array(one.way.values(one.coefficients(z)))
-    moved = [np.array(one.way.values(one.coefficients(z + _STEP * move))) for move in np.eye(len(z))]
+    here = np.array(one.variant.values(one.coefficients(z)))
+    moved = [np.array(one.variant.values(one.coefficients(z + _STEP * move))) for move in np.eye(len(z))]
     slope = (np.array(moved) - here).T / _STEP
     sd = np.sqrt(np.maximum(np.diag(slope @ fit.covariance[part, part] @ slope.T), 0.0))
     return tuple(
@@ -84,8 +84,10 @@ def smallest_of(about: Linear) -> dict[str, Smallest]:
             continue
         seen = [float(np.linalg.norm(model.standardised(place.columns[:, :1]))) for place in cause.places]
         best = int(np.argmax(seen))
-        way, trial = trials[best]
+        variant, trial = trials[best]
         part = belief("specimen.seen") / max(seen[best], 1e-12)
-        nothing, there = (way.values(c)[0] for c in (way.nothing, way.nothing + part * (trial[0] - way.nothing)))
+        nothing, there = (
+            variant.values(c)[0] for c in (variant.nothing, variant.nothing + part * (trial[0] - variant.nothing))
+        )
         found[effect.name] = Smallest(abs(there - nothing), effect.units[0], effect.names[0])
     return found

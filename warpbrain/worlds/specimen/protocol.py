@@ -1,12 +1,12 @@
-"""The tests of a specimen: stress over strain at the recorded rows, in chains of one memory; few rows for inference.
+"""The tests of a specimen: stress over strain at the recorded rows, in chains of one memory; fewer rows for inference.
 
 Every response is turned into a nominal stress [Pa]: a force over the area of an end, a torque over `int r dA`. Every
 imposed value is turned into a strain: a stretch, a shear, or the shear at the rim of a twisted cylinder.
 
-A `Protocol` has all recorded rows, of which every printed error is, or few of them, of which densities are: of a test
-with times so many that straight lines between them follow what was imposed, and that a rest is followed at ever longer
-steps (`warpbrain.simulation.history`). What a test is measured by (its largest stress and strain, the way along it) is
-that of the whole record in both.
+A `Protocol` has all recorded rows, of which every printed error is; thinned it has those of which densities are: of a
+test with times so many that straight lines between them follow what was imposed, and that a rest is followed at ever
+longer steps (`warpbrain.simulation.history`). What a test is measured by (its largest stress and strain, its strain
+path) is that of the whole record in both.
 
 Tests of one mode and one specimen whose times go on from one to the next are a chain: tissue remembers the earlier one.
 """
@@ -44,7 +44,7 @@ class Test:
     time : (n,) array or None
         [s]
     gone : (n,) array
-        Way along the test: strain that was gone through, over the largest.
+        Absolute changes of strain so far, summed, over the largest strain.
     sigma : float
         Of a reading [Pa]: as declared, or as rough as the record is.
     unit : float
@@ -65,7 +65,7 @@ class Test:
     strain: Floats
     stress: Floats
     time: Floats | None
-    gone: Floats
+    strain_path: Floats
     sigma: float
     unit: float
     peak: float
@@ -86,15 +86,15 @@ class Test:
 
     @property
     def path(self) -> Floats:
-        """Way (n,) along the test from 0: in strain, and in time."""
-        return self.gone + self.share
+        """Progress (n,) of the test from 0: strain path and part of its time together."""
+        return self.strain_path + self.share
 
     def at(self, rows: Ints) -> Test:
         """The test at some of its rows, by their places among them."""
         time = None if self.time is None else self.time[rows]
         return replace(
             self, rows=self.rows[rows], strain=self.strain[rows], stress=self.stress[rows], time=time,
-            gone=self.gone[rows],
+            strain_path=self.strain_path[rows],
         )  # fmt: skip
 
 
@@ -155,15 +155,15 @@ class Protocol:
         return tuple(dict.fromkeys(test.specimen for test in self.tests))
 
     @property
-    def few(self) -> Protocol:
+    def thinned(self) -> Protocol:
         """The same tests at the rows that densities are of."""
         return protocol(tuple(test.at(_kept(test)) for test in self.tests))
 
-    def spread(self, of_few: Floats, few: Protocol) -> Floats:
-        """Values (m,) at the few rows on all of them (n,): straight from one to the next."""
+    def spread(self, of_thinned: Floats, thinned: Protocol) -> Floats:
+        """Values (m,) of thinned rows at all of them (n,): straight from one to the next."""
         each = [
-            np.interp(test.rows, sparse.rows, of_few[rows])
-            for test, sparse, rows in zip(self.tests, few.tests, few.rows, strict=True)
+            np.interp(test.rows, sparse.rows, of_thinned[rows])
+            for test, sparse, rows in zip(self.tests, thinned.tests, thinned.rows, strict=True)
         ]
         return np.concatenate(each)
 
@@ -211,17 +211,17 @@ def test_of(specimen: Specimen, recording: TestRecording) -> Test:
         strain=strain,
         stress=stress,
         time=recording.time,
-        gone=np.zeros(len(strain)),
+        strain_path=np.zeros(len(strain)),
         sigma=unit * recording.sigma if recording.sigma is not None else roughness(stress),
         unit=unit,
         peak=float(np.abs(stress).max()),
         reach=max(float(away.max()), 1e-12),
         turn=recording.turn,
     )
-    # without the jitter of a reading, which would make every way long
+    # without the jitter of a reading, which would make every path long
     kept = _kept(test)
-    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain[kept])))]) / test.reach
-    return replace(test, gone=np.interp(test.rows, kept, gone))
+    strain_path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain[kept])))]) / test.reach
+    return replace(test, strain_path=np.interp(test.rows, kept, strain_path))
 
 
 test_of.__test__ = False  # type: ignore[attr-defined]  # not a test of pytest's
