@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +26,7 @@ from warpbrain.estimation.proposal import Proposal
 from warpbrain.estimation.target import Target
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
+from warpbrain.seconds import Seconds
 from warpbrain.simulation.locking import on_linear_elements
 
 #: The error of the mesh is computed again until the estimate moves by no more than this, in standard deviations.
@@ -115,38 +114,38 @@ class Estimation:
         self.case = case
         self.options = options or EstimationOptions()
         self.listener = listener or Listener()
-        self.seconds: dict[str, float] = {}
+        self.seconds = Seconds()
         self._device = device
         self._remarks = on_linear_elements(case.poisson, "an estimate")
         # what is wrong with recordings is known before anything is computed
         self.observations = Observations.to_fit(case)
         self._remarks += self.observations.remarks
         self.parameters = Parameters.of(case)
-        with self._timed("prior"):
+        with self.seconds.of("prior"):
             self.prior = prior if isinstance(prior, Prior) else prior_of(case, prior, seed=self.options.seed)
             self.prior_modes = prior_modes(self.prior, self.parameters)
-        with self._timed("pre-processing"):
+        with self.seconds.of("pre-processing"):
             self.forward = Forward(case, self.prior_modes[0].gaussian.mean, device)
 
     def run(self) -> Posterior:
         """All stages."""
-        with self._timed("estimate"):
+        with self.seconds.of("estimate"):
             modes = self.fit(Nuisances(registration=self.options.registration))
         solves = {"estimate": self.forward.solves}
         errors: list[DiscretisationError] = []
         if self.options.discretisation is not None:
-            with self._timed("error of the mesh"):
+            with self.seconds.of("error of the mesh"):
                 modes = self._corrected_for_mesh(modes, self.options.discretisation, errors, solves)
         require_explained(modes[0].estimate)
         before = self.forward.solves
-        with self._timed("check of the posterior"):
+        with self.seconds.of("check of the posterior"):
             target, proposal = Target(self.prior, modes), Proposal.of(modes)
             importance = self._check(target, proposal)
         solves["check of the posterior"] = self.forward.solves - before
         doubts, chain = importance.doubts(modes[0].laplace), None
         if doubts:
             before = self.forward.solves
-            with self._timed("chain"):
+            with self.seconds.of("chain"):
                 chain = self._sample(target, proposal, importance)
             solves["chain"] = self.forward.solves - before
         return Posterior(
@@ -261,12 +260,6 @@ class Estimation:
             start = importance.theta[best]
         rng = np.random.default_rng([self.options.seed, 1])
         return run_chain(target, proposal, start, solves, rng, lambda n: self.listener.progress(n / solves))
-
-    @contextmanager
-    def _timed(self, stage: str) -> Iterator[None]:
-        begun = time.perf_counter()
-        yield
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
 
 
 def _where(parameters: Parameters, mode: PriorMode) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +15,7 @@ from warpbrain.inference.confirm import after_checks
 from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, Decision, decide
 from warpbrain.physics.values import Measurement, Value
 from warpbrain.recordings.recording import TestRecording
+from warpbrain.seconds import Seconds
 from warpbrain.simulation.specimen import specimen_of
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.listener import Listener
@@ -91,7 +90,7 @@ class DiagnosingSpecimen:
     ) -> None:
         self.case, self.device, self._listener = case, device, listener or Listener()
         self.options = options or SpecimenOptions()
-        self.seconds: dict[str, float] = {}
+        self.seconds = Seconds()
         recordings = [one for one in case.recordings if isinstance(one, TestRecording)]
         self._check(recordings)
         #: All recorded rows, and those that densities are of.
@@ -127,7 +126,7 @@ class DiagnosingSpecimen:
     def _run(self) -> SpecimenDiagnosis:
         options, thinned, everything = self.options, self.thinned, self.protocol
         self._listener.stage("base: the case as declared, its tissue refitted")
-        with self._timed("base"):
+        with self.seconds.of("base"):
             assert self.case.specimen is not None
             glued = self.case.specimen.grips == "glued" and options.ends
             forward = Forward(self.case, thinned, GluedEnds(self.case, everything, self.device), glued)
@@ -136,10 +135,10 @@ class DiagnosingSpecimen:
             base = fitting.fit(forward, (), np.zeros((len(thinned), 0)), np.zeros(forward.size(())), 1.0)
         if base is None:
             raise InputError(f"{self.case.path}: the declared law finds no state in the tests")
-        with self._timed("sets of causes"):
+        with self.seconds.of("sets of causes"):
             sets = Sets(fitting, effects, base, self._listener)
             ordered = sets.ordered()
-        with self._timed("checks"):
+        with self.seconds.of("checks"):
             checking = Checker(sets, everything, options.draws, np.random.default_rng([options.seed, 11]))
             p_value = checking.p_left(base)
             hypotheses, chances = [one.hypothesis for one, _ in ordered], np.array([p for _, p in ordered])
@@ -153,9 +152,9 @@ class DiagnosingSpecimen:
                 by_posterior, checked.confirmations, checked.p_left, options.alpha, grown, worse
             )
         named = decision.causes if decision.verdict in (NAMED, NAMED_AND_REST) else ()
-        with self._timed("next measurement"):
+        with self.seconds.of("next measurement"):
             measurements = _next(ordered, base)
-        with self._timed("explained"):
+        with self.seconds.of("explained"):
             explained = explained_case(fitting, best) if named else None
         declared = forward.of(everything).stress((), np.zeros(forward.size(())))
         scores = {"declared": score(everything, declared, None)} | checked.scores
@@ -198,12 +197,6 @@ class DiagnosingSpecimen:
             by_test=checking.folds.by_test,
             seconds=self.seconds,
         )
-
-    @contextmanager
-    def _timed(self, stage: str) -> Iterator[None]:
-        begun = time.perf_counter()
-        yield
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
 
 
 def _explaining(ordered: Sequence[tuple[CauseSet, float]], decision: Decision) -> Fit:
