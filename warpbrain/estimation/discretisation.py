@@ -35,8 +35,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import ROUGH, Forward, State
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.inference.beliefs import belief
-from warpbrain.physics.force import NodalForce
-from warpbrain.simulation.finer import FinerCase, restricted
+from warpbrain.simulation.finer import FinerCase, GivenForces, restricted
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.sensitivity import Sensitivities
 
@@ -228,12 +227,13 @@ class FinerMesh:
     """
 
     def __init__(self, case: Case, theta: Floats, device: str | None = None) -> None:
-        finer = FinerCase(case)
+        known = Parameters.of(case).applied(case, theta)
+        finer = FinerCase(known)
         self._prolong = finer.prolongation
         away = case.remaining[0].points - case.remaining[0].points.mean(axis=0)
         self._positions = away / np.sqrt(np.mean(np.sum(away**2, axis=1)))
-        added = finer.spread(_shared_forces(Parameters.of(case).applied(case, theta)))
-        self._forward = Forward(finer.case, theta, device, added)
+        shared = [load for load in finer.model(model_of(known)[0]).loads if isinstance(load, GivenForces)]
+        self._forward = Forward(finer.case, theta, device, shared)
         #: The last error on the finer mesh, with which the next state there is predicted.
         self._last: Floats | float = 0.0
 
@@ -278,13 +278,3 @@ class FinerMesh:
         both = [restricted(self._prolong, du, dR) for du, dR in pairs]
         du, dR = (np.array([one[k] for one in both]) for k in range(2))
         return *restricted(self._prolong, finer.u, finer.reactions), du, dR
-
-
-def _shared_forces(case: Case) -> Floats:
-    """Nodal forces [N] of the boundaries that share a force among their nodes, long after every ramp."""
-    model, _ = model_of(case)
-    shared = [load for load in model.loads if isinstance(load, NodalForce)]
-    total = np.zeros(model.mesh.points.shape)
-    for load in shared:
-        total += load.factor(math.inf) * load.nodal_forces(model.mesh)
-    return total

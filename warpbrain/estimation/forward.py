@@ -9,6 +9,7 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
 from warpbrain.estimation.parameters import Parameters
+from warpbrain.physics.load import Load
 from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.model import Model
@@ -55,8 +56,8 @@ class Forward:
     theta : (p,) array
         Parameters to begin with; any that are stable.
     device : str, optional
-    added : (n, 3) array, optional
-        Nodal forces [N] beside the loads of the case.
+    loads : sequence of Load
+        Beside those of the case.
     elements : str
         See `Model`.
 
@@ -71,19 +72,17 @@ class Forward:
         case: Case,
         theta: Floats,
         device: str | None = None,
-        added: Floats | None = None,
+        loads: Sequence[Load] = (),
         elements: str = "tet4",
     ) -> None:
         self.parameters = Parameters.of(case)
         self._mechanisms = case.mechanisms
         plain, _ = plain_model_of(self.parameters.applied(case, theta))
-        self._plain = replace(plain, elements=elements)
+        self._plain = replace(plain, loads=[*plain.loads, *loads], elements=elements)
         self.system = System(self._model(theta), device)
         self._last: State | None = None
         self.solves = 0
         self._external = self.system.model.external_forces()
-        if added is not None:
-            self._external = self._external + added
         self._solvers = {
             tolerance: EquilibriumSolver(self.system, EquilibriumOptions(tolerance=tolerance))
             for tolerance in (EXACT, ROUGH)

@@ -15,9 +15,9 @@ from warpbrain.estimation.observations import Observation, Observations, Residua
 from warpbrain.estimation.realigned import realigned
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import with_gross_errors
-from warpbrain.mesh import TetMesh
 from warpbrain.recordings.agreement import by_unit
 from warpbrain.recordings.comparison import Comparison
+from warpbrain.simulation.mesh_error import Found
 from warpbrain.simulation.observation import observe
 
 #: Probabilities of the intervals whose coverage is told.
@@ -105,15 +105,6 @@ class OverallErrors:
         return tuple(found)
 
 
-@dataclass(frozen=True, eq=False)
-class _DeformedState:
-    """What recordings are compared with, see `warpbrain.simulation.observation.State`."""
-
-    mesh: TetMesh
-    u: Floats
-    reactions: Floats
-
-
 def predictions(case: Case, mode: Mode, role: str, observations: Observations, joint: Floats) -> tuple[Prediction, ...]:
     """Recordings of one role beside an estimate.
 
@@ -179,7 +170,7 @@ def _unseen(observation: Observation, part: Residuals, jacobian: Floats, joint: 
 
 def compared(case: Case, u: Floats, reactions: Floats) -> Mapping[str, Comparison]:
     """Recordings by name beside displacement and reactions (N, 3), as `warpbrain run` compares them."""
-    return {one.name: one for one in observe(case, _DeformedState(case.remaining[0], u, reactions)).comparisons}
+    return {one.name: one for one in observe(case, Found(case.remaining[0], u, reactions)).comparisons}
 
 
 def coverage(residuals: Floats, deviation: Floats, gross: Bools) -> tuple[float, ...] | None:
