@@ -154,7 +154,7 @@ def _rejected(kind: str, why: str) -> dict[str, Any]:
 
 
 def noise_distance(noise: Floats, sensors: Sensors) -> float | None:
-    """Root mean square [m] of the distance that noise (n,) [m] alone leaves at a recorded point, as errors are said."""
+    """Root mean square [m] of the distance in space that noise (n,) [m] alone leaves at a recorded point."""
     rows = sensors.is_displacement
     if not rows.any():
         return None
