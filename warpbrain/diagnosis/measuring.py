@@ -8,6 +8,8 @@ that the other can make, its size free:
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +25,9 @@ Floats = NDArray[np.float64]
 
 #: Points of a further recording.
 _POINTS = 25
+#: By how much the head is turned for another one [degrees], and about which axes of the body.
+_TURN = 30.0
+_AXES = ("left-right", "front-back", "head-foot")
 
 
 def next_measurements(base: Base, first: Weighed, second: Weighed, names: tuple[str, str]) -> tuple[Measurement, ...]:
@@ -56,11 +61,7 @@ def next_measurements(base: Base, first: Weighed, second: Weighed, names: tuple[
             size = abs(z[0]) * effect.proposed.sd[0] if name == names[0] else effect.proposed.sd[0]
             told = found[0].expected_nats + 0.5 * (float(size) / reading.error) ** 2
             found.append(Measurement(reading.words, told))
-        if known[name].stays_in_room:
-            # only what turns with the head: a second pose is a second experiment
-            found.append(
-                Measurement("the same points with the head turned by 30 degrees", 1.5 * found[0].expected_nats)
-            )
+    found += [Measurement(f"the same points with the head turned {words}", told) for words, told in asked.turned()]
     return tuple(sorted(found, key=lambda one: -one.expected_nats))
 
 
@@ -79,7 +80,7 @@ class _Apart:
     """Expected log Bayes factor of one effect over the best imitation by another, in noise and nuisances."""
 
     def __init__(self, base: Base, first: Effect, second: Effect, z: Floats, scale: float) -> None:
-        self._base, self._scale = base, scale
+        self._base, self._effects, self._z, self._scale = base, (first, second), z, scale
         self._rows = np.column_stack([first.mean + first.columns @ z, _imitation(second), base.nuisances.columns])
         self._alike = _imitation(second).shape[1]
 
@@ -97,6 +98,33 @@ class _Apart:
         whole = np.concatenate([self._rows, further])
         return self._told(GaussianModel(factor, whole[:, 1 + self._alike :], self._scale), whole)
 
+    def turned(self) -> list[tuple[str, float]]:
+        """With the same points again after the head is turned, in the most telling way; none if nothing stays behind.
+
+        Tissue is the same in both poses, each is registered for itself.
+        """
+        from scipy.spatial.transform import Rotation
+
+        each = []
+        for axis, words in enumerate(_AXES):
+            rotation = Rotation.from_rotvec(np.radians(_TURN) * np.eye(3)[axis]).as_matrix()
+            effects = [_turned(self._base, effect, rotation) for effect in self._effects]
+            if all(there is here for there, here in zip(effects, self._effects, strict=True)):
+                return []
+            alike = _imitation(effects[1])
+            nuisances = self._base.nuisances
+            again = np.zeros_like(nuisances.columns)
+            registration = nuisances.part("registration")
+            again[:, registration] = nuisances.columns[:, registration]
+            first = np.column_stack([self._rows, np.zeros_like(again)])
+            second = np.column_stack([effects[0].mean + effects[0].columns @ self._z, alike, nuisances.columns, again])
+            second[:, 1 + self._alike :][:, registration] = 0.0
+            rows = np.concatenate([first, second])
+            factor: Floats = np.kron(np.eye(2), self._base.model.noise_factor).astype(np.float64)
+            told = self._told(GaussianModel(factor, rows[:, 1 + self._alike :], self._scale), rows)
+            each.append((f"by {_TURN:g} degrees about its {words} axis", told))
+        return [max(each, key=lambda one: one[1])]
+
     def _told(self, model: GaussianModel, rows: Floats) -> float:
         white = model.standardised(rows[:, : 1 + self._alike])
         g, G = white[:, 0], white[:, 1:]
@@ -108,6 +136,16 @@ class _Apart:
 
 def _imitation(effect: Effect) -> Floats:
     return np.column_stack([effect.mean, effect.columns]) if effect.mean.any() else effect.columns
+
+
+def _turned(base: Base, effect: Effect, rotation: Floats) -> Effect:
+    """The effect on a body that is turned by a rotation (3, 3); itself if it turns with it."""
+    proposed = effect.proposed
+    acting = proposed.make(proposed.mean)
+    if acting.with_body_turned(rotation) is acting:
+        return effect
+    other = replace(proposed, make=lambda c: proposed.make(c).with_body_turned(rotation))
+    return base.effects.of([other])[0]
 
 
 def _further(base: Base, first: Effect, second: Effect, z: Floats, where: Floats) -> Floats:

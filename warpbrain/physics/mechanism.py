@@ -218,8 +218,6 @@ class Mechanism(Ramped, abc.ABC):
     of_specimens: ClassVar[bool] = False
     #: How its size can be read directly, if it can.
     reading: ClassVar[Reading | None] = None
-    #: Whether its direction is that of the room, not of the body: a body that is turned shows it anew.
-    stays_in_room: ClassVar[bool] = False
     #: Key of the belief of how much of it every tissue has, whatever a case says (`about_law`); empty if of none.
     always: ClassVar[str] = ""
 
@@ -227,6 +225,10 @@ class Mechanism(Ramped, abc.ABC):
     def parameters(cls) -> dict[str, Says]:
         """What is known of each parameter, by name."""
         return {f.name: f.metadata["says"] for f in dataclasses.fields(cls) if "says" in f.metadata}
+
+    def with_body_turned(self, rotation: NDArray[np.float64]) -> Mechanism:
+        """As it acts on a body that is turned in the room by a rotation (3, 3); itself if it turns with the body."""
+        return self
 
     @classmethod
     def required(cls) -> tuple[str, ...]:

@@ -113,6 +113,8 @@ class Coupling:
         solution depends on.
     own, others : wp.array of vec3
         `db_i/du_j` and `db_j/du_i`.
+    content : wp.array
+        `b(u) + A p` where the term advanced last, without what flowed in that step; zero once it has forgotten.
     """
 
     offsets: wp.array
@@ -121,6 +123,7 @@ class Coupling:
     yielding: wp.array
     own: wp.array
     others: wp.array
+    content: wp.array
 
 
 class Term(abc.ABC):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.unknown import _unit_stresses, fields
+from warpbrain.worlds.body.unknown import _unit_stresses, body_forces, fields
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_a_uniform_pressure_of_it_moves_what_it_does_on_the_surface(at):
 
 def test_fields_are_of_one_metre(at):
     rows = at.sensors.is_displacement
-    every = fields(at, 0.01)
+    every = fields(at, [0.01, 0.024], body_forces(at, [0.01, 0.024]))
     assert {name.split(",")[0] for name in every} == {"body force", "eigenstress", "traction"}
     for columns in every.values():
         np.testing.assert_allclose(np.mean(np.sum(columns[rows] ** 2, axis=1)), 1.0)

@@ -241,7 +241,7 @@ class DrainageTerm(Term):
         entries = len(self._rows)
         self.coupling = Coupling(
             self._offsets, self._columns, zeros(entries), zeros(entries), zeros(entries, dtype=vec3),
-            zeros(entries, dtype=vec3),
+            zeros(entries, dtype=vec3), self._held,
         )  # fmt: skip
         self._h = np.inf
         solvers = (

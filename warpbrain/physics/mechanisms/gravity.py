@@ -16,6 +16,7 @@ difference of two densities, so it takes `tissue_density`, that of brain. The `d
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -112,7 +113,6 @@ class Gravity(BodyForce, Mechanism):
     }
     sentence: ClassVar[str] = "Cerebrospinal fluid drained, and the brain sinks under the weight it no longer carries."
     example: ClassVar[str] = "gravity:level=130"
-    stays_in_room: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -206,6 +206,11 @@ class Gravity(BodyForce, Mechanism):
         down = unit_vector("direction", self.direction)
         imaged = unit_vector("imaged_direction", self.imaged_direction)
         return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(down, imaged)), down @ imaged)))
+
+    def with_body_turned(self, rotation: NDArray[np.float64]) -> Gravity:
+        """See `warpbrain.physics.mechanism.Mechanism`; levels are counted from what is the lowest point then."""
+        direction = tuple((rotation.T @ np.array(self.direction)).tolist())
+        return dataclasses.replace(self, direction=direction, lowest=None)
 
     def datum(self, mesh: TetMesh | QuadraticMesh) -> float:
         """Height [m], `-x . direction`, of the point that levels are counted from."""

@@ -29,7 +29,7 @@ from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volum
 from warpbrain.worlds.body.sensing import noise_of
 from warpbrain.worlds.body.sensors import Sensors, rows_of_points, tracked_points
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
-from warpbrain.worlds.body.switching import Known, Solving
+from warpbrain.worlds.body.switching import Solving
 from warpbrain.worlds.body.tissue_prior import declared, tissue_prior
 from warpbrain.worlds.body.unknown import body_forces, fields
 from warpbrain.worlds.listener import Listener
@@ -56,7 +56,7 @@ class Base:
         The base.
     at : Linearisation
     effects : Effects
-    known : Known
+    known : dict of str to SolvedState
         What was solved beside the base for them.
     nuisances : Nuisances
     unknown : dict of str to (n, k) array
@@ -80,7 +80,7 @@ class Base:
     state: SolvedState
     at: Linearisation
     effects: Effects
-    known: Known
+    known: dict[str, SolvedState]
     nuisances: Nuisances
     unknown: dict[str, Floats]
     model: GaussianModel
@@ -178,7 +178,7 @@ class BaseFinder:
 
     def _base(self, first: SolvedState, state: SolvedState, errors: MeshErrors | None) -> Base:
         linear = _Linear(self, state, errors)
-        unknown = fields(linear.at, self._spacing)
+        unknown = fields(linear.at, linear.lengths, linear.body_forces)
         nuisances, factor = linear.nuisances, linear.noise_factor
         if errors is not None and not self._bare:
             smooth = unknown[next(iter(unknown))]
@@ -244,11 +244,12 @@ class _Linear:
     def __init__(self, finder: BaseFinder, state: SolvedState, errors: MeshErrors | None) -> None:
         sensors, states = state.sensors, finder.states
         self.at = Linearisation(state.system, state.u, state.reactions, sensors)
-        self.known = Known()
+        self.known: dict[str, SolvedState] = {}
         self.effects = Effects(self.at, Solving(states, state, sensors, self.known), errors)
         # which makes the compliance: with it nuisances are products, where each would have an equilibrium of its own
-        lengths = finder._spacing * beliefs("unknown.lengths")
-        smooth = np.column_stack(body_forces(self.at, lengths.tolist()))
+        self.lengths = (finder._spacing * beliefs("unknown.lengths")).tolist()
+        self.body_forces = body_forces(self.at, self.lengths)
+        smooth = np.column_stack(self.body_forces)
         nuisances = nuisances_at(self.at, states, state.hypothesis.theta, finder.prior, self.effects, errors)
         self.nuisances = nuisances.weakened() if finder._bare else nuisances
         # what the state has of tissue and field is given back, so that their middle is that of their prior

@@ -14,9 +14,10 @@ from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
 from warpbrain.physics.proposal import Proposal
+from warpbrain.physics.term import Term
 from warpbrain.simulation.assumed import substituted
 from warpbrain.simulation.system import System
-from warpbrain.worlds.body.course import Course
+from warpbrain.worlds.body.consolidation import Course, consolidation
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer, volume_of
 from warpbrain.worlds.body.sensors import Sensors
@@ -38,9 +39,6 @@ class Solved(Protocol):
 
     def there(self, mechanism: Mechanism) -> Floats:
         """The sensors (n,) of the state with the mechanism, less those without it."""
-
-    def course(self, mechanism: Mechanism, paces: Sequence[float]) -> Course:
-        """The same over time, at any of some paces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +84,7 @@ class Effects:
     ----------
     at : Linearisation
     solved : Solved, optional
-        Asked for proposals that are switches or courses.
+        Asked for proposals that are switches.
     mesh_errors : MeshErrors, optional
         Of the state: what is less compressible locks more, and that is part of what it changes.
     """
@@ -103,7 +101,7 @@ class Effects:
 
     @property
     def _solved(self) -> Solved:
-        assert self._given is not None, "switches and courses keep their columns"
+        assert self._given is not None, "switches keep their columns"
         return self._given
 
     def of(self, proposals: Sequence[Proposal], present: Mechanism | None = None) -> list[Effect]:
@@ -132,13 +130,9 @@ class Effects:
         return found
 
     def _courses(self, proposals: Sequence[Proposal]) -> dict[str, Course]:
-        """Courses that proposals share, by what is solved."""
+        """Courses that proposals share, by what flows."""
         makes = {repr(made): made for made in (proposal.make(proposal.start) for proposal in proposals)}
-        paces: dict[str, list[float]] = {key: [] for key in makes}
-        for proposal in proposals:
-            assert proposal.pace is not None
-            paces[repr(proposal.make(proposal.start))].append(proposal.pace(proposal.mean))
-        return {key: self._solved.course(made, paces[key]) for key, made in makes.items()}
+        return {key: consolidation(self.at, self._bound(cast(Following, made))) for key, made in makes.items()}
 
     def _at_once(self, proposals: Sequence[Proposal], present: Mechanism | None) -> dict[str, Floats]:
         """What fading proposals change (n,) at once at their starts, by what is there."""
@@ -243,6 +237,18 @@ class Effects:
 
     def _following(self, mechanism: Following) -> Floats:
         """Internal forces (N, 3) of a term that is not there."""
+        system = self.at.system
+        term = self._bound(mechanism)
+        # what remembers answers as if the state had come at once: what is left of that, its history says
+        term.set_time_step(0.0 if term.forgets_in is not None else np.inf)
+        system.u.assign(self.at.u)
+        term.evaluate_forces(system.u)
+        found = np.zeros((system.size, 3))
+        np.add.at(found, term.stencils, term.forces.numpy())
+        return found
+
+    def _bound(self, mechanism: Following) -> Term:
+        """A term that is not there, with arrays of its own, as large as it is in the end."""
         import warp as wp
 
         system = self.at.system
@@ -252,13 +258,7 @@ class Effects:
         blocks = wp.zeros((count, nodes * (nodes + 1) // 2), dtype=p.mat33, device=device)
         term.place(wp.zeros((count, nodes), dtype=p.vec3, device=device), blocks)
         term.set_scale(term.factor(np.inf))
-        # what remembers answers as if the state had come at once: what is left of that, its history says
-        term.set_time_step(0.0 if term.forgets_in is not None else np.inf)
-        system.u.assign(self.at.u)
-        term.evaluate_forces(system.u)
-        found = np.zeros((system.size, 3))
-        np.add.at(found, term.stencils, term.forces.numpy())
-        return found
+        return term
 
     def _substituting(self, mechanism: Substituting) -> Floats:
         """What other laws add to the internal forces (N, 3)."""

@@ -230,6 +230,8 @@ class _Search:
         # coordinates that move the body, of states of this fit, and where it was
         self._known: list[tuple[Floats, Floats]] = []
         self._share: Share | None = None
+        # where what is linear was factorised last
+        self._at = fits.base.at
         # where columns were made
         self._made_at = np.full(len(self._moving), np.inf)
         # of the last state of this fit that was followed over time
@@ -354,7 +356,7 @@ class _Search:
         states = self._base.states
         begin = extrapolated(self._known, z) if self._known else near.u
         try:
-            state = states.solve(hypothesis, begin, error, near.course or self._course)
+            state = states.solve(hypothesis, begin, error, near.course or self._course, nearby=self._at)
         except SolveError:
             state = states.solve(hypothesis, None, error)
         self._known = [*self._known[-_KEPT:], (z, state.u)]
@@ -430,7 +432,7 @@ class _Search:
         # what was solved over time has no one state to be linear about
         if all(effect.about is None for effect in self._effects):
             try:
-                at = Linearisation(state.system, state.u, state.reactions, state.sensors)
+                at = self._at = Linearisation(state.system, state.u, state.reactions, state.sensors)
             except SolveError:
                 return columns
             early = self._early()

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from warpbrain.mesh import TetMesh, vertex_normals
 from warpbrain.physics.mechanism import Mechanism
+from warpbrain.simulation.chord import toward_equilibrium
 from warpbrain.simulation.system import System
 from warpbrain.threads import fill_columns, in_threads
 from warpbrain.worlds.body.factors import Factors
@@ -203,10 +204,25 @@ class Linearisation:
             fill_columns(found, lambda some: rows @ forces[:, some], together)
             return found[which]
         forces = forces.toarray() if issparse(forces) else forces
-        du = np.zeros((len(self._free), count))
-        du[self._free] = self._factors.solve(forces[self._free])
+        du = self.displacements(forces)
         dR = np.where(self._free[:, None], 0.0, self.stiffness @ du - forces)
         return np.asarray(self.sensors.by_displacement @ du + self.sensors.by_reactions @ dR)
+
+    def displacements(self, forces: Floats) -> Floats:
+        """Of all components (3 N, k) [m] under nodal forces (3 N, k) [N]."""
+        du = np.zeros(forces.shape)
+        du[self._free] = self._factors.solve(forces[self._free])
+        return du
+
+    def toward_equilibrium(self, system: System, external: Floats, start: Floats, tolerance: float) -> Floats:
+        """A displacement (N, 3) [m] nearer to an equilibrium of a system that is held at the same nodes.
+
+        See `warpbrain.simulation.chord`; the start itself where other nodes are held.
+        """
+        if not np.array_equal(system.model.constrained.ravel(), ~self._free):
+            return start
+        solve = self.displacements
+        return toward_equilibrium(system, external, start, lambda r: solve(r.reshape(-1, 1)).reshape(-1, 3), tolerance)
 
     def answers_of_elements(self, element_forces: Floats, weights: Any) -> Floats:
         """What internal forces of elements (m, 4, 3) [N], times weights (m, k), change: (n, k).

@@ -28,6 +28,7 @@ from warpbrain.simulation.model import Material
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
+from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import Sensors, sensors_at
 from warpbrain.worlds.body.stiffness_field import StiffnessField, stiffness_modes
 from warpbrain.worlds.body.surfaces import with_free_surfaces
@@ -36,8 +37,6 @@ Floats = NDArray[np.float64]
 
 #: Out-of-balance force of an equilibrium, relative.
 TOLERANCE = 1e-6
-#: The same of a course in time, whose steps are less exact than that.
-_COURSE = 1e-5
 #: Short steps after a load has come, as parts of the first time that counts.
 _SHORT = (1e-3, 0.1, 0.4)
 
@@ -145,6 +144,8 @@ class States:
         start: Floats | None = None,
         expected: Difference | None = None,
         course: Sequence[Floats] = (),
+        iterations: int = EquilibriumOptions.max_total_newton,
+        nearby: Linearisation | None = None,
     ) -> SolvedState:
         """The equilibrium under a hypothesis.
 
@@ -157,6 +158,10 @@ class States:
             What it lacks of the state without the error of the mesh; sensors are there.
         course : sequence of (N, 3) arrays, optional
             Of a state that is near to it, if it is followed over time.
+        iterations : int
+            Of Newton's method in all, after which there is taken to be none.
+        nearby : Linearisation, optional
+            Of a state that is near to it.
 
         Raises
         ------
@@ -168,7 +173,7 @@ class States:
         self.solves += 1
         system = self._system(hypothesis)
         model, external = system.model, system.model.external_forces()
-        options = EquilibriumOptions(tolerance=TOLERANCE)
+        options = EquilibriumOptions(tolerance=TOLERANCE, max_total_newton=iterations)
         # relaxing stress or fluid of its own: what a term has in its memory beside that changes no state in time
         in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
         if in_time and np.isfinite(self.times[0]):
@@ -181,6 +186,8 @@ class States:
             course = ()
             # on a CPU conjugate gradients have found a single state as soon as factors are made
             factors = None if system.device.is_cpu else self._factors_of(system)
+            if nearby is not None and start is not None:
+                start = nearby.toward_equilibrium(system, external, start, TOLERANCE)
             solver = EquilibriumSolver(system, options, factors=factors)
             states = [solver.solve(external, start)] * len(self.times)
         reactions = [model.reactions(state.internal, external) for state in states]
@@ -201,33 +208,6 @@ class States:
             ]
         parts = zip(self.times, self.observations, moments, strict=True)
         return sensors_at([(time, observations, *moment) for time, observations, moment in parts], self.centre)
-
-    def course(self, hypothesis: Hypothesis, times: Sequence[float], start: Floats) -> list[tuple[Floats, Floats]]:
-        """Displacement and reactions (N, 3) under a hypothesis at increasing times [s] after all loads came at once.
-
-        Parameters
-        ----------
-        hypothesis : Hypothesis
-        times : sequence of float
-        start : (N, 3) array
-            A displacement [m] that is near to the first.
-
-        Raises
-        ------
-        SolveError
-            If there is no equilibrium at one of the times.
-        """
-        self.solves += 1
-        system = self._system(hypothesis)
-        external = system.model.external_forces()
-        solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=_COURSE), factors=self._factors_of(system))
-        system.forget()
-        u, now, found = start, 0.0, []
-        for time in (*(times[0] * part for part in _SHORT), *times):
-            state = solver.step(u, time - now)
-            u, now = state.u, time
-            found.append((u, system.model.reactions(state.internal, external)))
-        return found[len(_SHORT) :]
 
     def _factors_of(self, system: System) -> KeptFactors | None:
         """Kept while the same mechanisms act: a fit has many states of those, one after the other.

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.inference.beliefs import belief, beliefs
+from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import node_areas
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.linearisation import Linearisation
@@ -89,21 +89,19 @@ def _unit_stresses(corners: Floats) -> Floats:
     return found
 
 
-def fields(at: Linearisation, spacing: float) -> dict[str, Floats]:
+def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Floats]) -> dict[str, Floats]:
     """Columns of every field, by what it is of.
 
     Parameters
     ----------
     at : Linearisation
-    spacing : float
-        Between sites of a scan [m], which lengths are relative to.
+    lengths : sequence of float
+        [m]
+    forces : sequence of (n, k) arrays
+        `body_forces` of these lengths.
     """
-    lengths = spacing * beliefs("unknown.lengths")
-    found = {
-        f"body force, {1e3 * length:.0f} mm": own
-        for length, own in zip(lengths, body_forces(at, lengths.tolist()), strict=True)
-    }
-    for length in lengths.tolist():
+    found = {f"body force, {1e3 * length:.0f} mm": own for length, own in zip(lengths, forces, strict=True)}
+    for length in lengths:
         found[f"eigenstress, {1e3 * length:.0f} mm"] = eigenstresses(at, length)
         found[f"traction, {1e3 * length:.0f} mm"] = tractions(at, length)
     return {name: columns for name, columns in found.items() if columns.shape[1]}

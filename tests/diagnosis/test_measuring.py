@@ -1,0 +1,35 @@
+"""What a further measurement would tell, against what is known of it beforehand."""
+
+import numpy as np
+import pytest
+
+from warpbrain.diagnosis.measuring import next_measurements
+from warpbrain.diagnosis.result import Diagnosis, Measurement
+from warpbrain.physics.mechanisms.gravity import Gravity
+
+
+def _told(diagnosis: Diagnosis, first: str, second: str) -> tuple[Measurement, ...]:
+    sets = [next(one for one in diagnosis.search.weighed if name in one.mechanisms) for name in (first, second)]
+    return next_measurements(diagnosis.search.base, *sets, (first, second))
+
+
+def test_a_head_that_is_turned_shows_weight_anew(small_diagnosis: Diagnosis) -> None:
+    told = {one.what: one.expected_nats for one in _told(small_diagnosis, "gravity", "swelling")}
+    [turned] = [nats for what, nats in told.items() if "turned" in what]
+    # a second look at the same points tells no less, and no measurement less than none
+    assert turned > told["nothing more"] > 0.0
+    assert min(told.values()) == told["nothing more"]
+
+
+def test_what_turns_with_the_head_is_not_told_apart_by_turning_it(small_diagnosis: Diagnosis) -> None:
+    assert not [one for one in _told(small_diagnosis, "swelling", "pressure") if "turned" in one.what]
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_weight_turns_back_with_the_head(axis: int) -> None:
+    from scipy.spatial.transform import Rotation
+
+    rotation = Rotation.from_rotvec(0.5 * np.eye(3)[axis])
+    weight = Gravity(direction=(0.0, 0.6, -0.8), density=1000.0)
+    back = weight.with_body_turned(rotation.as_matrix()).with_body_turned(rotation.inv().as_matrix())
+    np.testing.assert_allclose(back.direction, weight.direction, atol=1e-15)

@@ -1,0 +1,133 @@
+"""Fluid that flows out of tissue until a state is reached, linear about that state, at all times and paces at once.
+
+Unknowns `p` of a term's own (`warpbrain.physics.term.Coupling`) and the displacement obey, about a state with the
+tangent stiffness `K` in which `p` is zero,
+
+    K du = B^T p,        d/dt (b + B du + N p) = -H p,
+
+`b` what the state has taken up since rest, `B = db/du`, `H` the flow and `N` the storage. Loads that come at once leave
+no time for flow: `b + B du + N p = 0` at first. Without `du`, with `C = B K^-1 B^T + N` and `M = H^-1 C`,
+
+    p(t) = -g_t(M) H^-1 b,        g_t(x) = exp(-t / x) / x.
+
+`M` is symmetric in the product with `H`, so few steps of Lanczos' method stand for it at all times (Druskin and
+Knizhnerman, SIAM J. Matrix Anal. Appl. 19, 1998), each at the price of one equilibrium.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.physics.term import Coupling, Term
+from warpbrain.simulation.symmetric_factors import symmetric_factors
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.sensors import Sensors
+
+Floats = NDArray[np.float64]
+
+#: Steps of Lanczos' method at most, and the part of the first vector below which there is no further one.
+_STEPS, _LAST = 40, 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What is recorded on the way to a state, less what is recorded there, at any pace.
+
+    Attributes
+    ----------
+    sensors : Sensors
+    answers : (n, m) array
+        To each vector of a basis of the unknowns.
+    times : (m,) array
+        After which what relaxes alone is smaller by a factor of e [s].
+    first : (m, m) array
+        What is there of each vector of the basis, as parts that relax alone, after a rate of relaxation of 1/s.
+    """
+
+    sensors: Sensors
+    answers: Floats
+    times: Floats
+    first: Floats
+
+    def at(self, pace: float) -> Floats:
+        """Answers (n,) at the recorded times if all goes so many times faster; nothing is left in the end."""
+        left = np.zeros(len(self.sensors))
+        for time in np.unique(self.sensors.times[np.isfinite(self.sensors.times)]):
+            rows = self.sensors.times == time
+            left[rows] = self.answers[rows] @ (self.first @ (np.exp(-pace * time / self.times) / self.times))
+        return left
+
+
+def consolidation(at: Linearisation, term: Term) -> Course:
+    """What is recorded while a term's own unknowns vanish after all loads came at once.
+
+    Parameters
+    ----------
+    at : Linearisation
+        About the state that is reached.
+    term : Term
+        With unknowns of its own; bound to the system of that state, but not among what acts there.
+    """
+    from scipy.linalg import eigh_tridiagonal
+
+    b, B, N, H = _matrices(at, term)
+    flow = symmetric_factors(H)
+    v = flow.solve(-b)
+    length = float(np.sqrt(max(v @ (H @ v), np.finfo(np.float64).tiny)))
+    basis, answers, diagonal, beside = [v / length], [], [], []
+    while True:
+        v = basis[-1]
+        forces = (B.T @ v)[:, None]
+        answers.append(at.answers(forces.reshape(-1, 3)))
+        w = B @ at.displacements(forces)[:, 0] + N @ v
+        diagonal.append(float(v @ w))
+        w = flow.solve(w)
+        # less all before, twice: rounding lets the last ones come back
+        V = np.column_stack(basis)
+        for _ in range(2):
+            w -= V @ (V.T @ (H @ w))
+        size = float(np.sqrt(max(w @ (H @ w), 0.0)))
+        if len(basis) == _STEPS or size < _LAST * diagonal[0]:
+            break
+        beside.append(size)
+        basis.append(w / size)
+    times, vectors = eigh_tridiagonal(diagonal, beside)
+    first = length * vectors * vectors[0]
+    return Course(at.sensors, np.column_stack(answers), np.maximum(times, np.finfo(np.float64).tiny), first)
+
+
+def _matrices(at: Linearisation, term: Term) -> tuple[Floats, Any, Any, Any]:
+    """`b` (m,), `B` (m, 3 N), `N` and `H` (m, m) at the state, of nodes whose unknown is not given."""
+    from scipy.sparse import csr_matrix
+
+    system, coupling = at.system, term.coupling
+    assert coupling is not None
+    system.u.assign(at.u)
+    # takes the shape of the state, in which what flows flows, and what it has taken up
+    term.advance(system.u)
+    taken = coupling.content.numpy().astype(np.float64)
+    # what flows is in proportion to the step
+    steps = [_compliance(term, coupling, h) for h in (1.0, 2.0)]
+    H = steps[1] - steps[0]
+    open_rows = np.flatnonzero(H.diagonal() > 0.0)
+    term.evaluate_tangents(system.u)
+    columns = coupling.columns.numpy()
+    components = (3 * columns[:, None] + np.arange(3)).ravel()
+    own = coupling.own.numpy().astype(np.float64).ravel()
+    B = csr_matrix((own, components, 3 * coupling.offsets.numpy()), shape=(system.size, 3 * system.size))
+    square = np.ix_(open_rows, open_rows)
+    N = (2.0 * steps[0] - steps[1])[square]
+    return taken[open_rows], B[open_rows], N, H[square].tocsc()
+
+
+def _compliance(term: Term, coupling: Coupling, step: float) -> Any:
+    from scipy.sparse import csr_matrix
+
+    term.set_time_step(step)
+    size = len(coupling.content)
+    values = coupling.compliance.numpy().astype(np.float64)
+    return csr_matrix((values, coupling.columns.numpy(), coupling.offsets.numpy()), shape=(size, size))
