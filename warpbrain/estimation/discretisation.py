@@ -35,6 +35,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import ROUGH, Forward, State
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.inference.beliefs import belief
+from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.simulation.finer import FinerCase, GivenForces, restricted
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.sensitivity import Sensitivities
@@ -106,7 +107,7 @@ class Difference:
     @property
     def size(self) -> float:
         """Root mean square over the nodes [m]."""
-        return float(np.sqrt(np.mean(np.sum(self.u**2, axis=1))))
+        return root_mean_square(self.u)
 
     def less(self, other: Difference) -> Difference:
         """By how much it is more than another."""
@@ -231,7 +232,7 @@ class FinerMesh:
         finer = FinerCase(known)
         self._prolong = finer.prolongation
         away = case.remaining[0].points - case.remaining[0].points.mean(axis=0)
-        self._positions = away / np.sqrt(np.mean(np.sum(away**2, axis=1)))
+        self._positions = away / root_mean_square(away)
         shared = [load for load in finer.model(model_of(known)[0]).loads if isinstance(load, GivenForces)]
         self._forward = Forward(finer.case, theta, device, shared)
         #: The last error on the finer mesh, with which the next state there is predicted.

@@ -26,6 +26,7 @@ from warpbrain.estimation.proposal import Proposal
 from warpbrain.estimation.target import Target
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
+from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.seconds import Seconds
 from warpbrain.simulation.locking import on_linear_elements
 
@@ -234,8 +235,7 @@ class Estimation:
                 break
         else:
             self._remarks.append("the error of the mesh was still changing when it was last computed")
-        whole = float(np.sqrt(np.mean(np.sum(modes[0].estimate.point.state.u ** 2, axis=1))))
-        part = errors[-1].change.size / whole
+        part = errors[-1].change.size / root_mean_square(modes[0].estimate.point.state.u)
         if part > _TOO_COARSE:
             self._remarks.append(
                 f"the mesh is coarse: on elements of half the size displacements change by {100.0 * part:.0f} %; what "

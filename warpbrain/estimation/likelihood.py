@@ -183,13 +183,17 @@ class Noise:
             Rows that are gross errors.
         """
         own = self.rows.recordings == number
-        deviation = self.scale * np.sqrt(np.diag(self.rows.covariance(self.sigma)))
         gross = [wrong for rows, wrong in zip(self.rows.points, self.gross.tolist(), strict=True) if own[rows[0]]]
         return (
             self.scale * self.sigma[own].reshape(shape)[:, 0],
-            deviation[own].reshape(shape),
+            self._deviation[own].reshape(shape),
             np.array(gross or np.zeros(shape[0]), dtype=bool),
         )
+
+    @cached_property
+    def _deviation(self) -> Floats:
+        """Of each number (n,), with what neighbours share and without gross errors."""
+        return self.scale * np.sqrt(np.diag(self.rows.covariance(self.sigma)))
 
     def is_near(self, other: Noise) -> bool:
         """Whether another one has the same gross errors and nearly the same size."""

@@ -30,7 +30,7 @@ class Mode:
         """The normal distribution that fits the posterior there."""
         return Laplace.of(self.estimate)
 
-    @property
+    @cached_property
     def log_evidence(self) -> float:
         """Log probability of what was recorded and of this mode, by Laplace, up to what all modes have in common."""
         prior = self.estimate.problem.mode

@@ -38,7 +38,7 @@ def base_of(case):
     thinned = everything.thinned
     forward = Forward(case, thinned, GluedEnds(case, everything), False)
     fit = Fitting(noise_factor(thinned), thinned.mask(thinned.to_fit)).fit(
-        forward, (), np.zeros((len(thinned), 0)), np.zeros(forward.size(())), 1.0
+        forward, (), np.zeros((len(thinned), 0)), np.zeros(len(forward.nuisances)), 1.0
     )
     return everything, fit
 
@@ -97,7 +97,7 @@ def test_what_stiffens_is_what_tissue_remembers_too():
         Component(viscous_effect, variant, variant.trials[0], 1.0),
         Component(effect, effect.variants[0], effect.variants[0].trials[0], 1.0),
     )
-    z = np.zeros(forward.size(both))
+    z = np.zeros(len(forward.nuisances) + sum(map(len, both)))
     z[-len(both[1]) - len(both[0])] = 1.0
     plain = forward.stress(both, z)
     z[-1] = 1.0

@@ -10,9 +10,10 @@ from warpbrain.arrays import Floats
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.predict import Prediction
+from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.specimen.checks import blocks_of, folds_of, held_out, p_of_nothing_left, placebo_p
 from warpbrain.worlds.specimen.fit import Fit
-from warpbrain.worlds.specimen.measures import rms, score
+from warpbrain.worlds.specimen.measures import score
 from warpbrain.worlds.specimen.protocol import Protocol
 from warpbrain.worlds.specimen.result import Score
 from warpbrain.worlds.specimen.search import Sets
@@ -70,7 +71,7 @@ class Checker:
     def heldout_rms(self, fit: Fit) -> float:
         """Of all recorded rows of tests that were held out in turn [Pa]."""
         rows = self.protocol.mask(self.protocol.to_fit)
-        return rms((self.protocol.observed - self._predictions(fit)[1])[rows])
+        return root_mean_square((self.protocol.observed - self._predictions(fit)[1])[rows])
 
     def _predictions(self, fit: Fit) -> tuple[Floats, Floats, float]:
         """Stress of a fit and held-out stress at all recorded rows [Pa], and held-out log density."""
@@ -84,9 +85,9 @@ class Checker:
 
     def _improvement(self, before: Fit, after: Fit) -> tuple[float, float, float]:
         """Of held-out errors relative to the largest stress of each test."""
-        peaks = np.concatenate([np.full(len(test.strain), test.peak) for test in self.protocol.tests])
+        observed, peaks = self.protocol.observed, self.protocol.peaks
         first, second = (
-            Prediction((self.protocol.observed - self._predictions(fit)[1]) / peaks, self._blocks, np.zeros(0))
+            Prediction((observed - self._predictions(fit)[1]) / peaks, self._blocks, np.zeros(0))
             for fit in (before, after)
         )
         return second.improvement(first, self.protocol.mask(self.protocol.to_fit), self.random)

@@ -100,7 +100,7 @@ def placebo_p(about: Linear, name: str, folds: Folds, rng: np.random.Generator) 
     fit = about.fit
     cause = next(one for one in about.causes if one.name == name)
     length = np.sqrt(np.mean([np.mean(place.columns**2) for place in cause.places]))
-    peaks = np.concatenate([np.full(len(test.strain), test.peak) for test in fit.forward.protocol.tests])[fit.rows]
+    peaks = fit.forward.protocol.peaks[fit.rows]
     where, causes = _coordinates(fit.forward.protocol)[fit.rows], [cause]
     for number in range(_PLACEBOS):
         places = []

@@ -132,7 +132,7 @@ class DiagnosingSpecimen:
             forward = Forward(self.case, thinned, GluedEnds(self.case, everything, self.device), glued)
             fitting = Fitting(noise_factor(thinned), thinned.mask(thinned.to_fit))
             effects, rejected = effects_of(self.case, thinned, options.candidates)
-            base = fitting.fit(forward, (), np.zeros((len(thinned), 0)), np.zeros(forward.size(())), 1.0)
+            base = fitting.fit(forward, (), np.zeros((len(thinned), 0)), np.zeros(len(forward.nuisances)), 1.0)
         if base is None:
             raise InputError(f"{self.case.path}: the declared law finds no state in the tests")
         with self.seconds.of("sets of causes"):
@@ -156,7 +156,7 @@ class DiagnosingSpecimen:
             measurements = _next(ordered, base)
         with self.seconds.of("explained"):
             explained = explained_case(fitting, best) if named else None
-        declared = forward.of(everything).stress((), np.zeros(forward.size(())))
+        declared = forward.of(everything).stress((), np.zeros(len(forward.nuisances)))
         scores = {"declared": score(everything, declared, None)} | checked.scores
         ranking = _ranking(sets, ordered, effects, checking)
         by_name = {one.name: one for one in ranking}

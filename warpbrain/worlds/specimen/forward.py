@@ -106,17 +106,9 @@ class Forward:
         shape = self.shape_of_law if shape_of_law is None else shape_of_law
         return Forward(self.case, protocol or self.protocol, self.ends, self.glued, law or self.law, shape)
 
-    def size(self, assumed: Sequence[Component]) -> int:
-        """How many coefficients there are."""
-        return len(self.nuisances) + sum(map(len, assumed))
-
-    def parts(self, assumed: Sequence[Component], z: Floats) -> list[Floats]:
-        """Those (k,) of each cause in standard deviations."""
-        return np.split(z, np.cumsum([len(self.nuisances), *map(len, assumed)])[:-1])[1:]
-
     def mechanisms(self, assumed: Sequence[Component], z: Floats) -> tuple[Mechanism, ...]:
         """Of the registry, at coefficients (k,)."""
-        return tuple(mechanism for one in self._actions(assumed, z) for mechanism in one.mechanisms)
+        return tuple(mechanism for one in self.actions(assumed, z) for mechanism in one.mechanisms)
 
     def material(self, assumed: Sequence[Component], z: Floats) -> HomogeneousMaterial:
         """Of the tissue, at coefficients (k,)."""
@@ -132,15 +124,11 @@ class Forward:
         NoStateError
             If there is no state.
         """
-        return self._stress(z, self._actions(assumed, z))
-
-    def stress_of(self, actions: Sequence[Action], z: Floats) -> Floats:
-        """The same of what acts, with the coefficients of nuisances alone."""
-        return self._stress(z, actions)
+        return self.stress_of(self.actions(assumed, z), z)
 
     def tangent(self, assumed: Sequence[Component], z: Floats, stress: Floats) -> Floats:
         """Change (n, k) of the stress with each coefficient: differences for causes, exact for nuisances."""
-        actions = self._actions(assumed, z)
+        actions = self.actions(assumed, z)
         logs, _, zeros = self.nuisances.split(z)
         scaled = stress - self.nuisances.added @ zeros - _sum([one.added for one in actions], len(stress))
         scale = np.exp(self.nuisances.logarithmic @ logs) * _product([one.factor for one in actions], len(stress))
@@ -155,11 +143,13 @@ class Forward:
             columns.append(((self.stress(assumed, moved) - stress) / _STEP)[:, None])
         return np.concatenate(columns, axis=1)
 
-    def _actions(self, assumed: Sequence[Component], z: Floats) -> list[Action]:
-        parts = self.parts(assumed, z)
+    def actions(self, assumed: Sequence[Component], z: Floats) -> list[Action]:
+        """What causes do at coefficients (k,)."""
+        parts = np.split(z, np.cumsum([len(self.nuisances), *map(len, assumed)])[:-1])[1:]
         return [one.variant.act(one.coefficients(c), self.declared) for one, c in zip(assumed, parts, strict=True)]
 
-    def _stress(self, z: Floats, actions: Sequence[Action]) -> Floats:
+    def stress_of(self, actions: Sequence[Action], z: Floats) -> Floats:
+        """The stress of what causes do, with the coefficients of nuisances among all (k,)."""
         logs, shapes, zeros = self.nuisances.split(z)
         n = len(self.protocol)
         mechanisms = tuple(mechanism for one in actions for mechanism in one.mechanisms)

@@ -122,10 +122,7 @@ def _columns(fit: Fit, variant: Variant, trial: Floats) -> Floats | None:
     forward = fit.forward
     try:
         with np.errstate(all="ignore"):
-            actions = [
-                one.variant.act(one.coefficients(z), forward.declared)
-                for one, z in zip(fit.assumed, forward.parts(fit.assumed, fit.z), strict=True)
-            ]
+            actions = forward.actions(fit.assumed, fit.z)
             each = [forward.stress_of([*actions, variant.act(c, forward.declared)], fit.z) for c in trial]
     except CANNOT_BE:
         return None

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.physics.values import Smallest, Value
+from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.linear import Linear
 from warpbrain.worlds.specimen.protocol import Protocol, Test
@@ -17,17 +18,12 @@ from warpbrain.worlds.specimen.result import Score, Segment
 _STILL, _STEP = 0.002, 1e-3
 
 
-def rms(errors: Floats) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(errors**2)))
-
-
 def score(protocol: Protocol, stress: Floats, held: Floats | None) -> Score:
     """Errors of stresses (n,) at all recorded rows [Pa]."""
     errors, fitted = protocol.observed - stress, protocol.mask(protocol.to_fit)
-    check = {protocol.tests[k].name: rms(errors[protocol.rows[k]]) for k in protocol.to_check}
-    outside = None if held is None else rms((protocol.observed - held)[fitted])
-    return Score(rms(errors[fitted]), outside, check)
+    check = {protocol.tests[k].name: root_mean_square(errors[protocol.rows[k]]) for k in protocol.to_check}
+    outside = None if held is None else root_mean_square((protocol.observed - held)[fitted])
+    return Score(root_mean_square(errors[fitted]), outside, check)
 
 
 def values_of(fit: Fit, number: int) -> tuple[Value, ...]:

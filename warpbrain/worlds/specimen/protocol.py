@@ -26,6 +26,8 @@ from warpbrain.simulation.history import corners_of, history_of
 #: Steps from rest to the largest imposed value, rows of a test without times, and the part of a test's duration that
 #: the first step of a rest takes: how rows are chosen.
 _STEPS, _ROWS, _FIRST = 4, 60, 0.005
+#: Strain at rest, of each mode.
+REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ class Test:
     @property
     def rest(self) -> float:
         """Strain at rest."""
-        return 1.0 if self.mode == "axial" else 0.0
+        return REST[self.mode]
 
     @property
     def share(self) -> Floats:
@@ -131,6 +133,11 @@ class Protocol:
     def observed(self) -> Floats:
         """Stress (n,) at all rows [Pa]."""
         return np.concatenate([test.stress for test in self.tests])
+
+    @property
+    def peaks(self) -> Floats:
+        """Largest stress of the test (n,) of each row [Pa]."""
+        return np.concatenate([np.full(len(test.strain), test.peak) for test in self.tests])
 
     def mask(self, tests: Sequence[int]) -> Bools:
         """The rows (n,) of some tests."""
@@ -201,7 +208,7 @@ def test_of(specimen: Specimen, recording: TestRecording) -> Test:
     unit = stress_unit(specimen, recording)
     strain = strain_of(specimen, recording.mode, recording.quantities[0], recording.imposed)
     stress = unit * recording.response
-    away = np.abs(strain - (1.0 if recording.mode == "axial" else 0.0))
+    away = np.abs(strain - REST[recording.mode])
     test = Test(
         name=recording.name,
         mode=recording.mode,
