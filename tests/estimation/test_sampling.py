@@ -47,9 +47,8 @@ class Known:
 def proposal() -> Proposal:
     def mode(mean: np.ndarray, times: float) -> SimpleNamespace:
         prior = SimpleNamespace(low=np.full(2, -np.inf), high=np.full(2, np.inf), share=0.5)
-        estimate = SimpleNamespace(theta=mean, problem=SimpleNamespace(mode=prior))
         laplace = SimpleNamespace(posterior=Gaussian(mean, np.diag((times * DEVIATION) ** 2)))
-        return SimpleNamespace(estimate=estimate, laplace=laplace, log_evidence=0.0)
+        return SimpleNamespace(theta=mean, problem=SimpleNamespace(mode=prior), laplace=laplace, log_evidence=0.0)
 
     return Proposal((mode(MEAN + 0.2 * DEVIATION, 0.9), mode(MEAN - 0.5 * DEVIATION, 1.3)))
 

@@ -12,9 +12,9 @@ from warpbrain.errors import SolveError
 from warpbrain.estimation.chain import Chain, run_chain
 from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, FinerMesh
 from warpbrain.estimation.forward import Forward
-from warpbrain.estimation.gauss_newton import GaussNewton, GaussNewtonStep, require_explained
+from warpbrain.estimation.gauss_newton import GaussNewton, require_explained
 from warpbrain.estimation.importance import Importance, importance_sampling
-from warpbrain.estimation.modes import Mode
+from warpbrain.estimation.modes import Estimate, GaussNewtonStep
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
@@ -137,7 +137,7 @@ class Estimation:
         if self.options.discretisation is not None:
             with self.seconds.of("error of the mesh"):
                 modes = self._corrected_for_mesh(modes, self.options.discretisation, errors, solves)
-        require_explained(modes[0].estimate)
+        require_explained(modes[0])
         before = self.forward.solves
         with self.seconds.of("check of the posterior"):
             target, proposal = Target(self.prior, modes), Proposal.of(modes)
@@ -163,13 +163,13 @@ class Estimation:
             self.seconds,
         )
 
-    def fit(self, nuisances: Nuisances, starts: tuple[Mode, ...] = ()) -> tuple[Mode, ...]:
+    def fit(self, nuisances: Nuisances, starts: tuple[Estimate, ...] = ()) -> tuple[Estimate, ...]:
         """The estimate in every mode of the prior, the most probable first.
 
         Parameters
         ----------
         nuisances : Nuisances
-        starts : tuple of Mode, optional
+        starts : tuple of Estimate, optional
             Estimates with other nuisances, from which to go on.
 
         Raises
@@ -178,7 +178,7 @@ class Estimation:
             If there is none in any mode.
         """
         found, failures = [], []
-        begun = {id(mode.estimate.problem.mode): mode for mode in starts}
+        begun = {id(mode.problem.mode): mode for mode in starts}
         for prior_mode in self.prior_modes:
             if starts and id(prior_mode) not in begun:
                 continue
@@ -193,7 +193,7 @@ class Estimation:
             raise failures[0]
         return tuple(sorted(found, key=lambda mode: -mode.log_evidence))
 
-    def _fit_one(self, prior_mode: PriorMode, nuisances: Nuisances, start: Mode | None) -> Mode:
+    def _fit_one(self, prior_mode: PriorMode, nuisances: Nuisances, start: Estimate | None) -> Estimate:
         many = len(self.prior_modes) > 1
         text = "Gauss-Newton" + (f", {_where(self.parameters, prior_mode)}" if many else "")
         self.listener.stage(text if start is None else f"{text}, with the error of the mesh")
@@ -205,37 +205,37 @@ class Estimation:
         if start is None:
             found = search.solve()
         else:
-            known = start.estimate.point.nuisances
+            known = start.point.nuisances
             values = nuisances.mean.copy()
             values[len(values) - len(known) :] = known
-            found = search.solve(start.estimate.point.state, values)
+            found = search.solve(start.point.state, values)
         if not found.converged:
             self._remarks.append(f"{text}: not converged")
-        return Mode(found)
+        return found
 
     def _corrected_for_mesh(
         self,
-        modes: tuple[Mode, ...],
+        modes: tuple[Estimate, ...],
         believed: Discretisation,
         errors: list[DiscretisationError],
         solves: dict[str, int],
-    ) -> tuple[Mode, ...]:
+    ) -> tuple[Estimate, ...]:
         before = self.forward.solves
         finer: FinerMesh | None = None
         for _ in range(_MOST_ERRORS):
             self.listener.stage("error of the mesh: one equilibrium on elements of half the size")
             best = modes[0]
             if finer is None:
-                finer = FinerMesh(self.case, best.estimate.theta, self._device)
-            derivatives = best.estimate.linearised.du, best.estimate.linearised.dR
-            errors.append(finer.error(best.estimate.point.state, derivatives))
+                finer = FinerMesh(self.case, best.theta, self._device)
+            derivatives = best.linearised.du, best.linearised.dR
+            errors.append(finer.error(best.point.state, derivatives))
             nuisances = Nuisances(believed, errors[-1], self.options.registration)
             modes = self.fit(nuisances, modes)
             if np.sqrt(2.0 * modes[0].laplace.posterior.negative_log(errors[-1].theta)) <= _SETTLED:
                 break
         else:
             self._remarks.append("the error of the mesh was still changing when it was last computed")
-        part = errors[-1].change.size / root_mean_square(modes[0].estimate.point.state.u)
+        part = errors[-1].change.size / root_mean_square(modes[0].point.state.u)
         if part > _TOO_COARSE:
             self._remarks.append(
                 f"the mesh is coarse: on elements of half the size displacements change by {100.0 * part:.0f} %; what "
@@ -255,7 +255,7 @@ class Estimation:
         solves = self.options.chain
         self.listener.stage(f"Laplace's approximation fails: a chain of {solves} equilibria instead")
         best = int(np.argmax(importance.log_densities))
-        start = target.modes[0].estimate.theta
+        start = target.modes[0].theta
         if np.isfinite(importance.log_densities[best]):
             start = importance.theta[best]
         rng = np.random.default_rng([self.options.seed, 1])

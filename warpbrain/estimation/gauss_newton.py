@@ -14,7 +14,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import State
 from warpbrain.estimation.likelihood import Noise
+from warpbrain.estimation.modes import Estimate, GaussNewtonStep
 from warpbrain.estimation.problem import Linearised, Point, Problem
 
 #: How often a first state is tried at moduli larger by a factor of e.
@@ -32,57 +32,6 @@ _FEWEST_EXPLAINED = 0.1
 _ROUGHLY, _ROUNDS = 0.1, 8
 #: Iterations at most with each noise, and the change of every parameter below which there is no other.
 _ITERATIONS, _LEAST_STEP = 30, 1e-7
-
-
-@dataclass(frozen=True)
-class GaussNewtonStep:
-    """One line of the history.
-
-    Attributes
-    ----------
-    iteration : int
-        From 1.
-    objective : float
-        `-ln` of likelihood times prior, before the step.
-    decrement : float
-        Length of the whole step in standard deviations of the posterior.
-    step : float
-        Share of it that was taken.
-    newton_iterations : int
-        Of all equilibria that were tried.
-    """
-
-    iteration: int
-    objective: float
-    decrement: float
-    step: float
-    newton_iterations: int
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """The most probable parameters.
-
-    Attributes
-    ----------
-    problem : Problem
-    point : Point
-    linearised : Linearised
-        There.
-    converged : bool
-    history : tuple of GaussNewtonStep
-    """
-
-    problem: Problem
-    point: Point
-    linearised: Linearised
-    converged: bool
-    history: tuple[GaussNewtonStep, ...]
-
-    @property
-    def theta(self) -> Floats:
-        """Estimate of the parameters, shape (p,)."""
-        return self.point.state.theta
 
 
 class GaussNewton:

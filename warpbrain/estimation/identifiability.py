@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.estimation.gauss_newton import Estimate
-from warpbrain.estimation.laplace import Laplace
+from warpbrain.estimation.modes import Estimate
 from warpbrain.estimation.parameters import Parameter
 from warpbrain.physics.words import enumerated
 
@@ -78,8 +77,9 @@ class Identifiability:
         return tuple(said)
 
 
-def identifiability(estimate: Estimate, posterior: Laplace) -> Identifiability:
+def identifiability(estimate: Estimate) -> Identifiability:
     """What the data of an estimate inform."""
+    posterior = estimate.laplace
     parameters, gains = tuple(posterior.parameters), posterior.gains
     told, between = gains >= TOLD, (gains < TOLD) & (gains >= HIDDEN)
     # one prior standard deviation of a parameter is the unit in which changes of different kinds compare

@@ -14,9 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.estimation.gauss_newton import Estimate
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.problem import Linearised, Problem
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,18 +39,17 @@ class Laplace:
     information: Floats
 
     @classmethod
-    def of(cls, estimate: Estimate) -> Laplace:
-        """The posterior at an estimate."""
-        problem = estimate.problem
+    def of(cls, problem: Problem, theta: Floats, linearised: Linearised) -> Laplace:
+        """The posterior at the most probable parameters (p,) of a problem, linearised there."""
         p = len(problem.parameters)
-        information, joint = estimate.linearised.information[:p, :p], estimate.linearised.hessian
+        information, joint = linearised.information[:p, :p], linearised.hessian
         if len(problem.nuisances):
             # metres, radians and plain numbers: one size for all
             size = np.sqrt(np.diag(joint[p:, p:]))
             nuisances = joint[p:, p:] / np.outer(size, size)
             mixed = joint[p:, :p] / size[:, None]
             information = information - mixed.T @ np.linalg.solve(nuisances, mixed)
-        return cls(problem.parameters, estimate.theta, problem.mode.gaussian, information)
+        return cls(problem.parameters, theta, problem.mode.gaussian, information)
 
     @cached_property
     def covariance(self) -> Floats:

@@ -14,7 +14,7 @@ from warpbrain.estimation.chain import Chain
 from warpbrain.estimation.discretisation import DiscretisationError
 from warpbrain.estimation.identifiability import Identifiability, identifiability
 from warpbrain.estimation.importance import Importance
-from warpbrain.estimation.modes import Mode, probabilities
+from warpbrain.estimation.modes import Estimate, probabilities
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
@@ -64,7 +64,7 @@ class Posterior:
     case : Case
     options : EstimationOptions
     prior : Prior
-    modes : tuple of Mode
+    modes : tuple of Estimate
         The most probable first.
     remarks : tuple of str
         What a user should know of how it was found.
@@ -85,7 +85,7 @@ class Posterior:
     case: Case
     options: EstimationOptions
     prior: Prior
-    modes: tuple[Mode, ...]
+    modes: tuple[Estimate, ...]
     remarks: tuple[str, ...]
     mesh_errors: tuple[DiscretisationError, ...]
     importance: Importance
@@ -95,14 +95,14 @@ class Posterior:
     seconds: Mapping[str, float]
 
     @property
-    def best(self) -> Mode:
+    def best(self) -> Estimate:
         """The most probable mode."""
         return self.modes[0]
 
     @property
     def parameters(self) -> Parameters:
         """What `theta` means."""
-        return self.best.estimate.problem.parameters
+        return self.best.problem.parameters
 
     @property
     def method(self) -> str:
@@ -112,7 +112,7 @@ class Posterior:
     @property
     def theta(self) -> Floats:
         """The most probable parameters, shape (p,)."""
-        return self.best.estimate.theta
+        return self.best.theta
 
     @property
     def mode_probabilities(self) -> Floats:
@@ -169,7 +169,7 @@ class Posterior:
     @cached_property
     def joint_covariance(self) -> Floats:
         """Of parameters and nuisances by Laplace, shape (p + q, p + q)."""
-        information = self.best.estimate.linearised.hessian
+        information = self.best.linearised.hessian
         # metres, radians and plain numbers: one size for all
         size = np.sqrt(np.diag(information))
         return np.asarray(np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size))
@@ -178,19 +178,19 @@ class Posterior:
     def nuisances(self) -> tuple[tuple[str, float, float], ...]:
         """Name, estimate and standard deviation of each."""
         p = len(self.parameters)
-        names = self.best.estimate.problem.nuisances.names
-        values, deviations = self.best.estimate.point.nuisances, np.sqrt(np.diag(self.joint_covariance))[p:]
+        names = self.best.problem.nuisances.names
+        values, deviations = self.best.point.nuisances, np.sqrt(np.diag(self.joint_covariance))[p:]
         return tuple(zip(names, values.tolist(), deviations.tolist(), strict=True))
 
     @cached_property
     def identifiability(self) -> Identifiability:
         """What the recordings tell at all."""
-        return identifiability(self.best.estimate, self.best.laplace)
+        return identifiability(self.best)
 
     @cached_property
     def predictions(self) -> tuple[Prediction, ...]:
         """Recordings that were fitted, then those that check; these are looked at here for the first time."""
-        fitted = self.best.estimate.problem.observations
+        fitted = self.best.problem.observations
         both = (("fit", fitted), ("check", Observations.to_check(self.case)))
         return tuple(
             one

@@ -10,7 +10,7 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.case import Case
 from warpbrain.estimation.likelihood import Noise, Rows
-from warpbrain.estimation.modes import Mode
+from warpbrain.estimation.modes import Estimate
 from warpbrain.estimation.observations import Observation, Observations, Residuals
 from warpbrain.estimation.realigned import realigned
 from warpbrain.inference.gaussian import GaussianModel
@@ -105,20 +105,22 @@ class OverallErrors:
         return tuple(found)
 
 
-def predictions(case: Case, mode: Mode, role: str, observations: Observations, joint: Floats) -> tuple[Prediction, ...]:
+def predictions(
+    case: Case, estimate: Estimate, role: str, observations: Observations, joint: Floats
+) -> tuple[Prediction, ...]:
     """Recordings of one role beside an estimate.
 
     Parameters
     ----------
     case : Case
-    mode : Mode
+    estimate : Estimate
     role : {"fit", "check"}
     observations : Observations
         Of that role.
     joint : (p + q, p + q) array
         Covariance of parameters and nuisances.
     """
-    problem, point, derivatives = mode.estimate.problem, mode.estimate.point, mode.estimate.linearised
+    problem, point, derivatives = estimate.problem, estimate.point, estimate.linearised
     centre, motion = problem.observations.centre, problem.nuisances.motion(point.nuisances)
     rest = np.zeros_like(point.state.u)
     seen = problem.nuisances.observed(point.state, point.nuisances)

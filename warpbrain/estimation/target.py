@@ -11,7 +11,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import ROUGH, State
-from warpbrain.estimation.modes import Mode
+from warpbrain.estimation.modes import Estimate
 from warpbrain.estimation.problem import Point
 from warpbrain.gp.prior import Prior
 
@@ -22,7 +22,7 @@ class Target:
     Parameters
     ----------
     prior : Prior
-    modes : sequence of Mode
+    modes : sequence of Estimate
         States are predicted from the nearest, where solving starts.
 
     Attributes
@@ -31,13 +31,13 @@ class Target:
         Points whose laws were not stable, and points without an equilibrium.
     """
 
-    def __init__(self, prior: Prior, modes: Sequence[Mode]) -> None:
+    def __init__(self, prior: Prior, modes: Sequence[Estimate]) -> None:
         self.prior = prior
         self.modes = tuple(modes)
-        self.problem = modes[0].estimate.problem
+        self.problem = modes[0].problem
         self.unstable = self.failed = 0
 
-    def nearest(self, theta: Floats) -> Mode:
+    def nearest(self, theta: Floats) -> Estimate:
         """The mode that a point is nearest to, in its own standard deviations."""
 
         return min(self.modes, key=lambda mode: mode.laplace.posterior.negative_log(theta))
@@ -47,7 +47,7 @@ class Target:
         if not self._possible(theta):
             return -np.inf
         mode = self.nearest(theta)
-        return self._log_density(mode.predicted(theta), mode.estimate.point)
+        return self._log_density(mode.predicted(theta), mode.point)
 
     def log_density(self, theta: Floats) -> float:
         """Up to a constant, by an equilibrium; minus infinity where laws are unstable or there is no equilibrium."""
@@ -55,13 +55,13 @@ class Target:
             self.unstable += 1
             return -np.inf
         mode = self.nearest(theta)
-        starts = mode.predicted(theta).u, mode.estimate.point.state.u
+        starts = mode.predicted(theta).u, mode.point.state.u
         try:
             state = self.problem.forward.solve_from(theta, starts, ROUGH)
         except SolveError:
             self.failed += 1
             return -np.inf
-        return self._log_density(state, mode.estimate.point)
+        return self._log_density(state, mode.point)
 
     def _log_density(self, state: State, start: Point) -> float:
         misfit, _ = self.problem.without_nuisances(state, start.nuisances, start.known_noise)

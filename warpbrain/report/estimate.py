@@ -27,7 +27,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
     """Everything that is known of an estimate, with units in keys or beside the values; docs/estimation.md."""
     prior, parameters, case, options = posterior.prior, posterior.parameters, posterior.case, posterior.options
     said = posterior.identifiability
-    gauss_newton = posterior.best.estimate
+    gauss_newton = posterior.best
     return {
         "case": {"name": case.name, "title": case.title, "origin": case.origin, "assumptions": list(case.assumptions)},
         "inputs_sha256": fingerprints(case),
@@ -58,9 +58,9 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
         "chain": _describe_chain(posterior),
         "modes": [
             {
-                "theta": mode.estimate.theta,
+                "theta": mode.theta,
                 "probability": probability,
-                "share_of_prior": mode.estimate.problem.mode.share,
+                "share_of_prior": mode.problem.mode.share,
             }
             for mode, probability in zip(posterior.modes, posterior.mode_probabilities, strict=True)
         ],
@@ -217,7 +217,7 @@ def _describe_overall(overall: OverallErrors) -> dict[str, Any]:
 
 
 def _describe_likelihood(posterior: Posterior) -> dict[str, Any]:
-    noise = posterior.best.estimate.point.known_noise
+    noise = posterior.best.point.known_noise
     believed = noise.outliers
     return {
         "density": "normal, shared by neighbours" + ("" if believed is None else ", with gross errors"),
