@@ -35,6 +35,12 @@ SHIFT, TURN = 0.7e-3, float(np.deg2rad(0.7))
 DEMIRAY, OGDEN = (0.3, 2.0), ((0.4, 0.7), (2.0, 5.0), (-3.0, -1.0))
 
 
+def mean_square(ends: tuple[float, float]) -> float:
+    """Of what is even between ends."""
+    low, high = ends
+    return (low**2 + low * high + high**2) / 3.0
+
+
 def _middling(ends: tuple[float, float]) -> tuple[float, float]:
     """Two values with the mean and the variance of what is even between ends."""
     middle, sd = 0.5 * (ends[0] + ends[1]), (ends[1] - ends[0]) / np.sqrt(12.0)
