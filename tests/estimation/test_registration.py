@@ -92,7 +92,7 @@ def test_an_estimate_takes_the_registration_that_a_diagnosis_takes() -> None:
 
     registration = EstimationOptions().registration
     assert registration is not None
-    np.testing.assert_allclose(np.diag(registration.precision) ** -0.5, registration_sd())
+    np.testing.assert_allclose(registration.deviations, registration_sd())
 
 
 @pytest.mark.parametrize("values", [(0.0, 0.1), (0.001, -1.0), (np.nan, 0.1)])

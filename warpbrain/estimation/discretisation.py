@@ -83,9 +83,9 @@ class Discretisation:
         return np.concatenate([[self.mean], np.zeros(len(NAMES) - 1)])
 
     @property
-    def precisions(self) -> Floats:
+    def deviations(self) -> Floats:
         """Of `b` and the coefficients of `B`, shape (37,)."""
-        return np.concatenate([[self.deviation**-2], np.full(len(NAMES) - 1, self.shape**-2)])
+        return np.concatenate([[self.deviation], np.full(len(NAMES) - 1, self.shape)])
 
 
 @dataclass(frozen=True, eq=False)

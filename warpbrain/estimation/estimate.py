@@ -206,7 +206,7 @@ class Estimation:
             found = search.solve()
         else:
             known = start.point.nuisances
-            values = nuisances.mean.copy()
+            values = nuisances.prior.mean.copy()
             values[len(values) - len(known) :] = known
             found = search.solve(start.point.state, values)
         if not found.converged:

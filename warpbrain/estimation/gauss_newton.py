@@ -75,7 +75,7 @@ class GaussNewton:
             If there is no equilibrium to start from.
         """
         problem = self.problem
-        values = problem.nuisances.mean if nuisances is None else nuisances
+        values = problem.nuisances.prior.mean if nuisances is None else nuisances
         self._history = []
         if start is None:
             point, linearised = self._first(values)

@@ -109,7 +109,7 @@ class Problem:
         parts = self.observations.at(*self.nuisances.observed(state, nuisances), motion=motion)
         residual = np.concatenate([part.values.ravel() for part in parts])
         known = EmpiricalNoise(Rows.of(self.observations, parts)) if noise is None else noise
-        misfit = known.negative_log(residual) + self.nuisances.negative_log(nuisances)
+        misfit = known.negative_log(residual) + self.nuisances.prior.negative_log(nuisances)
         objective = misfit + self.mode.gaussian.negative_log(state.theta)
         return Point(state, nuisances, parts, residual, known, misfit, objective)
 
@@ -135,16 +135,16 @@ class Problem:
         p, hessian, prior = len(self.parameters), information.copy(), self.mode.gaussian
         gradient[:p] += prior.precision @ (point.state.theta - prior.mean)
         hessian[:p, :p] += prior.precision
-        gradient[p:] += self.nuisances.precision @ (point.nuisances - self.nuisances.mean)
-        hessian[p:, p:] += self.nuisances.precision
+        gradient[p:] += self.nuisances.prior.precision @ (point.nuisances - self.nuisances.prior.mean)
+        hessian[p:, p:] += self.nuisances.prior.precision
         return Linearised(jacobian, gradient, information, hessian, *derivatives)
 
     def with_likely_noise(self, point: Point, linearised: Linearised) -> Point:
         """The point with the most probable noise, everything that is estimated integrated out about it."""
         p, prior = len(self.parameters), self.mode.gaussian
-        deviations = 1.0 / np.sqrt(np.diag(self.nuisances.precision))
+        deviations = self.nuisances.prior.standard_deviations
         columns = np.column_stack([linearised.jacobian[:, :p] @ prior.factor, linearised.jacobian[:, p:] * deviations])
-        middle = np.concatenate([prior.mean, self.nuisances.mean])
+        middle = np.concatenate([prior.mean, self.nuisances.prior.mean])
         expected = point.residual + linearised.jacobian @ (middle - point.coordinates)
         rows = Rows.of(self.observations, point.parts)
         return self.at(point.state, point.nuisances, self.likelihood.noise(rows, point.residual, expected, columns))
@@ -173,8 +173,8 @@ class Problem:
 
     def _by_nuisances(self, point: Point) -> tuple[Floats, Floats]:
         gradient, hessian = _weighted(point, self._jacobian(point, None))
-        gradient += self.nuisances.precision @ (point.nuisances - self.nuisances.mean)
-        return gradient, hessian + self.nuisances.precision
+        gradient += self.nuisances.prior.precision @ (point.nuisances - self.nuisances.prior.mean)
+        return gradient, hessian + self.nuisances.prior.precision
 
     def _jacobian(self, point: Point, derivatives: tuple[Floats, Floats] | None) -> Floats:
         """Derivatives (n, k) of the residuals, as `Nuisances.jacobian`."""

@@ -45,9 +45,9 @@ class Registration:
                 raise InputError(f"registration: {name} = {value}: expected a positive number")
 
     @property
-    def precision(self) -> Floats:
-        """Inverse covariance of the six numbers, shape (6, 6)."""
-        return np.diag(np.repeat([self.shift**-2, self.turn**-2], 3))
+    def deviations(self) -> Floats:
+        """Standard deviations of the six numbers, shape (6,)."""
+        return np.repeat([self.shift, self.turn], 3)
 
 
 def moved_back(positions: Floats, motion: Floats, centre: Floats) -> Floats:
