@@ -54,5 +54,8 @@ class Gaussian:
 
     def negative_log(self, theta: Floats) -> float:
         """Negative log density, less its constant."""
-        away = theta - self.mean
-        return 0.5 * float(away @ self.precision @ away)
+        return 0.5 * float((theta - self.mean) @ self.gradient(theta))
+
+    def gradient(self, theta: Floats) -> Floats:
+        """Of the negative log density, shape (p,)."""
+        return self.precision @ (theta - self.mean)

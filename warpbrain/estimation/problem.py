@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.estimation.forward import Forward, State
+from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.likelihood import EmpiricalNoise, Likelihood, Noise, Rows
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations, Residuals
@@ -103,6 +105,14 @@ class Problem:
         """What `theta` means."""
         return self.forward.parameters
 
+    @cached_property
+    def prior(self) -> Gaussian:
+        """Of parameters and nuisances together."""
+        from scipy.linalg import block_diag
+
+        both = self.mode.gaussian, self.nuisances.prior
+        return Gaussian(np.concatenate([one.mean for one in both]), block_diag(*(one.covariance for one in both)))
+
     def at(self, state: State, nuisances: Floats, noise: Noise | EmpiricalNoise | None = None) -> Point:
         """The objective at a state; noise that is as large as the residuals are, unless it is known."""
         motion = self.nuisances.motion(nuisances)
@@ -132,20 +142,13 @@ class Problem:
             derivatives = found.u, found.reactions
         jacobian = self._jacobian(point, derivatives)
         gradient, information = _weighted(point, jacobian)
-        p, hessian, prior = len(self.parameters), information.copy(), self.mode.gaussian
-        gradient[:p] += prior.precision @ (point.state.theta - prior.mean)
-        hessian[:p, :p] += prior.precision
-        gradient[p:] += self.nuisances.prior.precision @ (point.nuisances - self.nuisances.prior.mean)
-        hessian[p:, p:] += self.nuisances.prior.precision
-        return Linearised(jacobian, gradient, information, hessian, *derivatives)
+        gradient += self.prior.gradient(point.coordinates)
+        return Linearised(jacobian, gradient, information, information + self.prior.precision, *derivatives)
 
     def with_likely_noise(self, point: Point, linearised: Linearised) -> Point:
         """The point with the most probable noise, everything that is estimated integrated out about it."""
-        p, prior = len(self.parameters), self.mode.gaussian
-        deviations = self.nuisances.prior.standard_deviations
-        columns = np.column_stack([linearised.jacobian[:, :p] @ prior.factor, linearised.jacobian[:, p:] * deviations])
-        middle = np.concatenate([prior.mean, self.nuisances.prior.mean])
-        expected = point.residual + linearised.jacobian @ (middle - point.coordinates)
+        columns = linearised.jacobian @ self.prior.factor
+        expected = point.residual + linearised.jacobian @ (self.prior.mean - point.coordinates)
         rows = Rows.of(self.observations, point.parts)
         return self.at(point.state, point.nuisances, self.likelihood.noise(rows, point.residual, expected, columns))
 
@@ -173,7 +176,7 @@ class Problem:
 
     def _by_nuisances(self, point: Point) -> tuple[Floats, Floats]:
         gradient, hessian = _weighted(point, self._jacobian(point, None))
-        gradient += self.nuisances.prior.precision @ (point.nuisances - self.nuisances.prior.mean)
+        gradient += self.nuisances.prior.gradient(point.nuisances)
         return gradient, hessian + self.nuisances.prior.precision
 
     def _jacobian(self, point: Point, derivatives: tuple[Floats, Floats] | None) -> Floats:
