@@ -12,13 +12,12 @@ from warpbrain.estimation.laplace import Laplace
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.estimation.prediction import INTERVALS, OverallErrors, Prediction
+from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
-#: Units as people read them: of a recording, the factor and the name.
-SHOWN = {"m": (MILLIMETRES, "mm"), "N": (1.0, "N")}
 #: More than this part of a recording being gross errors is said.
 _UNEXPLAINED = 0.3
 

@@ -14,7 +14,7 @@ from warpbrain.estimation.prediction import Prediction
 from warpbrain.mesh import boundary_faces
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report import views
-from warpbrain.report.estimate import SHOWN
+from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 
 #: Of Okabe and Ito, who can be told apart by everybody and in grey print.

@@ -10,7 +10,8 @@ from warpbrain.estimation.parameters import Parameter
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.prediction import Prediction
 from warpbrain.inference.probability import percent
-from warpbrain.report.estimate import SHOWN, describe_discretisation, describe_registration, noise_of, remarks_of
+from warpbrain.report.comparison import SHOWN
+from warpbrain.report.estimate import describe_discretisation, describe_registration, noise_of, remarks_of
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
