@@ -30,7 +30,7 @@ def check_errors(case: Case, base: Base, fits: Sequence[Refit]) -> tuple[float, 
     physics: recordings of one registration are as wrong where they are fitted as where they are not.
     """
     checks = Observations.to_check(case)
-    if all(one.kind == "force" for one in checks.each):
+    if all(one.kind == "force" for one in checks.recordings):
         return None
     centre, declared = base.states.centre, base.declared
     sensors = sensors_at([(math.inf, checks, declared.u, declared.reactions)], centre)

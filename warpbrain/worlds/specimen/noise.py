@@ -12,12 +12,10 @@ is.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.worlds.specimen.protocol import Protocol, Test
-
-Floats = NDArray[np.float64]
 
 
 def noise_factor(protocol: Protocol) -> Floats:
