@@ -15,9 +15,9 @@ from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.realigned import realigned
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.fitting import Refit
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
 from warpbrain.worlds.body.nuisances import registration_sd
+from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.sensors import sensors_at
 
 Floats = NDArray[np.float64]

@@ -13,7 +13,8 @@ from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.predict import Prediction, predictive_p
-from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
+from warpbrain.worlds.body.weighted_set import WeightedSet
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +56,7 @@ class Confirming:
         #: Columns (n, m) of a smooth force as large as the noise, of which patterns that mean nothing are made.
         self.modes = search.base.typical_noise * next(iter(search.base.unknown.values()))
 
-    def p_of_nothing(self, nothing: Weighed) -> float:
+    def p_of_nothing(self, nothing: WeightedSet) -> float:
         """Probability of rows of which any cause explains as much, if none acts.
 
         It is asked of draws of nothing, with the gross errors that it has; what a local cause moves may be among these,
@@ -66,7 +67,7 @@ class Confirming:
         bound = float(np.exp(-max(self.search.log_bayes_factor, 0.0) / calibration().temperature))
         return min(1.0, 2.0 * min(drawn, bound))
 
-    def p_left(self, one: Weighed) -> float:
+    def p_left(self, one: WeightedSet) -> float:
         """Probability of rows of which a field without a name explains as much, if a set is all that acts."""
         return self._p(one.marginal.model, one.residual, physics=False)
 
@@ -80,25 +81,25 @@ class Confirming:
         logs = np.array(weights) - np.logaddexp.reduce(weights)
         return predictive_p(model, fields, beliefs("unknown.sizes"), residual, self._draws, self._random, logs)
 
-    def way(self, one: Weighed) -> HeldOut:
+    def way(self, one: WeightedSet) -> HeldOut:
         """Blocks that suit what acts: here and there where all of it is local."""
         local = bool(one.effects) and all(effect.proposed.centre is not None for effect in one.effects)
         return self._ways[local]
 
-    def predict(self, one: Weighed, way: HeldOut) -> Prediction:
+    def predict(self, one: WeightedSet, way: HeldOut) -> Prediction:
         """Held-out rows with a set."""
         return way.predict(one.marginal.model, one.residual)
 
-    def confirmations(self, one: Weighed) -> tuple[Confirmation, ...]:
+    def confirmations(self, one: WeightedSet) -> tuple[Confirmation, ...]:
         """Of each mechanism of a set, where all others of it act."""
         return tuple(self._confirm(one, name) for name in one.mechanisms)
 
-    def _confirm(self, one: Weighed, name: str) -> Confirmation:
+    def _confirm(self, one: WeightedSet, name: str) -> Confirmation:
         others = self.search.get(one.names - {name})
         effect = one.effects[one.mechanisms.index(name)]
         way = self._ways[effect.proposed.centre is not None]
         if others is None:
-            others = self.search.without(one, name)
+            others = one.without(name, self.search.base)
         own, before = self.predict(one, way), self.predict(others, way)
         patterns = self._patterns(others, way, effect.columns.shape[1], len(self.search.causes.named(name).places))
         return Confirmation(
@@ -109,11 +110,11 @@ class Confirming:
             share_of_patterns(own, patterns),
         )
 
-    def _patterns(self, others: Weighed, way: HeldOut, freedom: int, places: int) -> tuple[Prediction, ...]:
+    def _patterns(self, others: WeightedSet, way: HeldOut, freedom: int, places: int) -> tuple[Prediction, ...]:
         model = others.marginal.model
         return way.with_patterns(model, others.residual, self.modes, freedom, tries_of(places), self._random)
 
-    def held_out(self, nothing: Weighed, one: Weighed) -> HeldOutErrors:
+    def held_out(self, nothing: WeightedSet, one: WeightedSet) -> HeldOutErrors:
         """A set beside none."""
         way = self.way(one)
         without, explained = self.predict(nothing, way), self.predict(one, way)
@@ -129,7 +130,7 @@ class Confirming:
             (low, high),
         )
 
-    def ceiling(self, nothing: Weighed, way: HeldOut) -> float:
+    def ceiling(self, nothing: WeightedSet, way: HeldOut) -> float:
         """Held-out error [m] with any field without a name."""
         fields = [self.search.base.typical_noise * columns for columns in self.search.base.unknown.values()]
         return way.ceiling(nothing.marginal.model, nothing.residual, fields)

@@ -35,10 +35,11 @@ from warpbrain.inference.decide import (
     decide,
 )
 from warpbrain.threads import one_thread_of_blas
-from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.observable import require_observable
 from warpbrain.worlds.body.screened import screened
 from warpbrain.worlds.body.surfaces import with_sets_that_act
+from warpbrain.worlds.body.weighted_set import WeightedSet
 from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
@@ -55,7 +56,7 @@ class _Checked:
 
     decision: Decision
     doubts: tuple[str, ...]
-    best: Weighed
+    best: WeightedSet
     confirmations: tuple[Confirmation, ...]
     p_left: float | None
 
@@ -119,12 +120,12 @@ class Diagnosing:
         )
         spacing = search.spacing
         confirming = Confirming(search, options.draws, random)
-        nothing = _of(search, ())
+        nothing = search.nothing
         with self._timed("significance"):
             p_value = confirming.p_of_nothing(nothing)
         with self._timed("fits"):
             search.fit(alone=p_value > options.alpha)
-        nothing = _of(search, ())
+        nothing = search.nothing
         by_posterior = self._decided(search, p_value)
         self.listener.stage("checks")
         with self._timed("checks"):
@@ -144,7 +145,7 @@ class Diagnosing:
         self.listener.stage("what to measure next")
         with self._timed("next measurement"):
             measurements = _next(search, ranked)
-        weighed = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
+        weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
         predictions = {REFITTED: confirming.predict(nothing, confirming.way(best))}
         if held_out is not None:
             predictions = {REFITTED: held_out.without, EXPLAINED: held_out.explained}
@@ -162,13 +163,13 @@ class Diagnosing:
             map=where,
             when=_onset(search, checked.decision, best),
             search=search,
-            weighed=weighed,
+            weighted_sets=weighted_sets,
             held_out=predictions,
             explained=self._explained(search, best, named),
             smallest=seen,
             confusion=confusion,
             next_measurement=measurements,
-            fit=self._fit(confirming, weighed, held_out, checked.confirmations),
+            fit=self._fit(confirming, weighted_sets, held_out, checked.confirmations),
             confirmations=checked.confirmations,
             assumptions=assumptions_of(self.case, search.base, best),
             remarks=search.base.remarks,
@@ -180,15 +181,15 @@ class Diagnosing:
         """The verdict of least expected loss; of nothing where there is no alarm."""
         if p_value > self.options.alpha:
             return Decision(NOTHING)
-        hypotheses = [one.hypothesis for one in search.weighed]
+        hypotheses = [one.hypothesis for one in search.weighted_sets]
         return decide(hypotheses, search.probabilities, calibration().losses)[0]
 
     def _checked(self, search: HypothesisSearch, confirming: Confirming, by_posterior: Decision) -> _Checked:
         """The verdict after its checks, and the set that is spoken of."""
-        nothing, alpha = _of(search, ()), self.options.alpha
+        nothing, alpha = search.nothing, self.options.alpha
         if by_posterior.verdict not in (NAMED, NAMED_AND_REST):
             return _Checked(by_posterior, (), nothing, (), None)
-        best = search.explaining(frozenset(by_posterior.causes))
+        best = search.fitted_with(frozenset(by_posterior.causes))
         if best is None:
             return _not_fitted(search, by_posterior.causes)
         confirmations, p_left = confirming.confirmations(best), confirming.p_left(best)
@@ -196,21 +197,21 @@ class Diagnosing:
         if decision.verdict not in (NAMED, NAMED_AND_REST):
             return _Checked(decision, doubts, nothing, confirmations, p_left)
         if set(decision.causes) != set(by_posterior.causes):
-            best = search.explaining(frozenset(decision.causes))
+            best = search.fitted_with(frozenset(decision.causes))
             if best is None:
                 return _not_fitted(search, decision.causes)
             p_left = confirming.p_left(best)
         return _Checked(decision, doubts, best, confirmations, p_left)
 
     @staticmethod
-    def _traits(decision: Decision, search: HypothesisSearch, best: Weighed, where: ScoreMap) -> Traits | None:
+    def _traits(decision: Decision, search: HypothesisSearch, best: WeightedSet, where: ScoreMap) -> Traits | None:
         """Of the force without a name that is left, alone or beside what is named."""
         if decision.verdict not in (UNKNOWN, NAMED_AND_REST):
             return None
         base, model = search.base, best.marginal.model
         return traits_of(base.at, model, best.residual, base.typical_noise, search.spacing, where.centre)
 
-    def _explained(self, search: HypothesisSearch, best: Weighed, named: tuple[str, ...]) -> Case | None:
+    def _explained(self, search: HypothesisSearch, best: WeightedSet, named: tuple[str, ...]) -> Case | None:
         if not named:
             return None
         assert best.refit is not None
@@ -220,18 +221,18 @@ class Diagnosing:
     def _fit(
         self,
         confirming: Confirming,
-        weighed: dict[str, Weighed],
+        weighted_sets: dict[str, WeightedSet],
         held_out: HeldOutErrors | None,
         confirmations: tuple[Confirmation, ...],
     ) -> Fit:
-        nothing, base = weighed[REFITTED], confirming.search.base
+        nothing, base = weighted_sets[REFITTED], confirming.search.base
         sensors = base.at.sensors
         raw = distance(base.declared.sensors, base.declared.sensors.residual)
-        way = confirming.way(weighed.get(EXPLAINED, nothing))
+        way = confirming.way(weighted_sets.get(EXPLAINED, nothing))
         without = confirming.predict(nothing, way) if held_out is None else held_out.without
-        inside = {name: distance(sensors, left_of(one)) for name, one in weighed.items()}
+        inside = {name: distance(sensors, one.best_residual) for name, one in weighted_sets.items()}
         explained = None if held_out is None else (inside[EXPLAINED], way.error(held_out.explained))
-        refits = [one.refit for one in weighed.values() if one.refit is not None]
+        refits = [one.refit for one in weighted_sets.values() if one.refit is not None]
         return Fit(
             (raw, raw),
             (inside[REFITTED], way.error(without)),
@@ -286,25 +287,11 @@ def diagnose(
     return DiagnosingSpecimen(case, asked, device, (listener or Listener()).stage).run()
 
 
-def left_of(one: Weighed) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """What a set leaves of what was recorded (n,), at its best point."""
-    if one.refit is not None:
-        return one.refit.residual
-    return np.asarray(one.residual - one.columns @ one.coordinates)
-
-
-def _of(search: HypothesisSearch, names: tuple[str, ...]) -> Weighed:
-    one = search.get(names)
-    assert one is not None
-    return one
-
-
 def _not_fitted(search: HypothesisSearch, causes: tuple[str, ...]) -> _Checked:
     """What cannot be simulated as large as it is seen has no name."""
-    said = (
-        f"{' and '.join(causes)}, as large as it is seen, could not be simulated: {search.why_not(frozenset(causes))}"
-    )
-    return _Checked(Decision(CANNOT_SAY, causes), (said,), _of(search, ()), (), None)
+    failure = search.failure_with(frozenset(causes))
+    doubt = f"{' and '.join(causes)}, as large as it is seen, could not be simulated: {failure}"
+    return _Checked(Decision(CANNOT_SAY, causes), (doubt,), search.nothing, (), None)
 
 
 def _combinations(search: HypothesisSearch) -> tuple[Combination, ...]:
@@ -318,11 +305,11 @@ def _combinations(search: HypothesisSearch) -> tuple[Combination, ...]:
             one.refit is not None,
             int(one.marginal.gross.sum()),
         )
-        for one, chance in list(zip(search.weighed, search.probabilities.tolist(), strict=True))[:_TOLD]
+        for one, chance in list(zip(search.weighted_sets, search.probabilities.tolist(), strict=True))[:_TOLD]
     )
 
 
-def _onset(search: HypothesisSearch, decision: Decision, best: Weighed) -> Onset | None:
+def _onset(search: HypothesisSearch, decision: Decision, best: WeightedSet) -> Onset | None:
     """Of the first cause that is named; of what is unknown where none is."""
     if decision.verdict in (NOTHING, NOT_PHYSICS):
         return None
@@ -339,5 +326,5 @@ def _next(search: HypothesisSearch, ranked: tuple[Ranked, ...]) -> tuple[Measure
     names = [one.kind for one in ranked if one.physics][:2]
     if len(names) < 2:
         return ()
-    sets = [next(one for one in search.weighed if name in one.mechanisms) for name in names]
+    sets = [next(one for one in search.weighted_sets if name in one.mechanisms) for name in names]
     return next_measurements(search.base, sets[0], sets[1], (names[0], names[1]))

@@ -18,8 +18,8 @@ from warpbrain.inference import GaussianModel
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect
-from warpbrain.worlds.body.hypotheses import Weighed
 from warpbrain.worlds.body.sensors import spread_points
+from warpbrain.worlds.body.weighted_set import WeightedSet
 
 Floats = NDArray[np.float64]
 
@@ -30,13 +30,15 @@ _TURN = 30.0
 _AXES = ("left-right", "front-back", "head-foot")
 
 
-def next_measurements(base: Base, first: Weighed, second: Weighed, names: tuple[str, str]) -> tuple[Measurement, ...]:
+def next_measurements(
+    base: Base, first: WeightedSet, second: WeightedSet, names: tuple[str, str]
+) -> tuple[Measurement, ...]:
     """Measurements in the order of what they tell about two mechanisms, the first of which is taken to be the cause.
 
     Parameters
     ----------
     base : Base
-    first, second : Weighed
+    first, second : WeightedSet
         Sets with one and with the other.
     names : (str, str)
     """

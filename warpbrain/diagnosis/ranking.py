@@ -14,8 +14,9 @@ from warpbrain.diagnosis.result import Ranked
 from warpbrain.inference import Cause, GaussianModel, Kind
 from warpbrain.inference.blocks import Blocks
 from warpbrain.worlds.body.effects import Effect
-from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.parameters import scanned_values, values_of
+from warpbrain.worlds.body.weighted_set import WeightedSet
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ class Ranking:
 
     def __init__(self, search: HypothesisSearch, confirming: Confirming) -> None:
         self._search, self._confirming = search, confirming
-        self._sets = list(zip(search.weighed, search.probabilities.tolist(), strict=True))
+        self._sets = list(zip(search.weighted_sets, search.probabilities.tolist(), strict=True))
 
     def all(self) -> tuple[Ranked, ...]:
         """Every cause as it is in the most probable set that has it, the most probable first."""
@@ -53,12 +54,12 @@ class Ranking:
                 found.append(self._ranked(cause, best, chance))
         return tuple(sorted(found, key=lambda one: (-one.probability, -one.log_evidence)))
 
-    def named(self, one: Weighed, names: tuple[str, ...]) -> tuple[Ranked, ...]:
+    def named(self, one: WeightedSet, names: tuple[str, ...]) -> tuple[Ranked, ...]:
         """Mechanisms as they are in one set."""
         chances = {name: sum(p for own, p in self._sets if name in own.names) for name in names}
         return tuple(self._ranked(self._search.causes.named(name), one, chances[name]) for name in names)
 
-    def _ranked(self, cause: Cause, one: Weighed, chance: float) -> Ranked:
+    def _ranked(self, cause: Cause, one: WeightedSet, chance: float) -> Ranked:
         alone, nothing = self._search.get((cause.name,)), self._search.get(())
         assert nothing is not None
         log_evidence = float("-inf") if alone is None else alone.hypothesis.log_evidence
@@ -93,7 +94,7 @@ class Ranking:
             why,
         )
 
-    def _weights(self, cause: Cause, one: Weighed) -> Floats:
+    def _weights(self, cause: Cause, one: WeightedSet) -> Floats:
         """Probabilities (p,) of the places of a scan beside all else that acts in a set."""
         from scipy.special import softmax
 
@@ -103,20 +104,19 @@ class Ranking:
         return np.asarray(softmax(logs))
 
 
-def about_base(search: HypothesisSearch, one: Weighed, name: str) -> tuple[GaussianModel, Floats]:
+def about_base(search: HypothesisSearch, one: WeightedSet, name: str) -> tuple[GaussianModel, Floats]:
     """The model and residual (n,) of all else that acts in a set but one mechanism, linear about the base.
 
     There the columns of all its places are known; about a fit, far from the base, they are others.
     """
     base, model = search.base, one.marginal.model
     others = [effect for kind, effect in zip(one.mechanisms, one.effects, strict=True) if kind != name]
-    louder = model.columns[:, model.columns.shape[1] - one.marginal.louder :]
-    columns = np.column_stack([base.nuisances.columns, *(effect.columns for effect in others), louder])
+    columns = np.column_stack([base.nuisances.columns, *(effect.columns for effect in others), one.marginal.excess])
     residual = base.residual - sum((effect.mean for effect in others), start=np.zeros(len(base.residual)))
     return GaussianModel(base.model.noise_factor, columns, model.scale), residual
 
 
-def _member(one: Weighed, name: str) -> _Member:
+def _member(one: WeightedSet, name: str) -> _Member:
     number = one.mechanisms.index(name)
     at = one.columns.shape[1] - sum(effect.columns.shape[1] for effect in one.effects)
     for effect in one.effects[:number]:
@@ -141,10 +141,10 @@ def _place(member: _Member, scanned: tuple[Effect, ...], weights: Floats) -> tup
     return centre, max(radius, float(proposed.radius or 0.0))
 
 
-def _detectability(nothing: Weighed, one: Weighed, member: _Member) -> float:
+def _detectability(nothing: WeightedSet, one: WeightedSet, member: _Member) -> float:
     """Of what it changes, from nothing to the best point by the trapezium rule, beside all else that acts."""
     # at the best point tissue explains how large it is, which says nothing of whether it is seen
-    count = len(nothing.columns.T) - nothing.extra.shape[1]
+    count = len(nothing.columns.T) - nothing.linear_columns.shape[1]
     others = np.delete(one.columns, np.r_[member.own], axis=1)[:, count:]
     columns = np.column_stack([nothing.columns[:, :count], others])
     model = GaussianModel(nothing.marginal.model.noise_factor, columns, one.marginal.scale)

@@ -19,7 +19,8 @@ from warpbrain.inference.decide import Decision
 from warpbrain.inference.predict import Prediction
 from warpbrain.physics.values import Smallest, Value
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
+from warpbrain.worlds.body.weighted_set import WeightedSet
 
 Floats = NDArray[np.float64]
 
@@ -176,7 +177,7 @@ class Diagnosis:
         When what explains the mismatch best set in; None with one time, or where nothing physical is missing.
     search : HypothesisSearch
         Of the sets of causes, with its base.
-    weighed : dict of str to Weighed
+    weighted_sets : dict of str to WeightedSet
         ``"refitted"`` without any cause, ``"explained"`` with all that is named.
     held_out : dict of str to Prediction
         What each of these predicts of points that it was not given.
@@ -207,7 +208,7 @@ class Diagnosis:
     map: ScoreMap
     when: Onset | None
     search: HypothesisSearch
-    weighed: Mapping[str, Weighed]
+    weighted_sets: Mapping[str, WeightedSet]
     held_out: Mapping[str, Prediction]
     explained: Case | None
     smallest: Mapping[str, Smallest]
@@ -236,9 +237,9 @@ class Diagnosis:
         return self.search.base
 
     @property
-    def best(self) -> Weighed:
+    def best(self) -> WeightedSet:
         """The set that is spoken of."""
-        return self.weighed.get(EXPLAINED, self.weighed[REFITTED])
+        return self.weighted_sets.get(EXPLAINED, self.weighted_sets[REFITTED])
 
     @property
     def gross(self) -> NDArray[np.bool_]:

@@ -24,8 +24,8 @@ from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import size_in_words, smallest_in_words
 from warpbrain.physics.words import measured
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.hypotheses import Weighed
 from warpbrain.worlds.body.not_physics import SENTENCES
+from warpbrain.worlds.body.weighted_set import WeightedSet
 
 
 def sentence_of(found: Diagnosis) -> str:
@@ -164,7 +164,7 @@ def traits_in_words(unknown: Traits | None) -> str:
     return f" {said}."
 
 
-def assumptions_of(case: Case, base: Base, best: Weighed) -> tuple[str, ...]:
+def assumptions_of(case: Case, base: Base, best: WeightedSet) -> tuple[str, ...]:
     """What was taken for granted."""
     sensors = base.at.sensors
     found = [*case.assumptions]

@@ -86,7 +86,7 @@ class AveragedTissue:
 
 def averaged_tissue(search: HypothesisSearch) -> AveragedTissue:
     """Tissue averaged over the sets of a search that were weighed."""
-    base, weighed, probabilities = search.base, search.weighed, search.probabilities
+    base, weighed, probabilities = search.base, search.weighted_sets, search.probabilities
     part, prior = base.nuisances.part("tissue"), base.prior
     means, covariances = [], []
     causes: dict[tuple[str, Kind], float] = {}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpbrain.inference import Cause, Kind, Place
 from warpbrain.inference.beliefs import belief, beliefs
-from warpbrain.inference.subsets import Member
+from warpbrain.inference.hypothesis import Member
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import Candidates
 from warpbrain.worlds.body.effects import Effect

@@ -225,7 +225,7 @@ def _tried(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | Inp
     return [by_proposal[id(proposal)] for proposal in proposals]
 
 
-def candidates_beside(
+def candidates_about_fit(
     state: SolvedState,
     acting: Sequence[Effect],
     candidates: Candidates,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -75,6 +76,17 @@ class Effect:
     def away(self, z: Floats) -> Floats:
         """How far (k,) [standard deviations] coefficients are from doing nothing."""
         return np.asarray((self.coefficients(z) - self.proposed.without) / self.proposed.sd)
+
+
+def width_of(effects: Sequence[Effect]) -> int:
+    """How many columns effects have together."""
+    return sum(effect.columns.shape[1] for effect in effects)
+
+
+def column_slices(effects: Sequence[Effect], first: int) -> tuple[slice, ...]:
+    """Columns of each effect where those of all stand side by side from the number `first` on."""
+    ends = np.cumsum([first, *(effect.columns.shape[1] for effect in effects)]).tolist()
+    return tuple(slice(low, high) for low, high in itertools.pairwise(ends))
 
 
 class Effects:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.decide import UNKNOWN
-from warpbrain.inference.subsets import Hypothesis
+from warpbrain.inference.hypothesis import Hypothesis
 from warpbrain.worlds.specimen.acting import Effect
 from warpbrain.worlds.specimen.fit import Fit, Fitting
 from warpbrain.worlds.specimen.linear import Linear, linearise, log_odds
