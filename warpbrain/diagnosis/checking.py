@@ -46,7 +46,7 @@ def _error(checks: Observations, base: Base, fit: Refit) -> float:
         error = _mesh_error(base, base.mesh_errors, fit)
         u, reactions = u + error.u, reactions + error.reactions
     sensors = sensors_at([(math.inf, checks, u, reactions)], base.states.centre)
-    nuisances, _ = base.seen_by(sensors)
+    nuisances, _ = base.for_sensors(sensors)
     # but for tissue and field, which the state has, and the motion by which recordings were taken back
     known = nuisances.coordinates(base.prior, fit.state.hypothesis)
     known[nuisances.part("registration")] = base.states.motion / registration_sd()

@@ -152,7 +152,7 @@ def _turned(base: Base, effect: Effect, rotation: Floats) -> Effect:
 
 def _further(base: Base, first: Effect, second: Effect, z: Floats, where: Floats) -> Floats:
     """Rows of tracked points at other places (k, 3) [m]: the effect, its imitation, nuisances."""
-    nuisances, effects = base.elsewhere(where)
+    nuisances, effects = base.at_points(where)
     there, imitation = effects.of([first.proposed, second.proposed])
     # as many columns there as here
     alike = np.column_stack([imitation.mean, imitation.columns]) if second.mean.any() else imitation.columns

@@ -151,5 +151,5 @@ def _detectability(nothing: WeightedSet, one: WeightedSet, member: _Member) -> f
     effect, z, own = member.effect, member.mean, one.columns[:, member.own]
     # what is there or not, or takes its time, is solved as a whole: it has no line from nothing to where it is
     whole = effect.proposed.is_there_or_not or effect.proposed.changes_in_time
-    change = effect.mean + effect.columns @ z if whole else 0.5 * (effect.columns + own) @ effect.away(z)
+    change = effect.mean + effect.columns @ z if whole else 0.5 * (effect.columns + own) @ effect.offset(z)
     return float(np.linalg.norm(model.standardised(change)))

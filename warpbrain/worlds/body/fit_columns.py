@@ -90,7 +90,7 @@ def columns_about(
     """
     columns, at = columns.copy(), None
     # a state that was followed over time has no one tangent
-    if all(effect.about is None for effect in effects):
+    if all(effect.columns_at is None for effect in effects):
         try:
             at = Linearisation(state.system, state.u, state.reactions, state.sensors)
         except SolveError:
@@ -102,8 +102,8 @@ def columns_about(
     first = layout.coefficients.start
     for effect, part in zip(effects, layout.effects, strict=True):
         c = effect.coefficients(z[part])
-        if effect.about is not None:
-            columns[:, part] = effect.about(c)
+        if effect.columns_at is not None:
+            columns[:, part] = effect.columns_at(c)
         elif at is not None and not effect.proposed.is_there_or_not:
             made = Effects(at, mesh_errors=mesh_errors)
             columns[:, part] = made.of([_proposal_about(effect.proposed, c)], effect.proposed.make(c))[0].columns

@@ -132,7 +132,7 @@ class Fitter:
         except SolveError:
             return False
         change = excess_error(known, error, state, self.base.prior)
-        self.mesh_errors = replace(known, own=error)
+        self.mesh_errors = replace(known, error=error)
         return float(np.linalg.norm(screened.noise.whitened(change))) > _MATTERS
 
 

@@ -83,8 +83,8 @@ def mesh_share_of(
     """
     sized = [not effect.proposed.is_there_or_not for effect in effects]
     parts = list(zip(sized, effects, coefficients, strict=True))
-    scaled = np.concatenate([has_size * effect.away(z) for has_size, effect, z in parts])
-    mean = np.concatenate([has_size * effect.away(np.zeros(len(z))) for has_size, effect, z in parts])
+    scaled = np.concatenate([has_size * effect.offset(z) for has_size, effect, z in parts])
+    mean = np.concatenate([has_size * effect.offset(np.zeros(len(z))) for has_size, effect, z in parts])
     square = float(scaled @ scaled)
     # the finer mesh is solved in the end state alone
     changing = any(effect.proposed.changes_in_time for effect in effects)
