@@ -44,15 +44,15 @@ from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
-#: Sets of causes that are told.
-_TOLD = 20
+#: Sets of causes that a diagnosis lists.
+_LISTED = 20
 #: Size of a patch of the map, in spacings of the scan.
 _PATCH = 0.7
 
 
 @dataclass(frozen=True, eq=False)
 class _Checked:
-    """A verdict after its checks, what failed in words, the set that is spoken of and its checks."""
+    """A verdict after its checks, what failed in words, the set that it is about and the checks of that."""
 
     decision: Decision
     doubts: tuple[str, ...]
@@ -96,7 +96,7 @@ class Diagnosing:
         self.seconds: dict[str, float] = {}
 
     def run(self) -> Diagnosis:
-        """Every stage.
+        """Run every stage.
 
         Raises
         ------
@@ -146,7 +146,7 @@ class Diagnosing:
         with self._timed("next measurement"):
             measurements = _next(search, ranked)
         weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
-        predictions = {REFITTED: confirming.predict(nothing, confirming.way(best))}
+        predictions = {REFITTED: confirming.predict(nothing, confirming.held_out_for(best))}
         if held_out is not None:
             predictions = {REFITTED: held_out.without, EXPLAINED: held_out.explained}
         return Diagnosis(
@@ -178,14 +178,14 @@ class Diagnosing:
         )
 
     def _decided(self, search: HypothesisSearch, p_value: float) -> Decision:
-        """The verdict of least expected loss; of nothing where there is no alarm."""
+        """The verdict of least expected loss; that nothing is missing if `p_value` is above `alpha`."""
         if p_value > self.options.alpha:
             return Decision(NOTHING)
-        hypotheses = [one.hypothesis for one in search.weighted_sets]
+        hypotheses = [weighted_set.hypothesis for weighted_set in search.weighted_sets]
         return decide(hypotheses, search.probabilities, calibration().losses)[0]
 
     def _checked(self, search: HypothesisSearch, confirming: Confirming, by_posterior: Decision) -> _Checked:
-        """The verdict after its checks, and the set that is spoken of."""
+        """The verdict after its checks, and the set that it is about."""
         nothing, alpha = search.nothing, self.options.alpha
         if by_posterior.verdict not in (NAMED, NAMED_AND_REST):
             return _Checked(by_posterior, (), nothing, (), None)
@@ -205,7 +205,7 @@ class Diagnosing:
 
     @staticmethod
     def _traits(decision: Decision, search: HypothesisSearch, best: WeightedSet, where: ScoreMap) -> Traits | None:
-        """Of the force without a name that is left, alone or beside what is named."""
+        """Of an unknown force, alone or in addition to what is named."""
         if decision.verdict not in (UNKNOWN, NAMED_AND_REST):
             return None
         base, model = search.base, best.marginal.model
@@ -227,20 +227,20 @@ class Diagnosing:
     ) -> Fit:
         nothing, base = weighted_sets[REFITTED], confirming.search.base
         sensors = base.at.sensors
-        raw = distance(base.declared.sensors, base.declared.sensors.residual)
-        way = confirming.way(weighted_sets.get(EXPLAINED, nothing))
-        without = confirming.predict(nothing, way) if held_out is None else held_out.without
-        inside = {name: distance(sensors, one.best_residual) for name, one in weighted_sets.items()}
-        explained = None if held_out is None else (inside[EXPLAINED], way.error(held_out.explained))
-        refits = [one.refit for one in weighted_sets.values() if one.refit is not None]
+        declared = distance(base.declared.sensors, base.declared.sensors.residual)
+        blocks = confirming.held_out_for(weighted_sets.get(EXPLAINED, nothing))
+        without = confirming.predict(nothing, blocks) if held_out is None else held_out.without
+        in_sample = {name: distance(sensors, s.best_residual) for name, s in weighted_sets.items()}
+        explained = None if held_out is None else (in_sample[EXPLAINED], blocks.error(held_out.explained))
+        refits = [weighted_set.refit for weighted_set in weighted_sets.values() if weighted_set.refit is not None]
         return Fit(
-            (raw, raw),
-            (inside[REFITTED], way.error(without)),
+            (declared, declared),
+            (in_sample[REFITTED], blocks.error(without)),
             explained,
             None if held_out is None else held_out.improvement,
-            None if held_out is None else max(one.placebo_p for one in confirmations),
+            None if held_out is None else max(confirmation.placebo_p for confirmation in confirmations),
             None if held_out is None else held_out.patterns,
-            confirming.ceiling(nothing, way),
+            confirming.ceiling(nothing, blocks),
             check_errors(self.case, base, refits),
         )
 
@@ -283,34 +283,35 @@ def diagnose(
     """
     if case.specimen is None:
         return Diagnosing(case, options, device, listener).run()
-    asked = (options or DiagnosisOptions()).of_specimen
-    return DiagnosingSpecimen(case, asked, device, (listener or Listener()).stage).run()
+    specimen_options = (options or DiagnosisOptions()).of_specimen
+    return DiagnosingSpecimen(case, specimen_options, device, (listener or Listener()).stage).run()
 
 
 def _not_fitted(search: HypothesisSearch, causes: tuple[str, ...]) -> _Checked:
-    """What cannot be simulated as large as it is seen has no name."""
+    """No verdict on causes that cannot be simulated at the size that the data ask for."""
     failure = search.failure_with(frozenset(causes))
     doubt = f"{' and '.join(causes)}, as large as it is seen, could not be simulated: {failure}"
     return _Checked(Decision(CANNOT_SAY, causes), (doubt,), search.nothing, (), None)
 
 
 def _combinations(search: HypothesisSearch) -> tuple[Combination, ...]:
+    likely = zip(search.weighted_sets[:_LISTED], search.probabilities.tolist()[:_LISTED], strict=True)
     return tuple(
         Combination(
-            one.hypothesis.causes,
-            one.hypothesis.kinds,
-            one.hypothesis.log_evidence,
-            one.hypothesis.log_prior,
-            chance,
-            one.refit is not None,
-            int(one.marginal.gross.sum()),
+            weighted_set.hypothesis.causes,
+            weighted_set.hypothesis.kinds,
+            weighted_set.hypothesis.log_evidence,
+            weighted_set.hypothesis.log_prior,
+            probability,
+            weighted_set.refit is not None,
+            int(weighted_set.marginal.gross.sum()),
         )
-        for one, chance in list(zip(search.weighted_sets, search.probabilities.tolist(), strict=True))[:_TOLD]
+        for weighted_set, probability in likely
     )
 
 
 def _onset(search: HypothesisSearch, decision: Decision, best: WeightedSet) -> Onset | None:
-    """Of the first cause that is named; of what is unknown where none is."""
+    """Of the first cause that is named, or of an unknown force."""
     if decision.verdict in (NOTHING, NOT_PHYSICS):
         return None
     if not best.mechanisms:
@@ -322,9 +323,9 @@ def _onset(search: HypothesisSearch, decision: Decision, best: WeightedSet) -> O
 
 
 def _next(search: HypothesisSearch, ranked: tuple[Ranked, ...]) -> tuple[Measurement, ...]:
-    """Between the two most probable mechanisms."""
-    names = [one.kind for one in ranked if one.physics][:2]
+    """Measurements that discriminate between the two most probable mechanisms."""
+    names = [cause.kind for cause in ranked if cause.physics][:2]
     if len(names) < 2:
         return ()
-    sets = [next(one for one in search.weighted_sets if name in one.mechanisms) for name in names]
+    sets = [next(s for s in search.weighted_sets if name in s.mechanisms) for name in names]
     return next_measurements(search.base, sets[0], sets[1], (names[0], names[1]))

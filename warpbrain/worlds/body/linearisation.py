@@ -5,9 +5,8 @@ changes the reactions of the held ones by `K_cf K_ff^-1 g_f - g_c`. Of the senso
 
     A = [ (H_u + H_R K_cf) K_ff^-1 ,  -H_R ]
 
-is needed, one right-hand side a sensor; after that each cause costs a product with `A`. SciPy's LU has the factors of 5,000
-nodes in a second, and 100 right-hand sides in another; block conjugate gradients take ten times as long for as many as
-there are sensors.
+is needed, one right-hand side a sensor; after that each cause costs a product with `A`. SciPy's LU has the factors of
+5,000 nodes in a second, and 100 right-hand sides in another; block conjugate gradients take ten times as long.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Stiffness that varies from place to place within tissues: a nuisance, never a cause.
 
-`ln mu(X)` has a normal distribution with a squared exponential covariance. Its largest modes are computed on a sample of
-the elements and extended to all of them (Nystroem's method; Williams and Seeger 2001).
+`ln mu(X)` has a normal distribution with a squared exponential covariance. Its largest modes are computed on some
+of the elements and extended to all of them (Nystroem's method; Williams and Seeger 2001).
 """
 
 from __future__ import annotations
