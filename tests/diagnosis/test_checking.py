@@ -32,7 +32,7 @@ def test_a_wrong_registration_is_as_wrong_where_it_is_not_fitted(small_diagnosis
 def test_nothing_is_said_where_there_is_nothing_to_check(small_diagnosis):
     case = small_diagnosis.case
     fitted = replace(case, recordings=tuple(one for one in case.recordings if one.role == "fit"))
-    assert check_errors(fitted, small_diagnosis.base, [small_diagnosis.weighed[EXPLAINED].refit]) is None
+    assert check_errors(fitted, small_diagnosis.base, [small_diagnosis.weighted_sets[EXPLAINED].refit]) is None
 
 
 @pytest.mark.parametrize("kind", [REFITTED, EXPLAINED])
@@ -40,7 +40,7 @@ def test_a_fit_is_compared_as_where_it_was_fitted(small_diagnosis, kind):
     # the recording that was fitted, as if it were to be checked
     case = small_diagnosis.case
     beads, _ = case.recordings
-    fit = small_diagnosis.weighed[kind].refit
+    fit = small_diagnosis.weighted_sets[kind].refit
     _, error = check_errors(
         replace(case, recordings=(beads, replace(beads, name="again", role="check"))), small_diagnosis.base, [fit]
     )

@@ -10,7 +10,7 @@ from warpbrain.physics.values import Measurement
 
 
 def _told(diagnosis: Diagnosis, first: str, second: str) -> tuple[Measurement, ...]:
-    sets = [next(one for one in diagnosis.search.weighed if name in one.mechanisms) for name in (first, second)]
+    sets = [next(one for one in diagnosis.search.weighted_sets if name in one.mechanisms) for name in (first, second)]
     return next_measurements(diagnosis.search.base, *sets, (first, second))
 
 

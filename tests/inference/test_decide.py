@@ -18,7 +18,7 @@ from warpbrain.inference.decide import (
     decide,
     loss,
 )
-from warpbrain.inference.subsets import Configuration, Hypothesis
+from warpbrain.inference.hypothesis import Configuration, Hypothesis
 
 KINDS = {"unknown": Kind.UNKNOWN, "registration": Kind.NOT_PHYSICS, "mesh": Kind.NOT_PHYSICS}
 LOSSES = calibration().losses

@@ -1,4 +1,4 @@
-"""Errors at recordings with role `check`, which nothing that was fitted has seen."""
+"""Errors at recordings with role `check`, to which nothing is fitted."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.realigned import realigned
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.fitting import Refit
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
 from warpbrain.worlds.body.nuisances import registration_sd
+from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.sensors import sensors_at
 
 Floats = NDArray[np.float64]
@@ -26,17 +26,17 @@ Floats = NDArray[np.float64]
 def check_errors(case: Case, base: Base, fits: Sequence[Refit]) -> tuple[float, ...] | None:
     """Root mean square distances [m]: of the case as declared, then of each fit; None if there is nothing to check.
 
-    What a fit says there is its state with the expected error of the mesh, and what it has found of all that is no
-    physics: recordings of one registration are as wrong where they are fitted as where they are not.
+    A fit predicts them by its state, the expected error of the mesh, and its nuisances: an error of registration is the
+    same for recordings that are fitted and for others.
     """
     checks = Observations.to_check(case)
-    if all(one.kind == "force" for one in checks.recordings):
+    if all(observation.kind == "force" for observation in checks.recordings):
         return None
     centre, declared = base.states.centre, base.declared
     sensors = sensors_at([(math.inf, checks, declared.u, declared.reactions)], centre)
-    # what was fitted was realigned before, see `realigned`
-    again = Observations.to_check(realigned(case, base.states.motion, centre))
-    return distance(sensors, sensors.residual), *(_error(again, base, fit) for fit in fits)
+    # fits are to realigned recordings, see `realigned`
+    realigned_checks = Observations.to_check(realigned(case, base.states.motion, centre))
+    return distance(sensors, sensors.residual), *(_error(realigned_checks, base, fit) for fit in fits)
 
 
 def _error(checks: Observations, base: Base, fit: Refit) -> float:
@@ -46,17 +46,17 @@ def _error(checks: Observations, base: Base, fit: Refit) -> float:
         error = _mesh_error(base, base.mesh_errors, fit)
         u, reactions = u + error.u, reactions + error.reactions
     sensors = sensors_at([(math.inf, checks, u, reactions)], base.states.centre)
-    nuisances, _ = base.seen_by(sensors)
-    # but for tissue and field, which the state has, and the motion by which recordings were taken back
-    known = nuisances.coordinates(base.prior, fit.state.hypothesis)
-    known[nuisances.part("registration")] = base.states.motion / registration_sd()
-    linear = fit.nuisances[: len(known)] - known
-    left = sensors.residual - nuisances.columns @ linear
-    return distance(sensors, left)
+    nuisances, _ = base.for_sensors(sensors)
+    # less tissue and field, which the state has, and the motion by which recordings were realigned
+    coordinates = nuisances.coordinates(base.prior, fit.state.hypothesis)
+    coordinates[nuisances.part("registration")] = base.states.motion / registration_sd()
+    linear = fit.nuisances[: len(coordinates)] - coordinates
+    residual = sensors.residual - nuisances.columns @ linear
+    return distance(sensors, residual)
 
 
 def _mesh_error(base: Base, known: MeshErrors, fit: Refit) -> Difference:
-    """The expected error of the mesh, with that of the mechanisms where a finer mesh can follow them."""
+    """The expected error of the mesh, with that of mechanisms where a finer mesh can be solved."""
     hypothesis = fit.state.hypothesis
     if not any(effect.proposed.changes_in_time for effect in fit.effects):
         try:

@@ -1,4 +1,4 @@
-"""Checks of sets of causes by the model that they were weighed with; see `warpbrain.inference.confirm`."""
+"""Checks of sets of causes: p-values under their models, and held-out rows; see `warpbrain.inference.confirm`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.predict import Prediction, predictive_p
-from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
+from warpbrain.worlds.body.effects import width_of
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
+from warpbrain.worlds.body.weighted_set import WeightedSet
 
 Floats = NDArray[np.float64]
 
@@ -26,9 +28,9 @@ class HeldOutErrors:
     ----------
     without, explained : Prediction
     improvement : (part, low, high)
-        Of the error that is gone.
+        Part of the error that is removed, and its 95 % interval.
     patterns : (low, high)
-        Errors [m] between which nine of ten patterns that mean nothing are.
+        Quantiles of 5 and 95 % of the error [m] with random patterns in the place of mechanisms.
     """
 
     without: Prediction
@@ -44,96 +46,98 @@ class Confirming:
     ----------
     search : HypothesisSearch
     draws : int
-        Of rows in which nothing is missing.
+        Of rows from each model.
     random : Generator
     """
 
     def __init__(self, search: HypothesisSearch, draws: int, random: np.random.Generator) -> None:
         self.search, self._draws, self._random = search, draws, random
         sensors = search.base.at.sensors
-        self._ways = {local: HeldOut(sensors, local) for local in (False, True)}
-        #: Columns (n, m) of a smooth force as large as the noise, of which patterns that mean nothing are made.
+        self._held_out = {local: HeldOut(sensors, local) for local in (False, True)}
+        #: Columns (n, m) of a smooth force as large as the noise, of which random patterns are mixtures.
         self.modes = search.base.typical_noise * next(iter(search.base.unknown.values()))
 
-    def p_of_nothing(self, nothing: Weighed) -> float:
-        """Probability of rows of which any cause explains as much, if none acts.
+    def p_of_nothing(self, nothing: WeightedSet) -> float:
+        """p-value of the hypothesis that no cause acts.
 
-        It is asked of draws of nothing, with the gross errors that it has; what a local cause moves may be among these,
-        and then the Bayes factor of all that may act, each with gross errors of its own, tells. Of data without any the
-        chance that it is `b` or more is `1 / b` at most (Markov's inequality). Twice asked, it is twice as easily said.
+        The smaller of two, times two (Bonferroni's correction). The first compares the Bayes factor of any cause with
+        draws of the model without any, its gross errors included. These may hide what a local cause moves; the second
+        takes the Bayes factor of all causes, each with gross errors of its own, which is `b` or more with a probability
+        of `1 / b` at most if none acts (Markov's inequality).
         """
-        drawn = self._p(nothing.marginal.model, nothing.residual, physics=True)
+        by_draws = self._predictive_p(nothing.marginal.model, nothing.residual, mechanisms=True)
         bound = float(np.exp(-max(self.search.log_bayes_factor, 0.0) / calibration().temperature))
-        return min(1.0, 2.0 * min(drawn, bound))
+        return min(1.0, 2.0 * min(by_draws, bound))
 
-    def p_left(self, one: Weighed) -> float:
-        """Probability of rows of which a field without a name explains as much, if a set is all that acts."""
-        return self._p(one.marginal.model, one.residual, physics=False)
+    def p_left(self, weighted_set: WeightedSet) -> float:
+        """p-value of the hypothesis that a set is all that acts, against unknown fields."""
+        return self._predictive_p(weighted_set.marginal.model, weighted_set.residual, mechanisms=False)
 
-    def _p(self, model: GaussianModel, residual: Floats, physics: bool) -> float:
+    def _predictive_p(self, model: GaussianModel, residual: Floats, mechanisms: bool) -> float:
         fields, weights = [], []
         for cause in self.search.causes.causes:
-            if cause.kind is Kind.UNKNOWN or (physics and cause.kind is Kind.PHYSICS):
-                each = [_with_mean(place.columns, place.mean) for place in cause.places]
-                fields += each
-                weights += [-np.log(len(each))] * len(each)
+            if cause.kind is Kind.UNKNOWN or (mechanisms and cause.kind is Kind.PHYSICS):
+                columns = [
+                    place.columns if place.mean is None else np.column_stack([place.mean, place.columns])
+                    for place in cause.places
+                ]
+                fields += columns
+                weights += [-np.log(len(columns))] * len(columns)
         logs = np.array(weights) - np.logaddexp.reduce(weights)
         return predictive_p(model, fields, beliefs("unknown.sizes"), residual, self._draws, self._random, logs)
 
-    def way(self, one: Weighed) -> HeldOut:
-        """Blocks that suit what acts: here and there where all of it is local."""
-        local = bool(one.effects) and all(effect.proposed.centre is not None for effect in one.effects)
-        return self._ways[local]
+    def held_out_for(self, weighted_set: WeightedSet) -> HeldOut:
+        """Held-out blocks for a set: scattered points if all its effects are local, else regions."""
+        local = bool(weighted_set.effects) and all(
+            effect.proposed.centre is not None for effect in weighted_set.effects
+        )
+        return self._held_out[local]
 
-    def predict(self, one: Weighed, way: HeldOut) -> Prediction:
-        """Held-out rows with a set."""
-        return way.predict(one.marginal.model, one.residual)
+    def predict(self, weighted_set: WeightedSet, held_out: HeldOut) -> Prediction:
+        """Held-out rows predicted with a set."""
+        return held_out.predict(weighted_set.marginal.model, weighted_set.residual)
 
-    def confirmations(self, one: Weighed) -> tuple[Confirmation, ...]:
-        """Of each mechanism of a set, where all others of it act."""
-        return tuple(self._confirm(one, name) for name in one.mechanisms)
+    def confirmations(self, weighted_set: WeightedSet) -> tuple[Confirmation, ...]:
+        """Of each mechanism of a set, given all others of it."""
+        return tuple(self._confirm(weighted_set, name) for name in weighted_set.mechanisms)
 
-    def _confirm(self, one: Weighed, name: str) -> Confirmation:
-        others = self.search.get(one.names - {name})
-        effect = one.effects[one.mechanisms.index(name)]
-        way = self._ways[effect.proposed.centre is not None]
+    def _confirm(self, weighted_set: WeightedSet, name: str) -> Confirmation:
+        others = self.search.get(weighted_set.names - {name})
+        effect = weighted_set.effects[weighted_set.mechanisms.index(name)]
+        held_out = self._held_out[effect.proposed.centre is not None]
         if others is None:
-            others = self.search.without(one, name)
-        own, before = self.predict(one, way), self.predict(others, way)
-        patterns = self._patterns(others, way, effect.columns.shape[1], len(self.search.causes.named(name).places))
+            others = weighted_set.without(name, self.search.base)
+        full, reduced = self.predict(weighted_set, held_out), self.predict(others, held_out)
+        patterns = self._patterns(others, held_out, effect.columns.shape[1], len(self.search.causes.named(name).places))
         return Confirmation(
             name,
-            one.hypothesis.log_evidence - others.hypothesis.log_evidence,
-            own.gain(before),
-            way.improvement(own, before, self._random),
-            share_of_patterns(own, patterns),
+            weighted_set.hypothesis.log_evidence - others.hypothesis.log_evidence,
+            full.gain(reduced),
+            held_out.improvement(full, reduced, self._random),
+            share_of_patterns(full, patterns),
         )
 
-    def _patterns(self, others: Weighed, way: HeldOut, freedom: int, places: int) -> tuple[Prediction, ...]:
+    def _patterns(self, others: WeightedSet, held_out: HeldOut, freedom: int, places: int) -> tuple[Prediction, ...]:
         model = others.marginal.model
-        return way.with_patterns(model, others.residual, self.modes, freedom, tries_of(places), self._random)
+        return held_out.with_patterns(model, others.residual, self.modes, freedom, tries_of(places), self._random)
 
-    def held_out(self, nothing: Weighed, one: Weighed) -> HeldOutErrors:
-        """A set beside none."""
-        way = self.way(one)
-        without, explained = self.predict(nothing, way), self.predict(one, way)
-        freedom = sum(effect.columns.shape[1] for effect in one.effects)
-        places = max((len(self.search.causes.named(name).places) for name in one.mechanisms), default=1)
-        patterns = self._patterns(nothing, way, max(freedom, 1), places)
-        errors = [way.error(pattern) for pattern in patterns]
+    def held_out(self, nothing: WeightedSet, weighted_set: WeightedSet) -> HeldOutErrors:
+        """Held-out rows with a set and without any cause."""
+        held_out = self.held_out_for(weighted_set)
+        without, explained = self.predict(nothing, held_out), self.predict(weighted_set, held_out)
+        freedom = width_of(weighted_set.effects)
+        places = max((len(self.search.causes.named(name).places) for name in weighted_set.mechanisms), default=1)
+        patterns = self._patterns(nothing, held_out, max(freedom, 1), places)
+        errors = [held_out.error(pattern) for pattern in patterns]
         low, high = np.quantile(errors, [0.05, 0.95]).tolist()
         return HeldOutErrors(
             without,
             explained,
-            way.improvement(explained, without, self._random),
+            held_out.improvement(explained, without, self._random),
             (low, high),
         )
 
-    def ceiling(self, nothing: Weighed, way: HeldOut) -> float:
-        """Held-out error [m] with any field without a name."""
+    def ceiling(self, nothing: WeightedSet, held_out: HeldOut) -> float:
+        """Least held-out error [m] with an unknown field."""
         fields = [self.search.base.typical_noise * columns for columns in self.search.base.unknown.values()]
-        return way.ceiling(nothing.marginal.model, nothing.residual, fields)
-
-
-def _with_mean(columns: Floats, mean: Floats | None) -> Floats:
-    return columns if mean is None else np.column_stack([mean, columns])
+        return held_out.ceiling(nothing.marginal.model, nothing.residual, fields)

@@ -34,27 +34,28 @@ from warpbrain.inference.decide import (
 from warpbrain.physics.values import Measurement
 from warpbrain.seconds import Seconds
 from warpbrain.threads import one_thread_of_blas
-from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.observable import require_observable
 from warpbrain.worlds.body.screened import screened
 from warpbrain.worlds.body.surfaces import with_sets_that_act
+from warpbrain.worlds.body.weighted_set import WeightedSet
 from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
-#: Sets of causes that are told.
-_TOLD = 20
+#: Sets of causes that a diagnosis lists.
+_LISTED = 20
 #: Size of a patch of the map, in spacings of the scan.
 _PATCH = 0.7
 
 
 @dataclass(frozen=True, eq=False)
 class _Checked:
-    """A verdict after its checks, what failed in words, the set that is spoken of and its checks."""
+    """A verdict after its checks, what failed in words, the set that it is about and the checks of that."""
 
     decision: Decision
     doubts: tuple[str, ...]
-    best: Weighed
+    best: WeightedSet
     confirmations: tuple[Confirmation, ...]
     p_left: float | None
 
@@ -94,7 +95,7 @@ class Diagnosing:
         self.seconds = Seconds()
 
     def run(self) -> Diagnosis:
-        """Every stage.
+        """Run every stage.
 
         Raises
         ------
@@ -118,12 +119,12 @@ class Diagnosing:
         )
         spacing = search.spacing
         confirming = Confirming(search, options.draws, random)
-        nothing = _of(search, ())
+        nothing = search.nothing
         with self.seconds.of("significance"):
             p_value = confirming.p_of_nothing(nothing)
         with self.seconds.of("fits"):
             search.fit(alone=p_value > options.alpha)
-        nothing = _of(search, ())
+        nothing = search.nothing
         by_posterior = self._decided(search, p_value)
         self.listener.stage("checks")
         with self.seconds.of("checks"):
@@ -143,8 +144,8 @@ class Diagnosing:
         self.listener.stage("what to measure next")
         with self.seconds.of("next measurement"):
             measurements = _next(search, ranked)
-        weighed = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
-        predictions = {REFITTED: confirming.predict(nothing, confirming.way(best))}
+        weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
+        predictions = {REFITTED: confirming.predict(nothing, confirming.held_out_for(best))}
         if held_out is not None:
             predictions = {REFITTED: held_out.without, EXPLAINED: held_out.explained}
         return Diagnosis(
@@ -161,13 +162,13 @@ class Diagnosing:
             map=where,
             when=_onset(search, checked.decision, best),
             search=search,
-            weighed=weighed,
+            weighted_sets=weighted_sets,
             held_out=predictions,
             explained=self._explained(search, best, named),
             smallest=seen,
             confusion=confusion,
             next_measurement=measurements,
-            fit=self._fit(confirming, weighed, held_out, checked.confirmations),
+            fit=self._fit(confirming, weighted_sets, held_out, checked.confirmations),
             confirmations=checked.confirmations,
             assumptions=assumptions_of(self.case, search.base, best),
             remarks=search.base.remarks,
@@ -176,18 +177,18 @@ class Diagnosing:
         )
 
     def _decided(self, search: HypothesisSearch, p_value: float) -> Decision:
-        """The verdict of least expected loss; of nothing where there is no alarm."""
+        """The verdict of least expected loss; that nothing is missing if `p_value` is above `alpha`."""
         if p_value > self.options.alpha:
             return Decision(NOTHING)
-        hypotheses = [one.hypothesis for one in search.weighed]
+        hypotheses = [weighted_set.hypothesis for weighted_set in search.weighted_sets]
         return decide(hypotheses, search.probabilities, calibration().losses)[0]
 
     def _checked(self, search: HypothesisSearch, confirming: Confirming, by_posterior: Decision) -> _Checked:
-        """The verdict after its checks, and the set that is spoken of."""
-        nothing, alpha = _of(search, ()), self.options.alpha
+        """The verdict after its checks, and the set that it is about."""
+        nothing, alpha = search.nothing, self.options.alpha
         if by_posterior.verdict not in (NAMED, NAMED_AND_REST):
             return _Checked(by_posterior, (), nothing, (), None)
-        best = search.explaining(frozenset(by_posterior.causes))
+        best = search.fitted_with(frozenset(by_posterior.causes))
         if best is None:
             return _not_fitted(search, by_posterior.causes)
         confirmations, p_left = confirming.confirmations(best), confirming.p_left(best)
@@ -195,21 +196,21 @@ class Diagnosing:
         if decision.verdict not in (NAMED, NAMED_AND_REST):
             return _Checked(decision, doubts, nothing, confirmations, p_left)
         if set(decision.causes) != set(by_posterior.causes):
-            best = search.explaining(frozenset(decision.causes))
+            best = search.fitted_with(frozenset(decision.causes))
             if best is None:
                 return _not_fitted(search, decision.causes)
             p_left = confirming.p_left(best)
         return _Checked(decision, doubts, best, confirmations, p_left)
 
     @staticmethod
-    def _traits(decision: Decision, search: HypothesisSearch, best: Weighed, where: ScoreMap) -> Traits | None:
-        """Of the force without a name that is left, alone or beside what is named."""
+    def _traits(decision: Decision, search: HypothesisSearch, best: WeightedSet, where: ScoreMap) -> Traits | None:
+        """Of an unknown force, alone or in addition to what is named."""
         if decision.verdict not in (UNKNOWN, NAMED_AND_REST):
             return None
         base, model = search.base, best.marginal.model
         return traits_of(base.at, model, best.residual, base.typical_noise, search.spacing, where.centre)
 
-    def _explained(self, search: HypothesisSearch, best: Weighed, named: tuple[str, ...]) -> Case | None:
+    def _explained(self, search: HypothesisSearch, best: WeightedSet, named: tuple[str, ...]) -> Case | None:
         if not named:
             return None
         assert best.refit is not None
@@ -219,26 +220,26 @@ class Diagnosing:
     def _fit(
         self,
         confirming: Confirming,
-        weighed: dict[str, Weighed],
+        weighted_sets: dict[str, WeightedSet],
         held_out: HeldOutErrors | None,
         confirmations: tuple[Confirmation, ...],
     ) -> Fit:
-        nothing, base = weighed[REFITTED], confirming.search.base
+        nothing, base = weighted_sets[REFITTED], confirming.search.base
         sensors = base.at.sensors
-        raw = distance(base.declared.sensors, base.declared.sensors.residual)
-        way = confirming.way(weighed.get(EXPLAINED, nothing))
-        without = confirming.predict(nothing, way) if held_out is None else held_out.without
-        inside = {name: distance(sensors, left_of(one)) for name, one in weighed.items()}
-        explained = None if held_out is None else (inside[EXPLAINED], way.error(held_out.explained))
-        refits = [one.refit for one in weighed.values() if one.refit is not None]
+        declared = distance(base.declared.sensors, base.declared.sensors.residual)
+        blocks = confirming.held_out_for(weighted_sets.get(EXPLAINED, nothing))
+        without = confirming.predict(nothing, blocks) if held_out is None else held_out.without
+        in_sample = {name: distance(sensors, s.best_residual) for name, s in weighted_sets.items()}
+        explained = None if held_out is None else (in_sample[EXPLAINED], blocks.error(held_out.explained))
+        refits = [weighted_set.refit for weighted_set in weighted_sets.values() if weighted_set.refit is not None]
         return Fit(
-            (raw, raw),
-            (inside[REFITTED], way.error(without)),
+            (declared, declared),
+            (in_sample[REFITTED], blocks.error(without)),
             explained,
             None if held_out is None else held_out.improvement,
-            None if held_out is None else max(one.placebo_p for one in confirmations),
+            None if held_out is None else max(confirmation.placebo_p for confirmation in confirmations),
             None if held_out is None else held_out.patterns,
-            confirming.ceiling(nothing, way),
+            confirming.ceiling(nothing, blocks),
             check_errors(self.case, base, refits),
         )
 
@@ -275,48 +276,35 @@ def diagnose(
     """
     if case.specimen is None:
         return Diagnosing(case, options, device, listener).run()
-    asked = (options or DiagnosisOptions()).of_specimen
-    return DiagnosingSpecimen(case, asked, device, listener).run()
-
-
-def left_of(one: Weighed) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """What a set leaves of what was recorded (n,), at its best point."""
-    if one.refit is not None:
-        return one.refit.residual
-    return np.asarray(one.residual - one.columns @ one.coordinates)
-
-
-def _of(search: HypothesisSearch, names: tuple[str, ...]) -> Weighed:
-    one = search.get(names)
-    assert one is not None
-    return one
+    specimen_options = (options or DiagnosisOptions()).of_specimen
+    return DiagnosingSpecimen(case, specimen_options, device, listener).run()
 
 
 def _not_fitted(search: HypothesisSearch, causes: tuple[str, ...]) -> _Checked:
-    """What cannot be simulated as large as it is seen has no name."""
-    said = (
-        f"{' and '.join(causes)}, as large as it is seen, could not be simulated: {search.why_not(frozenset(causes))}"
-    )
-    return _Checked(Decision(CANNOT_SAY, causes), (said,), _of(search, ()), (), None)
+    """No verdict on causes that cannot be simulated at the size that the data ask for."""
+    failure = search.failure_with(frozenset(causes))
+    doubt = f"{' and '.join(causes)}, as large as it is seen, could not be simulated: {failure}"
+    return _Checked(Decision(CANNOT_SAY, causes), (doubt,), search.nothing, (), None)
 
 
 def _combinations(search: HypothesisSearch) -> tuple[Combination, ...]:
+    likely = zip(search.weighted_sets[:_LISTED], search.probabilities.tolist()[:_LISTED], strict=True)
     return tuple(
         Combination(
-            one.hypothesis.causes,
-            one.hypothesis.kinds,
-            one.hypothesis.log_evidence,
-            one.hypothesis.log_prior,
-            chance,
-            one.refit is not None,
-            int(one.marginal.gross.sum()),
+            weighted_set.hypothesis.causes,
+            weighted_set.hypothesis.kinds,
+            weighted_set.hypothesis.log_evidence,
+            weighted_set.hypothesis.log_prior,
+            probability,
+            weighted_set.refit is not None,
+            int(weighted_set.marginal.gross.sum()),
         )
-        for one, chance in list(zip(search.weighed, search.probabilities.tolist(), strict=True))[:_TOLD]
+        for weighted_set, probability in likely
     )
 
 
-def _onset(search: HypothesisSearch, decision: Decision, best: Weighed) -> Onset | None:
-    """Of the first cause that is named; of what is unknown where none is."""
+def _onset(search: HypothesisSearch, decision: Decision, best: WeightedSet) -> Onset | None:
+    """Of the first cause that is named, or of an unknown force."""
     if decision.verdict in (NOTHING, NOT_PHYSICS):
         return None
     if not best.mechanisms:
@@ -328,9 +316,9 @@ def _onset(search: HypothesisSearch, decision: Decision, best: Weighed) -> Onset
 
 
 def _next(search: HypothesisSearch, ranked: tuple[Ranked, ...]) -> tuple[Measurement, ...]:
-    """Between the two most probable mechanisms."""
-    names = [one.kind for one in ranked if one.physics][:2]
+    """Measurements that discriminate between the two most probable mechanisms."""
+    names = [cause.kind for cause in ranked if cause.physics][:2]
     if len(names) < 2:
         return ()
-    sets = [next(one for one in search.weighed if name in one.mechanisms) for name in names]
+    sets = [next(s for s in search.weighted_sets if name in s.mechanisms) for name in names]
     return next_measurements(search.base, sets[0], sets[1], (names[0], names[1]))

@@ -1,8 +1,7 @@
-"""What a set of causes predicts of points that it is not given: blocks of rows, errors, and patterns that mean nothing.
+"""Cross-validation of sets of causes by blocks of rows, against random patterns in the place of mechanisms.
 
-Points are put into blocks before anything is fitted; each block is predicted from all others by conditioning the same
-model. Blocks are regions; what acts in one place only cannot be predicted from everywhere else, and for that points are
-held out here and there.
+Blocks do not depend on any fit; each is predicted from all others by conditioning the same model. Blocks are regions.
+The effect of a local cause cannot be predicted from other regions, so for that blocks are scattered points.
 """
 
 from __future__ import annotations
@@ -22,23 +21,23 @@ from warpbrain.worlds.body.sensors import Sensors, spread_points
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Blocks, and patterns that mean nothing.
+#: Blocks, and random patterns.
 _BLOCKS, _PATTERNS = 24, 100
 
 
 def blocks_of(sensors: Sensors, local: bool) -> Ints:
-    """Block (n,) of each row: here and there for what is local, else regions; forces are one region."""
+    """Block (n,) of each row: scattered points if `local`, else regions; forces are one region."""
     if local:
         return sensors.groups % _BLOCKS
     rows = sensors.is_displacement
-    found = np.zeros(len(sensors), dtype=np.int64)
-    where = sensors.positions[rows]
-    if not len(where):
-        return found
-    order = spread_points(where, 0.0, min(_BLOCKS, len(np.unique(sensors.groups[rows]))))
-    found[rows] = np.argmin(np.linalg.norm(where[:, None] - where[order][None], axis=2), axis=1)
-    found[~rows] = len(order)
-    return found
+    blocks = np.zeros(len(sensors), dtype=np.int64)
+    places = sensors.positions[rows]
+    if not len(places):
+        return blocks
+    centres = spread_points(places, 0.0, min(_BLOCKS, len(np.unique(sensors.groups[rows]))))
+    blocks[rows] = np.argmin(np.linalg.norm(places[:, None] - places[centres][None], axis=2), axis=1)
+    blocks[~rows] = len(centres)
+    return blocks
 
 
 def distance(sensors: Sensors, errors: Floats) -> float:
@@ -57,14 +56,14 @@ class HeldOut:
     ----------
     sensors : Sensors
     local : bool
-        Whether what is looked at acts in one place.
+        Whether all that acts is local.
     """
 
     def __init__(self, sensors: Sensors, local: bool) -> None:
         self.sensors, self.blocks = sensors, blocks_of(sensors, local)
 
     def predict(self, model: GaussianModel, residual: Floats) -> Prediction:
-        """Every block given the others."""
+        """Predict every block from the others."""
         return predict(model, residual, self.blocks)
 
     def error(self, prediction: Prediction) -> float:
@@ -74,7 +73,7 @@ class HeldOut:
     def improvement(
         self, prediction: Prediction, over: Prediction, random: np.random.Generator
     ) -> tuple[float, float, float]:
-        """Part of another's error that is gone, with its 95 % interval."""
+        """Part of another prediction's error that is removed, and its 95 % interval."""
         return prediction.improvement(over, self.sensors.is_displacement, random)
 
     def with_patterns(
@@ -86,10 +85,10 @@ class HeldOut:
         tries: int,
         random: np.random.Generator,
     ) -> tuple[Prediction, ...]:
-        """Predictions with patterns that mean nothing in the place of a mechanism.
+        """Predictions with random patterns in the place of a mechanism.
 
-        A pattern is a random mixture of the modes of a smooth force, of the size that suits it. Of `tries` of them that
-        which explains the rows best is taken, as the mechanism was from among its places.
+        A pattern is a random mixture of the modes of a smooth force with the size that fits best. The best of `tries`
+        patterns is taken, as the mechanism is the best of its places.
 
         Parameters
         ----------
@@ -116,17 +115,17 @@ class HeldOut:
 
     def ceiling(self, model: GaussianModel, residual: Floats, fields: Sequence[Floats]) -> float:
         """Least held-out error [m] with any of some fields, (n, k) as large as the noise, of any size."""
-        each = [size * columns for columns in fields for size in beliefs("unknown.sizes")]
-        predictions = predict_with(model, residual, self.blocks, each)
-        return self.error(max(predictions, key=lambda one: one.log_density))
+        column_sets = [size * columns for columns in fields for size in beliefs("unknown.sizes")]
+        predictions = predict_with(model, residual, self.blocks, column_sets)
+        return self.error(max(predictions, key=lambda prediction: prediction.log_density))
 
 
-def share_of_patterns(own: Prediction, patterns: Sequence[Prediction]) -> float:
-    """Probability that a pattern that means nothing predicts as well."""
-    better = sum(one.log_density >= own.log_density for one in patterns)
+def share_of_patterns(prediction: Prediction, patterns: Sequence[Prediction]) -> float:
+    """p-value of a prediction among those with random patterns."""
+    better = sum(pattern.log_density >= prediction.log_density for pattern in patterns)
     return float((1 + better) / (1 + len(patterns)))
 
 
 def tries_of(places: int) -> int:
-    """How many patterns stand for a scan of so many places, which are far from independent of each other."""
+    """How many patterns a scan of so many places is worth, which are far from independent of each other."""
     return int(min(places, belief("checks.tries")))

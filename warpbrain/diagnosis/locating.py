@@ -1,9 +1,9 @@
-"""Where the mismatch is: a score of a force at every place, its significance, and what the data could see there.
+"""Where the mismatch is: the score of a force at every place, its significance, and its detectability.
 
 A force patch with columns `B` has the score `T = s^T I^-1 s`, `s = B^T S^-1 r`, `I = B^T S^-1 B`: chi-squared of three
 degrees of freedom where nothing is missing. Of a single source without noise the score is largest at its own place,
 however deep it lies (the standardisation of Pascual-Marqui's sLORETA, 2002). The largest score of all places is
-compared with its distribution in draws of noise and nuisances (Westfall and Young 1993): looking everywhere is paid.
+compared with its distribution in draws of noise and nuisances, which corrects for all tests (Westfall and Young 1993).
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ class ScoreMap:
     threshold : float
         Of the largest score, at the level `alpha`.
     global_p, local_p : float
-        Of the largest score: looking everywhere, and at this place alone.
+        p-values of the largest score: corrected for all places, and at this place alone.
     detectable : (s,) array
-        Smallest force [N] that would be found there, in the direction in which the sensors see least.
+        Smallest force [N] that would be detected there, in the direction of the least sensitivity.
     region : (s,) bool array
-        Places that the data cannot tell from the best.
+        Places that the data do not distinguish from the best.
     """
 
     sites: Floats
@@ -64,12 +64,12 @@ class ScoreMap:
 
     @property
     def blind_above(self) -> float:
-        """Force [N]: where no smaller one would be found, the data cannot see."""
+        """Force [N] above which a place counts as blind, if no smaller one would be detected there."""
         return belief("checks.blind") * float(self.detectable.min())
 
     @property
     def centre(self) -> Floats:
-        """Mean (3,) [m] of the places that may be it, weighted by their scores' likelihood."""
+        """Mean (3,) [m] of the places in `region`, weighted by their likelihood."""
         return self._ball[0]
 
     @property
@@ -109,7 +109,7 @@ def score_map(
         Of noise and nuisances.
     residual : (n,) array
     draws : (n, b) array
-        Of rows in which nothing is missing.
+        Of rows if no cause acts.
     length, spacing : float
         Of patches and between them [m].
     alpha : float
@@ -119,7 +119,7 @@ def score_map(
     sites, answers = force_patches(at, length, spacing)
     columns = model.standardised(answers.reshape(len(answers), -1)).reshape(answers.shape)
     information = np.einsum("nsi,nsj->sij", columns, columns, optimize=True)
-    # what is held, or hidden behind what the nuisances explain, has no information: it has no score either
+    # held places, and those whose effect nuisances explain, have no information and no score
     size = np.trace(information, axis1=1, axis2=2)
     information += 1e-9 * max(float(size.max()), 1e-300) * np.eye(3)
 
@@ -127,21 +127,21 @@ def score_map(
         s = np.einsum("nsi,nb->sib", columns, model.standardised(rows), optimize=True)
         return np.asarray(np.einsum("sib,sib->sb", s, np.linalg.solve(information, s)))
 
-    own = scores(residual[:, None])[:, 0]
+    observed = scores(residual[:, None])[:, 0]
     largest = scores(draws).max(axis=0)
     threshold = float(np.quantile(largest, 1.0 - alpha))
-    # the noncentrality at which a single place passes the threshold of all
+    # the noncentrality at which one place exceeds the threshold for all with the power that is asked for
     needed = _noncentrality(threshold)
     weakest = np.linalg.eigvalsh(information)[:, 0]
     return ScoreMap(
         sites,
         length,
-        own,
+        observed,
         threshold,
-        float((1 + np.sum(largest >= own.max())) / (1 + len(largest))),
-        float(chdtrc(3, own.max())),
+        float((1 + np.sum(largest >= observed.max())) / (1 + len(largest))),
+        float(chdtrc(3, observed.max())),
         np.sqrt(needed / np.maximum(weakest, 1e-300)),
-        own.max() - own <= float(chdtri(3, 0.05)),
+        observed.max() - observed <= float(chdtri(3, 0.05)),
     )
 
 

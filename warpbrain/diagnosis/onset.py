@@ -1,9 +1,9 @@
-"""When something set in: what explains the mismatch, there from one of the recorded times on.
+"""When the cause of the mismatch set in: from which of the recorded times on it acts.
 
-Place and interval (`warpbrain.worlds.body.time_courses`) are scanned together. Each interval is as probable as another
-beforehand, and each course within it. A smooth force is only nearly what acts, and the state that all is linear about
-only nearly that of each time: the evidence is sharper than it should be, and is divided by a temperature with which
-what is said held for sudden and growing swellings of a phantom.
+Place and interval (`warpbrain.worlds.body.time_courses`) are scanned together. Intervals are equally probable
+beforehand, and so are the courses within each. A smooth force only approximates what acts, and the base only
+approximates the state at each time, so the evidence is overconfident; it is divided by a temperature with which
+intervals were right for sudden and growing swellings of a phantom.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from warpbrain.worlds.body.time_courses import TimeCourse, time_courses
 
 Floats = NDArray[np.float64]
 
-#: Of what has a history without anything that sets in later.
+#: Course of a mechanism that changes in time by itself.
 OF_ITS_OWN = "as its own law says, since the load came"
 
 
@@ -34,13 +34,13 @@ class Onset:
     Attributes
     ----------
     first, last : float
-        Between which times [s], 0 being when the load came.
+        Interval [s] of onset; 0 is when the load came.
     probability : float or None
-        Of that; None where it follows from what it is.
+        Of that interval; None if it follows from the mechanism.
     course : str
-        How it came, in words; empty if these data do not tell.
+        Its shape in time, in words; empty if these data do not tell.
     intervals : tuple of (first, last, probability)
-        All that were compared.
+        All intervals that were compared.
     """
 
     first: float
@@ -57,9 +57,9 @@ def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianMode
     ----------
     base : Base
     cause : Cause or None
-        What explains the mismatch best, at its places as if it were there all the time; None: any smooth force.
+        The best explanation, as if it acted all the time; None: an unknown force.
     in_time : bool
-        Whether it changes in time by itself.
+        Whether it changes in time under constant loads.
     model : GaussianModel
         Of all else that acts.
     residual : (n,) array
@@ -71,11 +71,11 @@ def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianMode
     if in_time:
         return Onset(0.0, float(times[0]), None, OF_ITS_OWN)
     courses = time_courses(base.states.times)
-    alike = np.bincount([course.interval for course in courses])
+    per_interval = np.bincount([course.interval for course in courses])
     cause = cause or unknown_cause(base, [np.ones(len(residual))])
     evidence = [
         _log_evidence(cause, course.factor(base.at.sensors.times), model, residual)
-        - float(np.log(alike[course.interval]))
+        - float(np.log(per_interval[course.interval]))
         for course in courses
     ]
     return _summary([0.0, *times.tolist()], courses, np.array(evidence))
@@ -84,7 +84,8 @@ def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianMode
 def _log_evidence(cause: Cause, factor: Floats, model: GaussianModel, residual: Floats) -> float:
     """Log Bayes factor of a cause that follows a factor (n,) on each row."""
     places = tuple(
-        Place(factor[:, None] * one.columns, None if one.mean is None else factor * one.mean) for one in cause.places
+        Place(factor[:, None] * place.columns, None if place.mean is None else factor * place.mean)
+        for place in cause.places
     )
     blocks = Blocks(model, residual, [replace(cause, places=places)])
     return float(np.logaddexp.reduce(blocks.log_factors() + blocks.log_weights, axis=None))
@@ -96,14 +97,14 @@ def _summary(edges: list[float], courses: list[TimeCourse], evidence: Floats) ->
     weights = softmax(evidence / belief("checks.onset_temperature"))
     count = len(edges) - 1
     of_interval = np.bincount([course.interval for course in courses], weights, minlength=count)
-    # the shortest run of intervals that holds enough
+    # the shortest run of intervals with enough probability
     runs = itertools.combinations(range(count + 1), 2)
     total = np.r_[0.0, np.cumsum(of_interval)]
     enough = [
         (edges[j] - edges[i], i, j) for i, j in runs if total[j] - total[i] >= min(belief("checks.sure"), total[-1])
     ]
     _, i, j = min(enough)
-    # what begins before the last time alone has no course
+    # a cause that is seen at the last time alone has no course
     of_shape: dict[str, float] = {}
     for course, weight in zip(courses, weights.tolist(), strict=True):
         of_shape[course.shape] = of_shape.get(course.shape, 0.0) + (weight if course.interval < count - 1 else 0.0)

@@ -1,4 +1,4 @@
-"""How a diagnosis is asked for."""
+"""Options of a diagnosis."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from warpbrain.worlds.specimen.diagnose import SpecimenOptions
 
 @dataclass(frozen=True)
 class DiagnosisOptions:
-    """What is asked for.
+    """Options of a diagnosis.
 
     Parameters
     ----------
     candidates : tuple of str or None
         Kinds of mechanisms to look for; None: all.
     alpha : float
-        Probability of an alarm where nothing is missing.
+        Probability of a false alarm.
     seed : int
         Of all draws.
     draws : int
@@ -26,8 +26,7 @@ class DiagnosisOptions:
     mesh_error : bool
         Whether the error of the mesh is computed on elements of half the size.
     without_nuisances : bool
-        Credit mechanisms with what nuisances could explain too: what the method is worth without its heart, for
-        comparisons.
+        Credit mechanisms also with what nuisances could explain: an ablation, for comparisons.
     ends : bool
         Of specimens: whether glued ends are computed; otherwise states are taken for homogeneous, as test evaluations
         do.

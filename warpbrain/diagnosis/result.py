@@ -1,4 +1,4 @@
-"""What a diagnosis found, as plain data."""
+"""The result of a diagnosis as plain data."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from warpbrain.inference.decide import Decision
 from warpbrain.inference.predict import Prediction
 from warpbrain.physics.values import Measurement, Smallest, Value
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.hypotheses import HypothesisSearch, Weighed
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
+from warpbrain.worlds.body.weighted_set import WeightedSet
 
 Floats = NDArray[np.float64]
 
-#: Of sets of causes: none, and all that is named.
+#: Sets of causes: without any, and with all that is named.
 REFITTED, EXPLAINED = "refitted", "explained"
 
 
 @dataclass(frozen=True, eq=False)
 class Ranked:
-    """One candidate.
+    """A cause with its probability, size and place.
 
     Attributes
     ----------
@@ -41,7 +42,7 @@ class Ranked:
     probability : float
         Among all that may be missing.
     detectability : float
-        `d` of the effect that was fitted.
+        Length of its fitted effect in standard deviations of noise and nuisances.
     heldout_rmse_change : float or None
         Of held-out points [m] against the refitted case without it; negative is better. None where it was not fitted.
     values : tuple of Value
@@ -67,12 +68,12 @@ class Ranked:
 
 @dataclass(frozen=True, eq=False)
 class Confusion:
-    """What could be taken for each mechanism.
+    """Confusion of mechanisms with other causes.
 
     Attributes
     ----------
     rows : dict of str to dict of str to float
-        By mechanism, the part of its visible effect that the best place of each other cause imitates.
+        By mechanism, the part of its detectable effect that the best place of each other cause explains.
     """
 
     rows: dict[str, dict[str, float]]
@@ -92,7 +93,7 @@ class Combination:
     fitted : bool
         Whether it was fitted without linearising.
     gross_errors : int
-        Points that are rather gross errors than not beside it.
+        Points that are more probably gross errors than not under it.
     """
 
     causes: tuple[str, ...]
@@ -113,11 +114,11 @@ class Fit:
     declared, refitted, explained : (rmse, held-out rmse)
         Of the case as declared, after its tissue was refitted, and with what was named; the last is None if nothing is.
     improvement : (part, low, high) or None
-        Of the refitted case's held-out error that is gone, with its 95 % interval.
+        Part of the refitted case's held-out error that is removed, and its 95 % interval.
     placebo_p : float or None
-        Probability that a pattern that means nothing does as well.
+        p-value of the held-out error among random patterns.
     placebo : (low, high) or None
-        Held-out errors between which nine of ten such patterns are.
+        Quantiles of 5 and 95 % of the held-out errors with these.
     ceiling : float or None
         Held-out error with any smooth force.
     check : tuple of float, or None
@@ -136,7 +137,7 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """All of it.
+    """A diagnosis of a body.
 
     Attributes
     ----------
@@ -146,11 +147,11 @@ class Diagnosis:
     doubts : tuple of str
         Checks that failed, in words.
     p_value : float
-        Of nothing missing.
+        Of the hypothesis that nothing is missing.
     p_left : float or None
-        Of nothing being left beside what is named; None where nothing is.
+        Of the hypothesis that nothing else is missing; None if nothing is named.
     named : tuple of Ranked
-        What is named, the most probable first: as it is in the fit with all of it.
+        What is named, the most probable first, as it is in the joint fit.
     ranking : tuple of Ranked
     rejected : dict of str to str
         Kinds that were not tried, and why.
@@ -158,13 +159,13 @@ class Diagnosis:
         Sets of causes, the most probable first.
     map : ScoreMap
     when : Onset or None
-        When what explains the mismatch best set in; None with one time, or where nothing physical is missing.
+        When the best explanation set in; None with one recorded time, or if nothing physical is missing.
     search : HypothesisSearch
         Of the sets of causes, with its base.
-    weighed : dict of str to Weighed
+    weighted_sets : dict of str to WeightedSet
         ``"refitted"`` without any cause, ``"explained"`` with all that is named.
     held_out : dict of str to Prediction
-        What each of these predicts of points that it was not given.
+        Their predictions of held-out points.
     explained : Case or None
         The case with what was named, ready to run.
     smallest : dict of str to Smallest
@@ -176,7 +177,7 @@ class Diagnosis:
     assumptions, remarks : tuple of str
     seconds : dict of str to float
     unknown : Traits or None
-        Of a force that no mechanism explains: alone, or beside what is named.
+        Of a force that no mechanism explains: alone, or in addition to what is named.
     """
 
     case: Case
@@ -192,7 +193,7 @@ class Diagnosis:
     map: ScoreMap
     when: Onset | None
     search: HypothesisSearch
-    weighed: Mapping[str, Weighed]
+    weighted_sets: Mapping[str, WeightedSet]
     held_out: Mapping[str, Prediction]
     explained: Case | None
     smallest: Mapping[str, Smallest]
@@ -212,22 +213,22 @@ class Diagnosis:
 
     @property
     def group(self) -> tuple[str, ...]:
-        """Causes that are not told apart; perhaps, where nothing can be said."""
+        """Causes that the data do not discriminate; possible ones if nothing can be said."""
         return () if self.named else self.decision.causes
 
     @property
     def base(self) -> Base:
-        """The state that all is linear about."""
+        """The base, about which all is linear."""
         return self.search.base
 
     @property
-    def best(self) -> Weighed:
-        """The set that is spoken of."""
-        return self.weighed.get(EXPLAINED, self.weighed[REFITTED])
+    def best(self) -> WeightedSet:
+        """The set that the verdict is about."""
+        return self.weighted_sets.get(EXPLAINED, self.weighted_sets[REFITTED])
 
     @property
     def gross(self) -> NDArray[np.bool_]:
-        """Rows (n,) of points that are gross errors beside that set."""
+        """Rows (n,) of points that are gross errors under that set."""
         rows = np.zeros(len(self.base.residual), dtype=bool)
         for number in np.flatnonzero(self.best.marginal.gross).tolist():
             rows[self.base.points[number]] = True

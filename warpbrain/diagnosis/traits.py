@@ -1,11 +1,11 @@
-"""What can be said of a force that no mechanism of the dictionary explains, from its posterior.
+"""Posterior of an unknown force: its resultant, its place, and whether it acts on the surface.
 
-The force is that of Gaussian patches all over the body, independent of each other. With `E` what is asked of their
-coefficients `c ~ N(0, s^2 I)`, `A` what they do to the sensors and `S` the covariance of noise and nuisances
+The force is that of independent Gaussian patches all over the body. With `E c` linear functionalss of their coefficients
+`c ~ N(0, s^2 I)`, `A` the response of the sensors to these and `S` the covariance of noise and nuisances
 
     mean = s^2 E A^T (S + s^2 A A^T)^-1 r,     covariance = s^2 E E^T - s^4 E A^T (S + s^2 A A^T)^-1 A E^T.
 
-A net force that is not zero comes from outside: what acts within the body, swollen or stressed, has none.
+A net force that is not zero is external: growth and stress within the body have none.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Traits:
-    """Of a force without a name.
+    """Of an unknown force.
 
     Attributes
     ----------
@@ -35,9 +35,9 @@ class Traits:
     moment, moment_sd : (3,) array
         Net moment about `centre` [N m].
     outside : bool
-        Whether a net force is there: something outside the body exerts it.
+        Whether there is a net force: it is exerted from outside the body.
     turning : bool
-        Whether a net moment is there.
+        Whether there is a net moment.
     surface_nats : float
         Log Bayes factor of a force on the surface alone over one within the body alone.
     centre : (3,) array
@@ -82,23 +82,23 @@ def traits_of(
     from scipy.special import chdtri
 
     sites, answers = force_patches(at, length)
-    # patches that fall on what is held do nothing, and nothing is known of them
+    # patches on held nodes have no effect
     moving = np.linalg.norm(answers, axis=(0, 2)) > 1e-3 * np.linalg.norm(answers, axis=(0, 2)).max()
     sites, answers = sites[moving], answers[:, moving]
     A = answers.reshape(len(answers), -1)
     rows = at.sensors.is_displacement
-    each = 1.0 / np.sqrt(np.mean(np.sum(A[rows] ** 2, axis=1)))
-    tried = noise * each * beliefs("unknown.sizes")
-    # the size that suits best
-    s = float(tried[int(np.argmax([model.with_columns(one * A).log_density(residual) for one in tried.tolist()]))])
-    asked = s * np.concatenate([_summed(sites), _turned(sites - centre)])
-    coefficients, spread = model.with_columns(s * A).coefficients(residual)
-    own = slice(len(coefficients) - A.shape[1], None)
-    mean = asked @ coefficients[own]
-    covariance = asked @ spread[own, own] @ asked.T
+    unit = 1.0 / np.sqrt(np.mean(np.sum(A[rows] ** 2, axis=1)))
+    scales = noise * unit * beliefs("unknown.sizes")
+    # the scale of the greatest likelihood
+    scale = float(scales[int(np.argmax([model.with_columns(s * A).log_density(residual) for s in scales.tolist()]))])
+    functionals = scale * np.concatenate([_summed(sites), _turned(sites - centre)])
+    coefficients, spread = model.with_columns(scale * A).coefficients(residual)
+    of_patches = slice(len(coefficients) - A.shape[1], None)
+    mean = functionals @ coefficients[of_patches]
+    covariance = functionals @ spread[of_patches, of_patches] @ functionals.T
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
-    def there(part: slice) -> bool:
+    def significant(part: slice) -> bool:
         square = float(mean[part] @ np.linalg.solve(covariance[part, part], mean[part]))
         return square > float(chdtri(3, 1.0 - belief("checks.sure")))
 
@@ -107,9 +107,9 @@ def traits_of(
         sd[:3],
         mean[3:],
         sd[3:],
-        there(slice(0, 3)),
-        there(slice(3, 6)),
-        _surface_nats(at, sites, answers, model, s, residual, length),
+        significant(slice(0, 3)),
+        significant(slice(3, 6)),
+        _surface_nats(at, sites, answers, model, scale, residual, length),
         centre,
     )
 
@@ -128,20 +128,26 @@ def _turned(arms: Floats) -> Floats:
 
 
 def _surface_nats(
-    at: Linearisation, sites: Floats, answers: Floats, model: GaussianModel, s: float, residual: Floats, length: float
+    at: Linearisation,
+    sites: Floats,
+    answers: Floats,
+    model: GaussianModel,
+    scale: float,
+    residual: Floats,
+    length: float,
 ) -> float:
-    """Of a force of the same mean displacement near the surface alone, over one that is deeper."""
+    """Log Bayes factor of a force near the surface alone over a deeper one with the same mean displacement."""
     from scipy.spatial import cKDTree
 
     mesh = at.system.model.mesh
     skin = mesh.points[nodes_of(mesh.boundary, len(mesh.points))]
-    near = cKDTree(skin).query(sites)[0] < 0.5 * length
-    if near.all() or not near.any():
+    superficial = cKDTree(skin).query(sites)[0] < 0.5 * length
+    if superficial.all() or not superficial.any():
         return 0.0
     whole = float(np.sum(answers**2))
-    found = []
-    for own in (near, ~near):
-        part = answers[:, own].reshape(len(answers), -1)
-        as_large = s * (whole / float(np.sum(part**2))) ** 0.5
-        found.append(float(model.with_columns(as_large * part).log_density(residual)))
-    return found[0] - found[1]
+    log_densities = []
+    for chosen in (superficial, ~superficial):
+        part = answers[:, chosen].reshape(len(answers), -1)
+        as_large = scale * (whole / float(np.sum(part**2))) ** 0.5
+        log_densities.append(float(model.with_columns(as_large * part).log_density(residual)))
+    return log_densities[0] - log_densities[1]

@@ -1,4 +1,4 @@
-"""What is believed before anything is recorded, read from `priors.toml`: each number stands there once."""
+"""Prior parameters from `priors.toml`, the only place where they are written."""
 
 from __future__ import annotations
 

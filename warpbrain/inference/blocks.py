@@ -5,7 +5,7 @@ The log of a Bayes factor of columns `Z` with means `m` and prior deviations `s`
     ln p(r | cause) - ln p(r | none) = |r|^2/2 - |r - m|^2/2 + b^T (M + D^-1)^-1 b / 2 - ln |I + D M| / 2
     b = Z^T (r - m),   M = Z^T Z,   D = diag(s^2)
 
-Of two blocks the second is seen after the first has been eliminated, a Schur complement: all second ones at once.
+Of pairs of blocks the first is eliminated by a Schur complement, once for all second ones.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,8 @@ Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
-    """Columns that are there already: standardised (n, k), prior deviations (k,), and their mean (n,)."""
+class ActingColumns:
+    """Columns of causes that act together with each block: standardised (n, k), prior deviations (k,), mean (n,)."""
 
     columns: Floats
     deviations: Floats
@@ -51,27 +52,27 @@ class Blocks:
     """
 
     def __init__(self, model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> None:
-        self._see(model.standardised(self._arranged(residual, causes)))
+        self._set_standardised(model.standardised(self._stacked(residual, causes)))
 
     @classmethod
     def at_scales(
         cls, model: GaussianModel, scales: Sequence[float], residual: Floats, causes: Sequence[Cause]
     ) -> Iterator[Blocks]:
         """Blocks with each of some factors on the noise."""
-        plain: Blocks = object.__new__(cls)
-        rows = plain._arranged(residual, causes)
-        for seen in model.standardised_at(scales, rows):
-            blocks = copy.copy(plain)
-            blocks._see(seen)
+        unscaled: Blocks = object.__new__(cls)
+        rows = unscaled._stacked(residual, causes)
+        for standardised in model.standardised_at(scales, rows):
+            blocks = copy.copy(unscaled)
+            blocks._set_standardised(standardised)
             yield blocks
 
-    def _see(self, rows: Floats) -> None:
-        """Take standardised rows (n, 1 + p + q): residual, means and columns."""
+    def _set_standardised(self, rows: Floats) -> None:
+        """Set standardised rows (n, 1 + p + q): residual, means and columns."""
         first = 1 + len(self.cause)
         self._r, self._m, self._Z = rows[:, 0], rows[:, 1:first], rows[:, first:]
 
-    def _arranged(self, residual: Floats, causes: Sequence[Cause]) -> Floats:
-        """Put blocks in order; their rows as they are."""
+    def _stacked(self, residual: Floats, causes: Sequence[Cause]) -> Floats:
+        """Rows (n, 1 + p + q) of the residual, means and columns, not yet standardised; sets the order of blocks."""
         widths = [max(place.columns.shape[1] for place in cause.places) for cause in causes]
         order = np.argsort([-width for width in widths], kind="stable").tolist()
         self.cause = np.concatenate([np.full(len(causes[c].places), c) for c in order]).astype(np.int64)
@@ -94,8 +95,13 @@ class Blocks:
     def __len__(self) -> int:
         return len(self.cause)
 
-    def some(self, chosen: Ints) -> Blocks:
-        """Some of the blocks, in the same order."""
+    @cached_property
+    def cause_edges(self) -> Ints:
+        """Numbers (c + 1,) of the first block of each cause in order, and at last how many blocks there are."""
+        return np.flatnonzero(np.diff(self.cause, prepend=-1, append=-1))
+
+    def subset(self, chosen: Ints) -> Blocks:
+        """Some of the blocks by their numbers, in the same order."""
         other: Blocks = object.__new__(Blocks)
         keep = np.sort(chosen)
         other.cause, other.place, other.log_weights = self.cause[keep], self.place[keep], self.log_weights[keep]
@@ -105,62 +111,60 @@ class Blocks:
         other._r, other._Z, other._m = self._r, self._Z[:, columns], self._m[:, keep]
         return other
 
-    def given(self, members: Sequence[tuple[int, int]]) -> Given:
-        """Blocks by number with the numbers of their sizes, as what is there already."""
+    def acting(self, members: Sequence[tuple[int, int]]) -> ActingColumns:
+        """Blocks by number, with the numbers of their sizes, as columns that act together with others."""
         columns = [self._Z[:, self._first[k] : self._first[k + 1]] for k, _ in members]
         deviations = [np.full(self._width[k], self._sizes[k, size]) for k, size in members]
         mean = self._m[:, [k for k, _ in members]].sum(axis=1)
-        return Given(np.concatenate(columns, axis=1), np.concatenate(deviations), mean)
+        return ActingColumns(np.concatenate(columns, axis=1), np.concatenate(deviations), mean)
 
-    def log_factors(self, given: Given | None = None, start: int = 0) -> Floats:
+    def log_factors(self, acting: ActingColumns | None = None, start: int = 0) -> Floats:
         """Log Bayes factors (p - start, s) of blocks from `start` on, with every size.
 
         Parameters
         ----------
-        given : Given, optional
-            Columns that act together with each block: the factor is then of both together, against none.
+        acting : ActingColumns, optional
+            Columns that act together with each block: factors are then of both together, against neither.
         start : int
+            Number of the first block.
         """
-        found = np.empty((len(self) - start, self._sizes.shape[1]))
+        logs = np.empty((len(self) - start, self._sizes.shape[1]))
         widths = self._width[start:]
-        # causes of one width lie together
+        # causes of the same width are next to each other
         edges = np.flatnonzero(np.diff(widths)) + 1
         for low, high in zip([0, *edges.tolist()], [*edges.tolist(), len(widths)], strict=True):
-            found[low:high] = self._of_one_width(np.arange(start + low, start + high), given)
-        return found
+            logs[low:high] = self._log_factors_of_width(np.arange(start + low, start + high), acting)
+        return logs
 
-    def _of_one_width(self, blocks: Ints, given: Given | None) -> Floats:
+    def _log_factors_of_width(self, blocks: Ints, acting: ActingColumns | None) -> Floats:
         """Log Bayes factors (b, s) of blocks that are all as wide as each other."""
         count, width = len(blocks), int(self._width[blocks[0]])
         at = slice(self._first[blocks[0]], self._first[blocks[-1] + 1])
         Z, means, sizes = self._Z[:, at], self._m[:, blocks], self._sizes[blocks]
-        each = Z.reshape(len(Z), count, width)
-        M = np.einsum("nbi,nbj->bij", each, each, optimize=True)
+        of_block = Z.reshape(len(Z), count, width)
+        M = np.einsum("nbi,nbj->bij", of_block, of_block, optimize=True)
         with_means = bool(means.any())
-        if given is None:
-            left = self._r[:, None] - means if with_means else self._r[:, None]
-        else:
-            rest = self._r - given.mean
-            left = rest[:, None] - means if with_means else rest[:, None]
+        r = self._r if acting is None else self._r - acting.mean
+        residual = r[:, None] - means if with_means else r[:, None]
         b = (
-            np.einsum("nbi,nb->bi", each, np.broadcast_to(left, (len(Z), count)), optimize=True)
+            np.einsum("nbi,nb->bi", of_block, np.broadcast_to(residual, (len(Z), count)), optimize=True)
             if with_means
-            else (left[:, 0] @ Z).reshape(count, width)
+            else (residual[:, 0] @ Z).reshape(count, width)
         )
-        log = 0.5 * (self._r @ self._r - np.sum(left**2, axis=0)) * np.ones(count)
-        if given is not None:
-            W = given.columns
-            A = np.linalg.inv(W.T @ W + np.diag(given.deviations**-2.0))
-            seen = W.T @ left
+        log = 0.5 * (self._r @ self._r - np.sum(residual**2, axis=0)) * np.ones(count)
+        if acting is not None:
+            W = acting.columns
+            A = np.linalg.inv(W.T @ W + np.diag(acting.deviations**-2.0))
+            projection = W.T @ residual
             C = (W.T @ Z).reshape(W.shape[1], count, width)
             AC = np.einsum("kl,lbi->kbi", A, C)
             M = M - np.einsum("kbi,kbj->bij", C, AC)
-            b = b - np.einsum("kbi,kb->bi", AC, np.broadcast_to(seen, (W.shape[1], count)))
-            log = log + 0.5 * np.einsum("kb,kl,lb->b", seen, A, seen) * np.ones(count)
-            log = log + 0.5 * np.linalg.slogdet(A)[1] - np.log(given.deviations).sum()
+            b = b - np.einsum("kbi,kb->bi", AC, np.broadcast_to(projection, (W.shape[1], count)))
+            log = log + 0.5 * np.einsum("kb,kl,lb->b", projection, A, projection) * np.ones(count)
+            log = log + 0.5 * np.linalg.slogdet(A)[1] - np.log(acting.deviations).sum()
         values, vectors = np.linalg.eigh(M)
-        along = np.einsum("bij,bi->bj", vectors, b) ** 2
+        projected = np.einsum("bij,bi->bj", vectors, b) ** 2
         ratio = sizes[:, :, None] ** 2
-        explained = np.sum(ratio * along[:, None] / (1.0 + ratio * np.maximum(values, 0.0)[:, None]), axis=2)
+        explained = np.sum(ratio * projected[:, None] / (1.0 + ratio * np.maximum(values, 0.0)[:, None]), axis=2)
         volume = np.sum(np.log1p(ratio * np.maximum(values, 0.0)[:, None]), axis=2)
         return np.asarray(log[:, None] + 0.5 * (explained - volume))

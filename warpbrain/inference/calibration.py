@@ -1,4 +1,4 @@
-"""What the referee has fitted: how probabilities follow from evidence, and what each kind of wrong verdict costs."""
+"""What is fitted to scored cases: how probabilities follow from evidence, and what each kind of wrong verdict costs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.inference.causes import Kind
-from warpbrain.inference.subsets import Hypothesis
+from warpbrain.inference.hypothesis import Hypothesis
 
 
 @dataclass(frozen=True)
@@ -22,15 +22,15 @@ class Calibration:
     Attributes
     ----------
     temperature : float
-        By which log probabilities are divided: evidence is sharper than it should be where noise, mesh and tissue are
-        only nearly what the model says.
+        Divisor of log probabilities: the evidence is overconfident where noise, mesh and tissue are only nearly as the
+        model has them.
     log_weights : mapping of str to float
         Added to the log prior of sets: of no cause (`nothing`), for each physical cause beyond the first (`another`),
         of sets with the unknown, and of sets with what is no physics.
     losses : mapping of str to float
         What each kind of wrong verdict costs, in units of silence where something is missing.
     most_said : float
-        The share of right names that was counted: no probability is said to be more.
+        Share of names that were right among scored cases: no higher probability is reported.
     """
 
     temperature: float
@@ -42,10 +42,11 @@ class Calibration:
         """Of each hypothesis, (h,)."""
         from scipy.special import softmax
 
-        logs = [one.log_evidence + one.log_prior + self._weight(one) for one in hypotheses]
+        logs = [h.log_evidence + h.log_prior + self._log_weight(h) for h in hypotheses]
         return np.asarray(softmax(np.array(logs) / self.temperature))
 
-    def _weight(self, hypothesis: Hypothesis) -> float:
+    def _log_weight(self, hypothesis: Hypothesis) -> float:
+        """What is added to the log prior of a set."""
         if not hypothesis.causes:
             return self.log_weights["nothing"]
         kinds = hypothesis.kinds
@@ -58,6 +59,6 @@ class Calibration:
 
 @cache
 def calibration() -> Calibration:
-    """Those of the package."""
-    read = json.loads((files("warpbrain.inference") / "calibration.json").read_text(encoding="utf-8"))
-    return Calibration(read["temperature"], read["log_weights"], read["losses"], read["most_said"])
+    """The calibration that the package has."""
+    values = json.loads((files("warpbrain.inference") / "calibration.json").read_text(encoding="utf-8"))
+    return Calibration(values["temperature"], values["log_weights"], values["losses"], values["most_said"])

@@ -1,4 +1,4 @@
-"""What may have caused residuals: physics, fields without a name, or what is no physics, all in one shape."""
+"""What may have caused residuals: mechanisms, unknown fields, or what is no physics, all with the same interface."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 
 class Kind(Enum):
-    """Of which kind a cause is; a verdict speaks differently of each."""
+    """Of which kind a cause is; verdicts differ among them."""
 
     PHYSICS = "physics"
     UNKNOWN = "unknown"
@@ -28,7 +28,7 @@ class Place:
     columns : (n, k) array
         What a unit of size of each coefficient changes of each row.
     mean : (n,) array, optional
-        What is expected of it whatever its size, such as the weight at a level of the fluid; zero if not given.
+        Expected change of each row, whatever the size, such as the weight at a level of the fluid; zero if not given.
     weight : float
         Probability among the places of its cause.
     """
@@ -42,8 +42,8 @@ class Place:
 class Cause:
     """One cause.
 
-    Coefficients are normal with the standard deviation `s`, and `s` is one of a few sizes: a scale mixture, so that a
-    cause that is small but plain to see pays as little for its width as one that is large.
+    Coefficients are normal with the standard deviation `s`, which is one of a few sizes: a scale mixture, by which the
+    prior penalises a small cause no more than a large one.
 
     Parameters
     ----------
@@ -64,6 +64,6 @@ class Cause:
 
     @property
     def log_weights(self) -> Floats:
-        """Logarithm of the probability of each place and size, (p, s): sizes are all alike probable."""
+        """Logarithm of the probability of each place and size, (p, s): all sizes are equally probable."""
         weights = np.array([place.weight for place in self.places])
         return np.log(weights / weights.sum())[:, None] - np.log(len(self.sizes)) + np.zeros(len(self.sizes))

@@ -1,4 +1,4 @@
-"""What the checks of a model take back of a verdict; they never choose between causes."""
+"""Checks of a verdict by held-out rows: names that fail are withdrawn; checks never choose between causes."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decisi
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What a cause is worth where all others act.
+    """What a cause of a fit explains that all others of it do not.
 
     Attributes
     ----------
     name : str
     log_evidence : float
-        Of the fit against that without the cause.
+        Log Bayes factor of the fit over that without the cause.
     heldout_log_density : float
         By how much held-out rows are more probable with it [nats].
     gain : (part, low, high)
-        Of the held-out error of all rows that is gone with it, and its 95 % interval.
+        Part of the held-out error of all rows that it removes, and its 95 % interval.
     placebo_p : float
-        Probability that a pattern that means nothing does as well in its place.
+        p-value among random patterns in its place, by what they predict of held-out rows.
     """
 
     name: str
@@ -32,13 +32,13 @@ class Confirmation:
     placebo_p: float
 
     def why_not(self, alpha: float) -> str:
-        """What keeps it from being named; empty if nothing does."""
-        said = []
+        """Why it is not named; empty if it is."""
+        reasons = []
         if self.heldout_log_density <= 0.0:
-            said.append("what was held out is not predicted better with it")
+            reasons.append("what was held out is not predicted better with it")
         if self.placebo_p > alpha:
-            said.append("patterns that mean nothing predict as well")
-        return " and ".join(said)
+            reasons.append("patterns that mean nothing predict as well")
+        return " and ".join(reasons)
 
 
 def after_checks(
@@ -51,8 +51,8 @@ def after_checks(
 ) -> tuple[Decision, tuple[str, ...]]:
     """A verdict after its checks, and what failed in words.
 
-    Names that fail are not spoken; without any other name, or where the error of what was held out grows, nothing can
-    be said. Where anything is left a rest is said.
+    Causes that fail are not named. Without any other name, or where the held-out error grows, nothing can be said.
+    Where a check shows that something is left the verdict says so.
 
     Parameters
     ----------
@@ -61,19 +61,19 @@ def after_checks(
     confirmations : sequence of Confirmation
         Of each mechanism of the fit.
     p_left : float or None
-        Probability of rows as far from the fit's model as these are.
+        p-value of the rows under the model of the fit.
     alpha : float
     grown, doubts : sequence of str
-        Errors that are larger with what was added than without, in words: those that forbid any name, and others.
+        In words: errors that are larger with the causes than without and forbid any name, and further doubts.
     """
-    said = list(doubts)
+    remarks = list(doubts)
     if decision.verdict not in (NAMED, NAMED_AND_REST):
-        return decision, (*grown, *said)
+        return decision, (*grown, *remarks)
     if p_left is not None and p_left <= alpha:
-        said.append(f"Other causes would explain what is left (p = {p_left:.2g} that nothing is).")
-    failed = {one.name: one.why_not(alpha) for one in confirmations if one.why_not(alpha)}
-    said += [f"{name} is not named: {why}." for name, why in failed.items() if name in decision.causes]
+        remarks.append(f"Other causes would explain what is left (p = {p_left:.2g} that nothing is).")
+    failed = {checked.name: why for checked in confirmations if (why := checked.why_not(alpha))}
+    remarks += [f"{name} is not named: {why}." for name, why in failed.items() if name in decision.causes]
     kept = tuple(name for name in decision.causes if name not in failed)
     if grown or not kept:
-        return Decision(CANNOT_SAY, decision.causes), (*grown, *said)
-    return (Decision(NAMED_AND_REST, kept) if said else decision), tuple(said)
+        return Decision(CANNOT_SAY, decision.causes), (*grown, *remarks)
+    return (Decision(NAMED_AND_REST, kept) if remarks else decision), tuple(remarks)

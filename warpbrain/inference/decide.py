@@ -1,7 +1,7 @@
 """The verdict of least expected loss under the posterior over sets of causes.
 
-Every verdict that could be spoken is compared under every set that may be true; what a wrong one costs stands in one
-table, `calibration.json`. No other number decides.
+Every possible verdict is compared under every set that may be true; what a wrong one costs stands in one table,
+`calibration.json`. No other number decides.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.inference.causes import Kind
-from warpbrain.inference.subsets import Hypothesis
+from warpbrain.inference.hypothesis import Hypothesis
 
 Floats = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ NOTHING, NAMED, GROUP, NAMED_AND_REST, UNKNOWN, NOT_PHYSICS, CANNOT_SAY = VERDIC
 
 @dataclass(frozen=True)
 class Decision:
-    """A verdict, and the causes that it speaks of."""
+    """A verdict, and the causes that it is about."""
 
     verdict: str
     causes: tuple[str, ...] = ()
@@ -40,7 +40,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Truth:
-    """What a set of causes says: mechanisms by name, whether something has no name, and what is no physics."""
+    """A set of causes that may be true: its mechanisms, whether an unknown acts, and what is no physics."""
 
     mechanisms: frozenset[str]
     unknown: bool
@@ -49,12 +49,11 @@ class Truth:
     @classmethod
     def of(cls, hypothesis: Hypothesis) -> Truth:
         """Of a set of causes."""
-
-        def named(kind: Kind) -> frozenset[str]:
-            each = zip(hypothesis.causes, hypothesis.kinds, strict=True)
-            return frozenset(cause for cause, own in each if own is kind)
-
-        return cls(named(Kind.PHYSICS), bool(named(Kind.UNKNOWN)), named(Kind.NOT_PHYSICS))
+        return cls(
+            frozenset(hypothesis.of_kind(Kind.PHYSICS)),
+            bool(hypothesis.of_kind(Kind.UNKNOWN)),
+            frozenset(hypothesis.of_kind(Kind.NOT_PHYSICS)),
+        )
 
     @property
     def physical(self) -> bool:
@@ -74,7 +73,7 @@ def decide(
     losses : mapping of str to float
         See `Calibration`.
     """
-    truths = [Truth.of(one) for one in hypotheses]
+    truths = [Truth.of(hypothesis) for hypothesis in hypotheses]
     expected = {
         decision: sum(p * loss(decision, truth, losses) for p, truth in zip(probabilities, truths, strict=True))
         for decision in decisions(truths, probabilities)
@@ -84,20 +83,23 @@ def decide(
 
 def decisions(truths: Sequence[Truth], probabilities: Floats, most: int = 4) -> list[Decision]:
     """Verdicts worth comparing: about mechanisms that are in probable sets."""
-    mass: dict[str, float] = {}
-    for truth, p in zip(truths, probabilities.tolist(), strict=True):
-        for name in truth.mechanisms:
-            mass[name] = mass.get(name, 0.0) + p
-    names = sorted(mass, key=lambda name: -mass[name])[:most]
-    wrong: dict[str, float] = {}
-    for truth, p in zip(truths, probabilities.tolist(), strict=True):
-        for name in truth.not_physics:
-            wrong[name] = wrong.get(name, 0.0) + p
-    found = [Decision(NOTHING), Decision(CANNOT_SAY), Decision(UNKNOWN)]
-    found += [Decision(NOT_PHYSICS, (name,)) for name in sorted(wrong, key=lambda name: -wrong[name])[:2]]
+    names = _most_probable([truth.mechanisms for truth in truths], probabilities)[:most]
+    errors = _most_probable([truth.not_physics for truth in truths], probabilities)[:2]
+    verdicts = [Decision(NOTHING), Decision(CANNOT_SAY), Decision(UNKNOWN)]
+    verdicts += [Decision(NOT_PHYSICS, (name,)) for name in errors]
     for named in _subsets(names, range(1, 4)):
-        found += [Decision(NAMED, named), Decision(NAMED_AND_REST, named)]
-    return found + [Decision(GROUP, group) for group in _subsets([*names, UNKNOWN], range(2, 5)) if group[0] != UNKNOWN]
+        verdicts += [Decision(NAMED, named), Decision(NAMED_AND_REST, named)]
+    groups = _subsets([*names, UNKNOWN], range(2, 5))
+    return verdicts + [Decision(GROUP, group) for group in groups if group[0] != UNKNOWN]
+
+
+def _most_probable(sets: Sequence[frozenset[str]], probabilities: Floats) -> list[str]:
+    """Names in any of the sets, the most probable first."""
+    total: dict[str, float] = {}
+    for names, p in zip(sets, probabilities.tolist(), strict=True):
+        for name in names:
+            total[name] = total.get(name, 0.0) + p
+    return sorted(total, key=lambda name: -total[name])
 
 
 def _subsets(names: Sequence[str], sizes: Iterable[int]) -> list[tuple[str, ...]]:
@@ -140,10 +142,10 @@ def _group(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> flo
 
 def _named(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> float:
     false = len(set(decision.causes) - truth.mechanisms)
-    left = len(truth.mechanisms.difference(decision.causes))
+    left_out = len(truth.mechanisms.difference(decision.causes))
     cost = losses["false name"] * false
     if decision.verdict == NAMED_AND_REST:
-        # a rest that is said stands for what is left, without its name
-        cost += losses["name left out"] * left
-        return cost + losses["rest where nothing is"] * (left == 0 and not truth.unknown)
-    return cost + losses["name left out"] * left + losses["rest left out"] * truth.unknown
+        # the rest stands for causes that are left out
+        cost += losses["name left out"] * left_out
+        return cost + losses["rest where nothing is"] * (left_out == 0 and not truth.unknown)
+    return cost + losses["name left out"] * left_out + losses["rest left out"] * truth.unknown

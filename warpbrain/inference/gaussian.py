@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 class _Noise:
-    """Covariance of the noise and its inverse, which models of one noise share and few ask for."""
+    """Covariance of the noise and its inverse: shared by models with the same noise, made when they are first used."""
 
     def __init__(self, factor: Floats) -> None:
         self._factor = factor
@@ -60,7 +60,7 @@ class GaussianModel:
         return len(self.noise_factor)
 
     def with_scale(self, scale: float) -> GaussianModel:
-        """The same with another factor on the noise; nothing is factorised again."""
+        """The same model with another factor on the noise; nothing is factorised again."""
         other = GaussianModel(self.noise_factor, self.columns, scale)
         other.__dict__["_noise"] = self._noise
         other.__dict__["_whitened_columns"] = self._whitened_columns
@@ -68,13 +68,13 @@ class GaussianModel:
         return other
 
     def of_noise(self, columns: Floats) -> GaussianModel:
-        """Other columns (n, q) with the same noise, at a scale of one; nothing of the noise is made again."""
+        """Other columns (n, q) with the same noise, at a scale of one; the noise is not factorised again."""
         other = GaussianModel(self.noise_factor, columns)
         other.__dict__["_noise"] = self._noise
         return other
 
     def with_columns(self, columns: Floats) -> GaussianModel:
-        """The same with more columns (n, k) of normal coefficients."""
+        """The same model with more columns (n, k) of normal coefficients."""
         other = GaussianModel(self.noise_factor, np.column_stack([self.columns, columns]), self.scale)
         other.__dict__["_noise"] = self._noise
         other.__dict__["_whitened_columns"] = np.column_stack([self._whitened_columns, self._by_noise(columns)])
@@ -96,7 +96,7 @@ class GaussianModel:
         return _Noise(self.noise_factor)
 
     @cached_property
-    def _seen(self) -> tuple[Floats, Floats]:
+    def _low_rank(self) -> tuple[Floats, Floats]:
         """`B` (n, q) and weights (q,) with which `S^-1 = ((L L^T)^-1 - B diag(weights) B^T) / kappa^2`."""
         from scipy.linalg import solve_triangular
 
@@ -110,18 +110,18 @@ class GaussianModel:
 
     def precision_columns(self, rows: NDArray[np.int64]) -> Floats:
         """Columns (n, d) of `S^-1` by their numbers (d,)."""
-        B, weights = self._seen
+        B, weights = self._low_rank
         return np.asarray((self._noise.precision[:, rows] - B @ (weights * B[rows]).T) / self.scale**2)
 
     def precision_blocks(self, rows: NDArray[np.int64]) -> Floats:
         """Diagonal blocks (g, d, d) of `S^-1` of points with the rows (g, d)."""
-        B, weights = self._seen
+        B, weights = self._low_rank
         of_noise = self._noise.precision[rows[:, :, None], rows[:, None, :]]
         return np.asarray((of_noise - (B[rows] * weights) @ np.swapaxes(B[rows], 1, 2)) / self.scale**2)
 
     def precision_times(self, rows: Floats) -> Floats:
         """`S^-1` times rows (n,) or (n, b)."""
-        B, weights = self._seen
+        B, weights = self._low_rank
         return np.asarray((self._noise.precision @ rows - B @ (weights * (B.T @ rows).T).T) / self.scale**2)
 
     @cached_property
@@ -153,14 +153,14 @@ class GaussianModel:
         return next(self.standardised_at([self.scale], rows))
 
     def standardised_at(self, scales: Sequence[float], rows: Floats) -> Iterator[Floats]:
-        """`standardised` rows with each of some factors on the noise: what they have in common is made once."""
+        """`standardised` rows with each of some factors on the noise: what they have in common is computed once."""
         values, directions = self._spectrum
         white = self._by_noise(rows)
-        seen = directions.T @ white
+        projected = directions.T @ white
         for scale in scales:
             root = np.sqrt(scale**2 + values)
             weights = 1.0 / (root * (root + scale))
-            yield np.asarray((white - directions @ (weights * seen.T).T) / scale)
+            yield np.asarray((white - directions @ (weights * projected.T).T) / scale)
 
     @cached_property
     def log_determinant(self) -> float:
@@ -212,13 +212,13 @@ class GaussianModel:
 
     def log_marginal(self, rows: Floats, scales: Floats, log_prior: Floats) -> float:
         """Log density of rows (n,), summed over factors on the noise (k,) with the log of their prior probability."""
-        return float(np.logaddexp.reduce(self._of_scales(rows, scales) + log_prior))
+        return float(np.logaddexp.reduce(self._log_densities_at(rows, scales) + log_prior))
 
     def likely_scale(self, rows: Floats, scales: Floats, log_prior: Floats) -> float:
         """Mean of the factor on the noise after rows (n,); arguments as of `log_marginal`."""
         from scipy.special import softmax
 
-        return float(softmax(self._of_scales(rows, scales) + log_prior) @ scales)
+        return float(softmax(self._log_densities_at(rows, scales) + log_prior) @ scales)
 
-    def _of_scales(self, rows: Floats, scales: Floats) -> Floats:
+    def _log_densities_at(self, rows: Floats, scales: Floats) -> Floats:
         return np.array([float(self.with_scale(scale).log_density(rows)) for scale in scales.tolist()])

@@ -1,13 +1,13 @@
 """Points whose noise is far larger than declared, such as mispaired landmarks: each hypothesis pays for its own.
 
 The noise of point i is `w_i` times as large, 1 or one of few inflations: the covariance of its rows is larger by
-`Delta_i = (w_i^2 - 1) kappa^2 (L L^T)_ii`. Seen from all other rows, given the inflations of the other points, another
-one that changes it by `D_i` has
+`Delta_i = (w_i^2 - 1) kappa^2 (L L^T)_ii`. Given all other rows and the
+inflations of the other points, another inflation, which changes it by `D_i`, has
 
     ln p(r | w_i') / p(r | w_i) = v^T (I + D_i P_ii)^-1 D_i v / 2 - ln |I + D_i P_ii| / 2
 
-with `v = (S^-1 r)_i` and `P_ii = (S^-1)_ii`. What one hypothesis takes for gross errors is what another one explains,
-so nothing is set aside before a hypothesis is asked.
+with `v = (S^-1 r)_i` and `P_ii = (S^-1)_ii`. Points that are gross errors under one hypothesis may be explained
+by another, so no point is discarded before hypotheses are compared.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Outliers:
     inflation : float
         Factor on the standard deviation of its noise.
     further : tuple of float
-        Others, all alike probable: of one inflation alone a point that is much farther away still pulls.
+        Further factors, all equally probable: with a single one a point that is much farther off still has influence.
     """
 
     probability: float
@@ -61,7 +61,7 @@ class GrossErrors:
     Attributes
     ----------
     log_density : float
-        Log density of the rows, summed over the inflations: each by itself about the most probable of all of them.
+        Log density of the rows, summed over the inflation of each point with all others at their most probable ones.
     log_odds : (g,) array
         Of each point to be a gross error, given the others.
     inflation : (g,) array
@@ -92,35 +92,35 @@ def with_gross_errors(
     """
     search = _Search(model, residual, points, prior)
     log_prior = prior.log_probabilities
-    everyone = np.arange(len(points))
+    numbers = np.arange(len(points))
     for _ in range(sweeps * max(len(points), 1)):
         logs = search.log_ratios() + log_prior
-        logs -= logs[everyone, search.kinds][:, None]
+        logs -= logs[numbers, search.kinds][:, None]
         best = np.argmax(logs, axis=1)
         if not (best != search.kinds).any():
             break
-        worst = int(np.argmax(logs[everyone, best]))
+        worst = int(np.argmax(logs[numbers, best]))
         search.change(worst, int(best[worst]))
-    others = np.logaddexp.reduce(logs, axis=1)
-    log_density = search.log_density() + float(log_prior[search.kinds].sum() + others.sum())
+    sums = np.logaddexp.reduce(logs, axis=1)
+    log_density = search.log_density() + float(log_prior[search.kinds].sum() + sums.sum())
     odds = np.logaddexp.reduce(logs[:, 1:], axis=1) - logs[:, 0]
     return GrossErrors(log_density, odds, prior.inflations[search.kinds])
 
 
 def columns_of_inflation(model: GaussianModel, points: Sequence[Ints], inflation: Floats) -> Floats:
     """Columns (n, k) of normal coefficients by which the noise of points is as many times larger (g,) as it is."""
-    found = [np.zeros((len(model), 0))]
+    blocks = [np.zeros((len(model), 0))]
     for number in np.flatnonzero(inflation > 1.0).tolist():
         columns = np.zeros((len(model), len(points[number])))
         noise = model.noise_blocks(points[number][None])[0]
         columns[points[number]] = np.linalg.cholesky((inflation[number] ** 2 - 1.0) * noise)
-        found.append(columns)
-    return np.concatenate(found, axis=1)
+        blocks.append(columns)
+    return np.concatenate(blocks, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
-class _Alike:
-    """Points of equally many rows: their numbers (g,), rows (g, d), noise (g, d, d), and `P_ii` of all sound."""
+class _Group:
+    """Points with equally many rows: numbers (g,), rows (g, d), noise (g, d, d), and `P_ii` if all are sound."""
 
     numbers: Ints
     rows: Ints
@@ -137,28 +137,28 @@ class _Search:
     def __init__(self, model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> None:
         self.kinds = np.zeros(len(points), dtype=np.int64)
         self._model, self._points = model, points
-        # variance of each kind, in units of that of a sound point
+        # variance with each inflation, in units of that of a sound point
         self._variances = prior.inflations**2
         sizes = np.array([len(rows) for rows in points], dtype=np.int64)
-        self._alike = []
+        self._groups = []
         for size in np.unique(sizes).tolist():
             numbers = np.flatnonzero(sizes == size)
             rows = np.array([points[number] for number in numbers.tolist()])
-            self._alike.append(_Alike(numbers, rows, model.noise_blocks(rows), model.precision_blocks(rows)))
+            self._groups.append(_Group(numbers, rows, model.noise_blocks(rows), model.precision_blocks(rows)))
         self._weighted = model.precision_times(residual)
         self._log_sound = float(model.log_density(residual))
-        # of points that have been gross errors: columns of the inverse, the inverse of their noise and its volume
-        self._once: dict[int, tuple[Floats, Floats, float]] = {}
+        # of points that have been inflated: columns of `P_0`, the inverse of their noise and its log determinant
+        self._changed: dict[int, tuple[Floats, Floats, float]] = {}
         self._update()
 
     def change(self, number: int, kind: int) -> None:
         """Give a point another inflation."""
         self.kinds[number] = kind
-        if number not in self._once:
+        if number not in self._changed:
             rows = self._points[number]
             noise = self._model.noise_blocks(rows[None])[0]
             columns = self._model.precision_columns(rows)
-            self._once[number] = columns, np.asarray(np.linalg.inv(noise)), float(np.linalg.slogdet(noise)[1])
+            self._changed[number] = columns, np.asarray(np.linalg.inv(noise)), float(np.linalg.slogdet(noise)[1])
         self._update()
 
     def _update(self) -> None:
@@ -167,36 +167,36 @@ class _Search:
 
         numbers = np.flatnonzero(self.kinds).tolist()
         R = np.concatenate([np.zeros(0, dtype=np.int64), *(self._points[number] for number in numbers)])
-        columns = np.concatenate([np.zeros((len(self._model), 0)), *(self._once[k][0] for k in numbers)], axis=1)
-        inner, at, log_volume = columns[R], 0, 0.0
+        columns = np.concatenate([np.zeros((len(self._model), 0)), *(self._changed[k][0] for k in numbers)], axis=1)
+        inner, at, log_determinant = columns[R], 0, 0.0
         for number in numbers:
-            _, inverse, log_noise = self._once[number]
-            size, more = len(inverse), float(self._variances[self.kinds[number]]) - 1.0
-            inner[at : at + size, at : at + size] += inverse / more
-            log_volume += log_noise + size * np.log(more)
+            _, inverse, log_noise = self._changed[number]
+            size, increase = len(inverse), float(self._variances[self.kinds[number]]) - 1.0
+            inner[at : at + size, at : at + size] += inverse / increase
+            log_determinant += log_noise + size * np.log(increase)
             at += size
         factor = np.linalg.cholesky(inner)
-        both = np.column_stack([columns.T, self._weighted[R]])
-        solved = solve_triangular(factor, both, lower=True, check_finite=False) if numbers else both
-        self._seen, self._residual = solved[:, :-1].T, solved[:, -1]
-        self._log_volume = log_volume + 2.0 * float(np.log(np.diag(factor)).sum())
+        right_sides = np.column_stack([columns.T, self._weighted[R]])
+        solved = solve_triangular(factor, right_sides, lower=True, check_finite=False) if numbers else right_sides
+        self._projected, self._residual = solved[:, :-1].T, solved[:, -1]
+        self._log_determinant = log_determinant + 2.0 * float(np.log(np.diag(factor)).sum())
 
     def log_ratios(self) -> Floats:
-        """Log density (g, k) with every kind of each point, less that with the one it is of now."""
-        weighted = self._weighted - self._seen @ self._residual
+        """Log density (g, k) with every inflation of each point, less that with its current one."""
+        weighted = self._weighted - self._projected @ self._residual
         logs = np.empty((len(self.kinds), len(self._variances)))
-        for alike in self._alike:
-            seen = self._seen[alike.rows]
-            P = alike.precision - seen @ np.swapaxes(seen, 1, 2)
-            now = self._variances[self.kinds[alike.numbers]]
+        for group in self._groups:
+            projected = self._projected[group.rows]
+            P = group.precision - projected @ np.swapaxes(projected, 1, 2)
+            current = self._variances[self.kinds[group.numbers]]
             for kind, variance in enumerate(self._variances.tolist()):
-                change = (variance - now)[:, None, None] * alike.noise
-                logs[alike.numbers, kind] = _log_ratios(weighted[alike.rows], P, change)
+                change = (variance - current)[:, None, None] * group.noise
+                logs[group.numbers, kind] = _log_ratios(weighted[group.rows], P, change)
         return logs
 
     def log_density(self) -> float:
-        """Of the rows, with the gross errors that there are."""
-        return self._log_sound + 0.5 * float(self._residual @ self._residual) - 0.5 * self._log_volume
+        """Of the rows, with the current inflations."""
+        return self._log_sound + 0.5 * float(self._residual @ self._residual) - 0.5 * self._log_determinant
 
 
 def _log_ratios(v: Floats, P: Floats, change: Floats) -> Floats:

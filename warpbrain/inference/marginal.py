@@ -1,4 +1,4 @@
-"""Evidence of rows under one hypothesis: summed over the scale of the noise, and over which points are gross errors."""
+"""Marginal likelihood of rows under one hypothesis: summed over the scale of the noise and over gross errors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpbrain.inference.noise import outliers, scales
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Scales are summed over until their part is below this.
+#: The sum over scales ends where a term is below this part of the largest.
 _NEGLIGIBLE = 1e-3
 
 
@@ -32,36 +32,41 @@ class Marginal:
     gross : (g,) bool array
         Points that are most probably gross errors, at that scale.
     model : GaussianModel
-        At that scale, with columns of the larger noise of these points after those of the hypothesis.
-    louder : int
-        How many these are.
+        At that scale; the excess noise of these points is columns after those of the hypothesis.
+    excess_columns : int
+        How many columns the excess noise has.
     """
 
     log_evidence: float
     scale: float
     gross: NDArray[np.bool_]
     model: GaussianModel
-    louder: int
+    excess_columns: int
 
     @cached_property
     def noise(self) -> GaussianModel:
-        """Of the noise alone, that of gross errors larger."""
-        louder = self.model.columns[:, self._given :]
-        own = self.scale * self.model.noise_factor
-        factor: Floats = np.asarray(np.linalg.cholesky(own @ own.T + louder @ louder.T), dtype=np.float64)
+        """Of the noise alone, with the excess noise of gross errors."""
+        scaled = self.scale * self.model.noise_factor
+        covariance = scaled @ scaled.T + self.excess @ self.excess.T
+        factor: Floats = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
         return GaussianModel(factor, np.zeros((len(factor), 0)))
 
     def coordinates(self, residual: Floats) -> Floats:
         """Mean of the coefficients (q,) of the hypothesis after residuals (n,)."""
-        return self.model.coefficients(residual)[0][: self._given]
+        return self.model.coefficients(residual)[0][: self._own_columns]
 
     @property
-    def _given(self) -> int:
-        """Columns of the hypothesis."""
-        return self.model.columns.shape[1] - self.louder
+    def excess(self) -> Floats:
+        """Columns (n, e) of the excess noise of gross errors."""
+        return self.model.columns[:, self._own_columns :]
+
+    @property
+    def _own_columns(self) -> int:
+        """How many columns the hypothesis has."""
+        return self.model.columns.shape[1] - self.excess_columns
 
 
-def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], near: float = 1.0) -> Marginal:
+def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], scale: float = 1.0) -> Marginal:
     """Evidence of residuals (n,).
 
     Parameters
@@ -72,23 +77,23 @@ def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], nea
         Less what is expected of the causes.
     points : sequence of int arrays
         Rows of each point.
-    near : float
-        A factor on the noise that is not far from the most probable one.
+    scale : float
+        A factor on the noise near the most probable one, where the sum begins.
     """
     values, log_prior = scales()
     logs = np.full(len(values), -np.inf)
     inflations: dict[int, Floats] = {}
 
-    def ask(number: int) -> None:
+    def add_scale(number: int) -> None:
         at_scale = with_gross_errors(model.with_scale(float(values[number])), residual, points, outliers())
         logs[number], inflations[number] = at_scale.log_density + log_prior[number], at_scale.inflation
 
-    first = int(np.argmin(np.abs(np.log(values / near))))
-    ask(first)
+    first = int(np.argmin(np.abs(np.log(values / scale))))
+    add_scale(first)
     for step in (-1, 1):
         number = first + step
         while 0 <= number < len(values):
-            ask(number)
+            add_scale(number)
             if logs[number] < logs.max() + np.log(_NEGLIGIBLE):
                 break
             number += step

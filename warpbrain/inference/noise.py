@@ -38,9 +38,9 @@ def noise_covariance(positions: Floats, directions: Floats, times: Floats, sigma
 
     covariance = np.diag(np.asarray(sigma, dtype=np.float64) ** 2)
     rows = np.flatnonzero(directions.any(axis=1))
-    where, along = positions[rows], directions[rows]
-    shared = np.exp(-0.5 * (cdist(where, where) / belief("noise.reach")) ** 2) * (along @ along.T)
-    # what was recorded at another time has another noise
+    places, axes = positions[rows], directions[rows]
+    shared = np.exp(-0.5 * (cdist(places, places) / belief("noise.reach")) ** 2) * (axes @ axes.T)
+    # noise at different times is independent
     shared *= times[rows][:, None] == times[rows][None]
     covariance[np.ix_(rows, rows)] += belief("noise.shared") ** 2 * np.outer(sigma[rows], sigma[rows]) * shared
     return covariance
@@ -49,7 +49,7 @@ def noise_covariance(positions: Floats, directions: Floats, times: Floats, sigma
 def noise_factor(positions: Floats, directions: Floats, times: Floats, sigma: Floats) -> Floats:
     """Lower triangular factor (n, n) of `noise_covariance`, with its parameters."""
     covariance = noise_covariance(positions, directions, times, sigma)
-    # metres beside newtons: one size for all
+    # rows in metres and in newtons: scaled to a unit diagonal before they are factorised
     return np.asarray(sigma[:, None] * np.linalg.cholesky(covariance / np.outer(sigma, sigma)))
 
 
@@ -72,6 +72,6 @@ def scales() -> tuple[Floats, Floats]:
     from scipy.special import log_softmax
 
     values = beliefs("noise.scales")
-    # each stands for the part of the logarithm that is nearest to it
+    # each value stands for the interval of the logarithm that is nearest to it
     widths = np.gradient(np.log(values))
     return values, np.asarray(log_softmax(log_scale_density(values) + np.log(widths)))

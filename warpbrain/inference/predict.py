@@ -1,4 +1,4 @@
-"""Checks of a model by itself: what it predicts of rows it has not seen, and whether what is left looks like its noise.
+"""Predictive checks: held-out rows given all others, and whether the residuals look like draws of the model.
 
 With `P = S^-1` the rows of a block given all others have the mean `r_b - P_bb^-1 (P r)_b` and the covariance `P_bb^-1`:
 exactly what conditioning the model on the others gives.
@@ -38,14 +38,14 @@ class Prediction:
     def improvement(
         self, over: Prediction, rows: NDArray[np.bool_], random: np.random.Generator, draws: int = 2000
     ) -> tuple[float, float, float]:
-        """Part of another's root mean square error that is gone, and its 95 % interval by bootstrap over blocks."""
+        """Part of another's root mean square error that is removed, and its 95 % interval by bootstrap over blocks."""
         names = np.unique(self.blocks[rows])
-        own = np.array([np.sum(self.errors[rows & (self.blocks == b)] ** 2) for b in names])
-        other = np.array([np.sum(over.errors[rows & (self.blocks == b)] ** 2) for b in names])
+        squares = np.array([np.sum(self.errors[rows & (self.blocks == b)] ** 2) for b in names])
+        squares_over = np.array([np.sum(over.errors[rows & (self.blocks == b)] ** 2) for b in names])
         chosen = random.integers(len(names), size=(draws, len(names)))
-        parts = 1.0 - np.sqrt(own[chosen].sum(axis=1) / np.maximum(other[chosen].sum(axis=1), 1e-300))
+        parts = 1.0 - np.sqrt(squares[chosen].sum(axis=1) / np.maximum(squares_over[chosen].sum(axis=1), 1e-300))
         low, high = np.quantile(parts, [0.025, 0.975])
-        return float(1.0 - np.sqrt(own.sum() / max(other.sum(), 1e-300))), float(low), float(high)
+        return float(1.0 - np.sqrt(squares.sum() / max(squares_over.sum(), 1e-300))), float(low), float(high)
 
     @property
     def log_density(self) -> float:
@@ -53,7 +53,7 @@ class Prediction:
         return float(self.log_densities.sum())
 
     def gain(self, over: Prediction) -> float:
-        """By how much [nats] the blocks are more probable than under another."""
+        """Log density [nats] of the blocks less that of another prediction."""
         return float(np.sum(self.log_densities - over.log_densities))
 
 
@@ -70,9 +70,9 @@ def predict(model: GaussianModel, residual: Floats, blocks: Ints) -> Prediction:
 
 
 def predict_with(
-    model: GaussianModel, residual: Floats, blocks: Ints, each: Sequence[Floats]
+    model: GaussianModel, residual: Floats, blocks: Ints, column_sets: Sequence[Floats]
 ) -> tuple[Prediction, ...]:
-    """Predict every block of rows, with each of some sets of columns beside those of the model.
+    """Predict every block of rows with each of several sets of columns added to those of the model.
 
     With columns `G` the inverse covariance is `P - u (I + G^T u)^-1 u^T`, `u = P G` (Woodbury).
 
@@ -81,41 +81,41 @@ def predict_with(
     model : GaussianModel
     residual : (n,) array
     blocks : (n,) int array
-    each : sequence of (n, k) arrays
+    column_sets : sequence of (n, k) arrays
     """
     weighted = model.precision_times(residual)
     rows_of = [np.flatnonzero(blocks == block) for block in np.unique(blocks)]
     inverses = [model.precision_columns(rows)[rows] for rows in rows_of]
-    found = []
-    for columns in each:
+    predictions = []
+    for columns in column_sets:
         u = model.precision_times(columns)
         inner: Floats = np.asarray(np.linalg.inv(np.eye(columns.shape[1]) + columns.T @ u), dtype=np.float64)
-        left = weighted - u @ (inner @ (columns.T @ weighted))
+        projected = weighted - u @ (inner @ (columns.T @ weighted))
         errors, densities = np.zeros(len(residual)), []
         for rows, inverse in zip(rows_of, inverses, strict=True):
             L = np.linalg.cholesky(inverse - u[rows] @ inner @ u[rows].T)
-            white = np.linalg.solve(L, left[rows])
+            white = np.linalg.solve(L, projected[rows])
             errors[rows] = np.linalg.solve(L.T, white)
             volume = np.log(np.diag(L)).sum() - 0.5 * len(rows) * np.log(2.0 * np.pi)
             densities.append(volume - 0.5 * float(white @ white))
-        found.append(Prediction(errors, blocks, np.array(densities)))
-    return tuple(found)
+        predictions.append(Prediction(errors, blocks, np.array(densities)))
+    return tuple(predictions)
 
 
 def log_factors_of_fields(
     model: GaussianModel, fields: Sequence[Floats], sizes: Floats, residuals: Floats, weights: Floats | None = None
 ) -> Floats:
-    """Log Bayes factor (d,) of any of some fields, of any size, against none.
+    """Log Bayes factor (d,) of a mixture of fields and sizes over none.
 
     Parameters
     ----------
     model : GaussianModel
     fields : sequence of (n, k) arrays
     sizes : (s,) array
-        Factors on the columns of a field, all alike probable.
+        Factors on the columns of a field, all equally probable.
     residuals : (n, d) array
     weights : (f,) array, optional
-        Log probability of each field; all alike if not given.
+        Log probability of each field; equal unless given.
     """
     white = model.standardised(residuals)
     weights = np.full(len(fields), -np.log(len(fields))) if weights is None else weights
@@ -140,7 +140,7 @@ def predictive_p(
     random: np.random.Generator,
     weights: Floats | None = None,
 ) -> float:
-    """Probability that a field would seem as probable in rows drawn from the model; see above."""
+    """Probability that the Bayes factor of `log_factors_of_fields` is as large in rows drawn from the model."""
     drawn = np.column_stack([residual, model.draws(draws, random)])
     statistic = log_factors_of_fields(model, fields, sizes, drawn, weights)
     return float((1 + np.sum(statistic[1:] >= statistic[0])) / (1 + draws))

@@ -1,4 +1,4 @@
-"""How a probability is said to people: never more surely than right names were counted to be right."""
+"""Probabilities in words: never higher than the share of names that were right among scored cases."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from warpbrain.inference.calibration import calibration
 
 
 def percent(probability: float) -> str:
-    """A probability in percent; beyond what was counted (`Calibration.most_said`) only that it is beyond."""
+    """A probability in percent; beyond `Calibration.most_said` it is only said to be beyond."""
     most = calibration().most_said
     if probability > most:
         return f"above {100.0 * most:g} %"

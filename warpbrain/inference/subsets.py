@@ -1,10 +1,11 @@
-"""Probabilities of sets of causes: none, each, every pair, and triples that begin with good pairs, in closed form.
+"""Posterior over sets of causes in closed form: none, every cause, every pair, and triples that extend good pairs.
 
-The sums over places, sizes and the scale of the noise are carried out; a set is as probable as its sum says.
+The evidence of a set is the sum over the places and sizes of its causes and over the scale of the noise.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,81 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.inference.blocks import Blocks
-from warpbrain.inference.causes import Cause, Kind
+from warpbrain.inference.causes import Cause
 from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.hypothesis import Configuration, Hypothesis, Member, Posterior
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Member:
-    """A cause of a hypothesis by its number, the number of its place and that of its size."""
-
-    cause: int
-    place: int
-    size: int
-
-
-@dataclass(frozen=True)
-class Configuration:
-    """Causes with places and sizes at a scale of the noise, and the log of its joint density with the rows."""
-
-    members: tuple[Member, ...]
-    scale: float
-    log_density: float
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """A set of causes.
-
-    Attributes
-    ----------
-    causes : tuple of str
-    kinds : tuple of Kind
-        Of each of them.
-    log_evidence : float
-        Log density of the rows, summed over places, sizes and scales.
-    log_prior : float
-        Sum of the log odds of its causes.
-    best : Configuration
-        The most probable one.
-    """
-
-    causes: tuple[str, ...]
-    kinds: tuple[Kind, ...]
-    log_evidence: float
-    log_prior: float
-    best: Configuration
-
-
-@dataclass(frozen=True, eq=False)
-class Posterior:
-    """Probabilities of sets of causes, the most probable first."""
-
-    hypotheses: tuple[Hypothesis, ...]
-
-    @property
-    def probabilities(self) -> Floats:
-        """Of each hypothesis."""
-        from scipy.special import softmax
-
-        return np.asarray(softmax([one.log_evidence + one.log_prior for one in self.hypotheses]))
-
-    def probability(self, *causes: str) -> float:
-        """That exactly these causes act."""
-        each = zip(self.hypotheses, self.probabilities.tolist(), strict=True)
-        return sum(p for one, p in each if frozenset(one.causes) == frozenset(causes))
-
-    def marginal(self, cause: str) -> float:
-        """That a cause acts, whatever else does."""
-        each = zip(self.hypotheses, self.probabilities.tolist(), strict=True)
-        return sum(p for one, p in each if cause in one.causes)
-
-
 @dataclass(frozen=True, eq=False)
 class Search:
-    """How far sets are looked for.
+    """Which sets are summed over.
 
     Parameters
     ----------
@@ -99,7 +35,7 @@ class Search:
     most : int
         Causes of a set at most.
     negligible : float
-        A scale at which no single cause has this part of the greatest density is left out of pairs and triples.
+        Pairs and triples are left out at scales where every single cause is below this part of the greatest density.
     """
 
     scales: Floats
@@ -125,19 +61,18 @@ class _Sums:
     def add_blocks(
         self, blocks: Blocks, start: int, logs: Floats, members: tuple[Member, ...], scale: float
     ) -> list[Configuration]:
-        """Add densities (p, s) of blocks from `start` on beside members; returns the best with each cause."""
-        taken = {member.cause for member in members}
-        cause = blocks.cause[start:]
-        firsts = np.flatnonzero(np.diff(cause, prepend=-1))
+        """Add log densities (p, s) of blocks from `start` on together with members; returns the best of each cause."""
+        acting = {member.cause for member in members}
+        edges = blocks.cause_edges[blocks.cause_edges >= start].tolist()
         best = []
-        for low, high in zip(firsts.tolist(), [*firsts[1:].tolist(), len(cause)], strict=True):
-            if cause[low] in taken:
+        for low, high in itertools.pairwise(edges):
+            if blocks.cause[low] in acting:
                 continue
-            some = logs[low:high]
-            row, size = np.unravel_index(int(np.argmax(some)), some.shape)
-            last = Member(int(cause[low]), int(blocks.place[start + low + row]), int(size))
-            best.append(Configuration((*members, last), scale, float(some[row, size])))
-            self.add(frozenset(taken | {last.cause}), float(np.logaddexp.reduce(some, axis=None)), best[-1])
+            of_cause = logs[low - start : high - start]
+            row, size = np.unravel_index(int(np.argmax(of_cause)), of_cause.shape)
+            last = Member(int(blocks.cause[low]), int(blocks.place[low + row]), int(size))
+            best.append(Configuration((*members, last), scale, float(of_cause[row, size])))
+            self.add(frozenset(acting | {last.cause}), float(np.logaddexp.reduce(of_cause, axis=None)), best[-1])
         return best
 
 
@@ -166,11 +101,11 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
     greatest = max((float(logs.max()) for *_, logs in by_scale), default=0.0)
     for scale, none, blocks, logs in by_scale:
         if min(len(causes), search.most) > 1 and logs.max() >= greatest + np.log(search.negligible):
-            kept = blocks.some(_best_places(blocks, logs, search.places))
+            kept = blocks.subset(_best_places(blocks, logs, search.places))
             pairs = _add_pairs(sums, kept, none, scale)
-            pairs.sort(key=lambda one: -one.log_density)
+            pairs.sort(key=lambda pair: -pair.log_density)
             _add_triples(sums, kept, none, pairs[: search.beam] if min(len(causes), search.most) > 2 else [])
-    found = [
+    hypotheses = [
         Hypothesis(
             tuple(causes[c].name for c in sorted(members)),
             tuple(causes[c].kind for c in sorted(members)),
@@ -180,13 +115,15 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
         )
         for members, log in sums.logs.items()
     ]
-    return Posterior(tuple(sorted(found, key=lambda one: -(one.log_evidence + one.log_prior))))
+    return Posterior(
+        tuple(sorted(hypotheses, key=lambda hypothesis: -(hypothesis.log_evidence + hypothesis.log_prior)))
+    )
 
 
 def likely_places(
     model: GaussianModel, residual: Floats, causes: Sequence[Cause], most: int
 ) -> dict[str, NDArray[np.int64]]:
-    """Numbers of the most probable places of each cause by its name, alone and at the scale of a model.
+    """Numbers of the most probable places of each cause by its name, if it acts alone, at the scale of a model.
 
     Parameters
     ----------
@@ -216,37 +153,32 @@ def _add_pairs(sums: _Sums, blocks: Blocks, none: float, scale: float) -> list[C
     """Add every pair of causes; returns the best configurations with each first member."""
     best = []
     for first in range(len(blocks)):
-        # pairs are counted once: with causes that come later
-        start = int(np.searchsorted(np.cumsum(np.diff(blocks.cause, prepend=-1) != 0), _rank(blocks, first) + 1))
+        # each pair once: with causes that come later
+        start = int(blocks.cause_edges[np.searchsorted(blocks.cause_edges, first, side="right")])
         if start == len(blocks):
             break
         for size in range(blocks.log_weights.shape[1]):
             member = Member(int(blocks.cause[first]), int(blocks.place[first]), size)
-            together = blocks.log_factors(blocks.given([(first, size)]), start)
+            together = blocks.log_factors(blocks.acting([(first, size)]), start)
             logs = together + blocks.log_weights[start:] + blocks.log_weights[first, size] + none
             best += sums.add_blocks(blocks, start, logs, (member,), scale)
     return best
 
 
-def _rank(blocks: Blocks, number: int) -> int:
-    """Which of the causes, in the order of the blocks, a block belongs to, from 1."""
-    return int(np.cumsum(np.diff(blocks.cause, prepend=-1) != 0)[number])
-
-
 def _add_triples(sums: _Sums, blocks: Blocks, none: float, pairs: Sequence[Configuration]) -> None:
-    """Add a third cause to good pairs; of a triple that several pairs lead to the greatest sum counts."""
+    """Add a third cause to good pairs; of a triple that extends several pairs the greatest sum counts."""
     number = {(c, p): k for k, (c, p) in enumerate(zip(blocks.cause.tolist(), blocks.place.tolist(), strict=True))}
     by_pair: dict[tuple[int, int], _Sums] = {}
     for pair in pairs:
         rows = [(number[member.cause, member.place], member.size) for member in pair.members]
-        logs = blocks.log_factors(blocks.given(rows)) + blocks.log_weights + none
+        logs = blocks.log_factors(blocks.acting(rows)) + blocks.log_weights + none
         logs = logs + sum(blocks.log_weights[row] for row in rows)
-        beside = by_pair.setdefault((pair.members[0].cause, pair.members[1].cause), _Sums())
-        beside.add_blocks(blocks, 0, logs, pair.members, pair.scale)
+        extended = by_pair.setdefault((pair.members[0].cause, pair.members[1].cause), _Sums())
+        extended.add_blocks(blocks, 0, logs, pair.members, pair.scale)
     merged: dict[frozenset[int], tuple[float, Configuration]] = {}
-    for beside in by_pair.values():
-        for causes, log in beside.logs.items():
+    for extended in by_pair.values():
+        for causes, log in extended.logs.items():
             if causes not in merged or log > merged[causes][0]:
-                merged[causes] = log, beside.best[causes]
+                merged[causes] = log, extended.best[causes]
     for causes, (log, best) in merged.items():
         sums.add(causes, log, best)

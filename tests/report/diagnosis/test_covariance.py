@@ -12,7 +12,7 @@ def test_an_effect_stands_out_as_much_as_the_tool_finds(diagnosed, small_diagnos
     covariance = np.load(diagnosed / "covariance.npz")["covariance"]
     assert len(read_saved(diagnosed).rows["observed"]) == len(covariance)
     np.testing.assert_array_equal(covariance, covariance.T)
-    model = base.model.with_scale(small_diagnosis.weighed[REFITTED].marginal.scale)
+    model = base.model.with_scale(small_diagnosis.weighted_sets[REFITTED].marginal.scale)
     for change in np.random.default_rng(1).normal(size=(5, len(covariance))):
         mine = np.sqrt(change @ np.linalg.solve(covariance.astype(float), change))
         own = np.linalg.norm(model.standardised(1e-3 * change))

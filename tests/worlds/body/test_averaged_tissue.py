@@ -56,7 +56,7 @@ def test_tissue_of_each_set_against_conditioning_its_rows(search, verify):
     """Of theta and rows jointly normal: `Cov(theta, r) Cov(r)^-1 r`, written out densely."""
     found = averaged_tissue(search)
     base, worst = search.base, 0.0
-    for number, one in enumerate(search.weighed[:4]):
+    for number, one in enumerate(search.weighted_sets[:4]):
         U = one.columns
         S = one.marginal.noise.noise_factor @ one.marginal.noise.noise_factor.T + U @ U.T
         of_theta = base.prior.factor @ U[:, base.nuisances.part("tissue")].T

@@ -25,12 +25,12 @@ def search(tmp_path_factory: pytest.TempPathFactory) -> HypothesisSearch:
 
 
 def test_the_weight_is_named(search):
-    decision, _ = decide([one.hypothesis for one in search.weighed], search.probabilities, calibration().losses)
+    decision, _ = decide([one.hypothesis for one in search.weighted_sets], search.probabilities, calibration().losses)
     assert decision.verdict == NAMED and decision.causes == ("gravity",)
 
 
 def test_probabilities_are_in_order_and_one_in_all(search):
-    assert search.weighed[0].names == {"gravity"}
+    assert search.weighted_sets[0].names == {"gravity"}
     np.testing.assert_allclose(search.probabilities.sum(), 1.0)
 
 
@@ -54,22 +54,22 @@ def test_nothing_is_far_less_probable(search):
 
 
 def test_sets_say_what_they_are(search):
-    for one in search.weighed:
+    for one in search.weighted_sets:
         assert len(one.mechanisms) == len(one.effects) == len(one.coefficients)
         assert one.columns.shape[0] == len(one.residual) == len(search.base.residual)
-        widths = sum(effect.columns.shape[1] for effect in one.effects) + one.extra.shape[1]
+        widths = sum(effect.columns.shape[1] for effect in one.effects) + one.linear_columns.shape[1]
         assert one.columns.shape[1] == search.base.nuisances.columns.shape[1] + widths
 
 
 def test_no_set_that_is_not_fitted_would_change_the_verdict(search):
-    verdict, _ = decide([one.hypothesis for one in search.weighed], search.probabilities, calibration().losses)
-    for one in search.weighed:
-        if one.refit is not None or one.why:
+    verdict, _ = decide([one.hypothesis for one in search.weighted_sets], search.probabilities, calibration().losses)
+    for one in search.weighted_sets:
+        if one.refit is not None or one.failure:
             continue
         for change in (-belief("fits.change"), belief("fits.change")):
             others = [
                 other.with_evidence(other.hypothesis.log_evidence + change * (other is one)).hypothesis
-                for other in search.weighed
+                for other in search.weighted_sets
             ]
             best, losses = decide(others, calibration().probabilities(others), calibration().losses)
             assert losses[verdict] - losses[best] <= belief("fits.regret")

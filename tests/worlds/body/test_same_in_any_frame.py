@@ -77,10 +77,12 @@ def as_it_is(case: Case) -> HypothesisSearch:
 @pytest.mark.parametrize("change", list(_ANEW))
 def test_sets_are_as_probable(change: str, case: Case, as_it_is: HypothesisSearch) -> None:
     found = search(_ANEW[change](case))
-    chances = dict(zip((one.names for one in found.weighed), found.probabilities.tolist(), strict=True))
-    for one, chance in zip(as_it_is.weighed, as_it_is.probabilities.tolist(), strict=True):
+    chances = dict(zip((one.names for one in found.weighted_sets), found.probabilities.tolist(), strict=True))
+    for one, chance in zip(as_it_is.weighted_sets, as_it_is.probabilities.tolist(), strict=True):
         if chance > 1e-6:
             assert chances[one.names] == pytest.approx(chance, abs=1e-6)
     losses = calibration().losses
-    said = [decide([one.hypothesis for one in own.weighed], own.probabilities, losses)[0] for own in (as_it_is, found)]
+    said = [
+        decide([one.hypothesis for one in own.weighted_sets], own.probabilities, losses)[0] for own in (as_it_is, found)
+    ]
     assert said[0] == said[1]

@@ -9,7 +9,6 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.atomic import whole_file
-from warpbrain.diagnosis.diagnose import left_of
 from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Diagnosis
 from warpbrain.report.files import MILLIMETRES
 
@@ -31,8 +30,8 @@ def write_points(path: Path, found: Diagnosis) -> None:
     sensors = found.base.declared.sensors
     observed = sensors.computed + sensors.residual
     nothing = np.full(len(sensors), np.nan)
-    refitted = left_of(found.weighed[REFITTED])
-    explained = left_of(found.weighed[EXPLAINED]) if EXPLAINED in found.weighed else nothing
+    refitted = found.weighted_sets[REFITTED].best_residual
+    explained = found.weighted_sets[EXPLAINED].best_residual if EXPLAINED in found.weighted_sets else nothing
     gross = found.gross
     factors = np.where(sensors.is_displacement, MILLIMETRES, 1.0)
     numbers = [

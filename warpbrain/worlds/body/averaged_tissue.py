@@ -61,9 +61,9 @@ class AveragedTissue:
     @property
     def covariance(self) -> Floats:
         """Of `theta`, shape (p, p)."""
-        away = self.means - self.mean
-        each = self.covariances + away[:, :, None] * away[:, None, :]
-        return np.asarray(np.tensordot(self.probabilities, each, 1))
+        deviations = self.means - self.mean
+        covariances = self.covariances + deviations[:, :, None] * deviations[:, None, :]
+        return np.asarray(np.tensordot(self.probabilities, covariances, 1))
 
     def interval(self, probability: float) -> Floats:
         """Ends (p, 2) between which a parameter is with a probability, as much below as above."""
@@ -71,8 +71,8 @@ class AveragedTissue:
         from scipy.special import ndtr, ndtri
 
         tails = 0.5 * (1.0 - probability), 0.5 * (1.0 + probability)
-        found = np.empty((len(self.mean), 2))
-        for k, ends in enumerate(found):
+        intervals = np.empty((len(self.mean), 2))
+        for k, ends in enumerate(intervals):
             means, deviations = self.means[:, k], np.sqrt(self.covariances[:, k, k])
             for side, tail in enumerate(tails):
                 # a quantile of a mixture is between those of its parts
@@ -81,25 +81,25 @@ class AveragedTissue:
                 ends[side] = brentq(
                     lambda x, m=means, s=deviations, q=tail: self.probabilities @ ndtr((x - m) / s) - q, low, high
                 )
-        return found
+        return intervals
 
 
 def averaged_tissue(search: HypothesisSearch) -> AveragedTissue:
     """Tissue averaged over the sets of a search that were weighed."""
-    base, weighed, probabilities = search.base, search.weighed, search.probabilities
-    part, prior = base.nuisances.part("tissue"), base.prior
+    base, weighted_sets, probabilities = search.base, search.weighted_sets, search.probabilities
+    tissue, prior = base.nuisances.part("tissue"), base.prior
     means, covariances = [], []
     causes: dict[tuple[str, Kind], float] = {}
-    for one, probability in zip(weighed, probabilities.tolist(), strict=True):
-        xi, covariance = one.marginal.model.coefficients(one.residual)
-        means.append(prior.mean + prior.factor @ xi[part])
-        covariances.append(prior.factor @ covariance[part, part] @ prior.factor.T)
-        for cause in zip(one.hypothesis.causes, one.hypothesis.kinds, strict=True):
+    for weighted_set, probability in zip(weighted_sets, probabilities.tolist(), strict=True):
+        xi, covariance = weighted_set.marginal.model.coefficients(weighted_set.residual)
+        means.append(prior.mean + prior.factor @ xi[tissue])
+        covariances.append(prior.factor @ covariance[tissue, tissue] @ prior.factor.T)
+        for cause in zip(weighted_set.hypothesis.causes, weighted_set.hypothesis.kinds, strict=True):
             causes[cause] = causes.get(cause, 0.0) + probability
     likely = sorted(causes.items(), key=lambda item: -item[1])
     return AveragedTissue(
         base.states.parameters,
-        sum(p for one, p in zip(weighed, probabilities.tolist(), strict=True) if not one.names),
+        sum(p for s, p in zip(weighted_sets, probabilities.tolist(), strict=True) if not s.names),
         tuple(LikelyCause(name, kind, probability) for (name, kind), probability in likely),
         probabilities,
         np.array(means),

@@ -1,8 +1,8 @@
-"""The state that everything is compared at: the case as declared, its tissue refitted beside any smooth force.
+"""The base state, about which all is linear: the case as declared, its tissue refitted together with a smooth force.
 
-Nuisances fitted as if nothing were missing imitate what is missing; fitted beside a force that may be anything they do
-not. Where the load is large one round from the declared state is not enough: columns there are off by a third. In the
-rounds after it they serve as well, since residuals are those of the state that was reached.
+Nuisances that are fitted as if nothing were missing imitate what is missing; fitted together with an arbitrary smooth
+force they do not. Under a large load one Gauss-Newton step from the declared state is not enough. Further steps keep
+its columns, with the residuals of the state that was reached.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volum
 from warpbrain.worlds.body.sensing import noise_of
 from warpbrain.worlds.body.sensors import Sensors, rows_of_points, tracked_points
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
-from warpbrain.worlds.body.switching import Solving
+from warpbrain.worlds.body.switching import SolvedSwitches
 from warpbrain.worlds.body.tissue_prior import declared, tissue_prior
 from warpbrain.worlds.body.unknown import body_forces, fields
 from warpbrain.worlds.listener import Listener
@@ -37,8 +37,8 @@ from warpbrain.worlds.listener import Listener
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Rounds at most, and by how much less tissue and field move in the last one [standard deviations].
-_ROUNDS, _NEAR = 3, 0.5
+#: Gauss-Newton steps at most; the last one moves tissue and field by less than this [standard deviations].
+_STEPS, _CONVERGED = 3, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +56,19 @@ class Base:
         The base.
     at : Linearisation
     effects : Effects
-    known : dict of str to SolvedState
-        What was solved beside the base for them.
+    switch_states : dict of str to SolvedState
+        States with a switch that were solved for them, by the mechanism.
     nuisances : Nuisances
     unknown : dict of str to (n, k) array
-        Columns of fields without a name, of 1 m.
+        Columns of unknown fields, of 1 m.
     model : GaussianModel
-        Of the rows where nothing is missing: noise of every point as if it were sound, and nuisances.
+        Of the rows if no cause acts: nuisances, and noise without gross errors.
     noise : (n,) array
         Standard deviation of the independent noise of each row.
     points : tuple of int arrays
         Rows of each recorded point.
     residual : (n,) array
-        Of the linear model with all nuisances in the middle of their prior.
+        Of the linear model with all nuisances at their prior mean.
     mesh_errors : MeshErrors or None
         Of the base; None: the mesh is taken for exact.
     remarks : tuple of str
@@ -80,7 +80,7 @@ class Base:
     state: SolvedState
     at: Linearisation
     effects: Effects
-    known: dict[str, SolvedState]
+    switch_states: dict[str, SolvedState]
     nuisances: Nuisances
     unknown: dict[str, Floats]
     model: GaussianModel
@@ -96,18 +96,18 @@ class Base:
         lengths = self.at.sensors.is_displacement
         return float(np.median(self.noise[lengths] if lengths.any() else self.noise))
 
-    def seen_by(self, sensors: Sensors) -> tuple[Nuisances, Effects]:
-        """What nuisances do to other sensors, in the coordinates that they have here, and what makes effects there."""
+    def for_sensors(self, sensors: Sensors) -> tuple[Nuisances, Effects]:
+        """Nuisances as columns over other sensors, in the same coordinates, and what makes effects over them."""
         at = self.at.with_sensors(sensors)
-        effects = Effects(at, Solving(self.states, self.state, at.sensors, self.known), self.mesh_errors)
-        theta, own = self.state.hypothesis.theta, self.nuisances
+        effects = Effects(at, SolvedSwitches(self.states, self.state, at.sensors, self.switch_states), self.mesh_errors)
+        theta, nuisances = self.state.hypothesis.theta, self.nuisances
         return nuisances_at(
-            at, self.states, theta, self.prior, effects, self.mesh_errors, own.anchors, own.fraction
+            at, self.states, theta, self.prior, effects, self.mesh_errors, nuisances.anchors, nuisances.fraction
         ), effects
 
-    def elsewhere(self, points: Floats) -> tuple[Nuisances, Effects]:
+    def at_points(self, points: Floats) -> tuple[Nuisances, Effects]:
         """The same of the displacement of other points (k, 3) [m]."""
-        return self.seen_by(tracked_points(self.at.system.model.mesh, points, self.states.centre))
+        return self.for_sensors(tracked_points(self.at.system.model.mesh, points, self.states.centre))
 
 
 class BaseFinder:
@@ -135,9 +135,9 @@ class BaseFinder:
         prior: Gaussian | None = None,
     ) -> None:
         self.states = states
-        # a second of drawing from the generative model, while the first state is solved
+        # drawn from the generative model in a thread, while the first state is solved
         self._prior = beside(lambda: prior or tissue_prior(states.case, states.parameters))
-        self._spacing, self._mesh_error, self._bare = spacing, mesh_error, without_nuisances
+        self._spacing, self._mesh_error, self._without_nuisances = spacing, mesh_error, without_nuisances
         self._listener = listener
         self._remarks = on_linear_elements(states.case.poisson, "a diagnosis")
 
@@ -155,42 +155,44 @@ class BaseFinder:
             If the case as declared has no equilibrium.
         """
         self._listener.stage("the case as declared")
-        first = self.states.solve(self._declared())
+        declared = self.states.solve(self._declared())
         self._listener.stage("tissue beside any smooth force")
-        state, rough = first, _Linear(self, first, None)
-        for _ in range(_ROUNDS):
-            hypothesis = self._freed(rough)
-            before, after = (rough.nuisances.coordinates(self.prior, one) for one in (state.hypothesis, hypothesis))
+        state, linear = declared, _LinearModel(self, declared, None)
+        for _ in range(_STEPS):
+            hypothesis = self._next_hypothesis(linear)
+            before, after = (
+                linear.nuisances.coordinates(self.prior, point) for point in (state.hypothesis, hypothesis)
+            )
             try:
                 state = self.states.solve(hypothesis, state.u)
             except (SolveError, InputError):
-                # with recordings where they are taken to be now
+                # realigned recordings have other residuals
                 state = self.states.solve(state.hypothesis, state.u)
                 break
-            if np.abs(after - before).max() < _NEAR:
+            if np.abs(after - before).max() < _CONVERGED:
                 break
-            rough = rough.moved(state)
+            linear = linear.with_residual_of(state)
         self._listener.stage("the error of the mesh, and the compliance of the body at the sensors")
         errors = self._errors_of_mesh(state)
         if errors is not None:
-            state = self.states.corrected(state, expected(errors.own))
-        return self._base(first, state, errors)
+            state = self.states.corrected(state, expected(errors.error))
+        return self._base(declared, state, errors)
 
-    def _base(self, first: SolvedState, state: SolvedState, errors: MeshErrors | None) -> Base:
-        linear = _Linear(self, state, errors)
+    def _base(self, declared: SolvedState, state: SolvedState, errors: MeshErrors | None) -> Base:
+        linear = _LinearModel(self, state, errors)
         unknown = fields(linear.at, linear.lengths, linear.body_forces)
         nuisances, factor = linear.nuisances, linear.noise_factor
-        if errors is not None and not self._bare:
+        if errors is not None and not self._without_nuisances:
             smooth = unknown[next(iter(unknown))]
             nuisances = _with_likely_fraction(nuisances, factor, linear.residual, linear.typical_noise * smooth)
         return Base(
             self.states,
             self.prior,
-            first,
+            declared,
             state,
             linear.at,
             linear.effects,
-            linear.known,
+            linear.switch_states,
             nuisances,
             unknown,
             GaussianModel(factor, nuisances.columns),
@@ -201,20 +203,20 @@ class BaseFinder:
             tuple(self._remarks),
         )
 
-    def _freed(self, rough: _Linear) -> Hypothesis:
-        """Tissue and field beside any smooth force; recordings are realigned."""
-        nuisances = rough.nuisances
-        # before points of a surface are compared with the right faces a registration may be wrong by more than it is
-        part, wider = nuisances.part("registration"), belief("registration.rough")
-        loose = np.column_stack([nuisances.columns, rough.anything, wider * nuisances.columns[:, part]])
-        model = GaussianModel(rough.noise_factor, loose)
+    def _next_hypothesis(self, linear: _LinearModel) -> Hypothesis:
+        """Tissue and field fitted together with a smooth force; recordings are realigned."""
+        nuisances = linear.nuisances
+        # until points of a surface are compared with the right faces the registration may seem wrong by more than it is
+        registration, factor = nuisances.part("registration"), belief("registration.rough")
+        columns = np.column_stack([nuisances.columns, linear.smooth_force, factor * nuisances.columns[:, registration]])
+        model = GaussianModel(linear.noise_factor, columns)
         values, log_prior = scales()
-        model = model.with_scale(model.likely_scale(rough.residual, values, log_prior))
-        inflation = with_gross_errors(model, rough.residual, rough.points, outliers()).inflation
-        model = model.with_columns(columns_of_inflation(model, rough.points, inflation))
-        xi, _ = model.coefficients(rough.residual)
-        turned = loose.shape[1]
-        self.states.realign((xi[part] + wider * xi[turned - 6 : turned]) * registration_sd())
+        model = model.with_scale(model.likely_scale(linear.residual, values, log_prior))
+        inflation = with_gross_errors(model, linear.residual, linear.points, outliers()).inflation
+        model = model.with_columns(columns_of_inflation(model, linear.points, inflation))
+        xi, _ = model.coefficients(linear.residual)
+        count = columns.shape[1]
+        self.states.realign((xi[registration] + factor * xi[count - 6 : count]) * registration_sd())
         farthest = belief("tissue.farthest_base")
         tissue = np.clip(xi[nuisances.part("tissue")], -farthest, farthest)
         field = np.clip(xi[nuisances.part("stiffness field")], -farthest, farthest)
@@ -238,50 +240,50 @@ class BaseFinder:
             return None
 
 
-class _Linear:
-    """What is linear about a state: nuisances, residual, noise."""
+class _LinearModel:
+    """The linear model about a state: nuisances, residual, noise."""
 
     def __init__(self, finder: BaseFinder, state: SolvedState, errors: MeshErrors | None) -> None:
         sensors, states = state.sensors, finder.states
         self.at = Linearisation(state.system, state.u, state.reactions, sensors)
-        self.known: dict[str, SolvedState] = {}
-        self.effects = Effects(self.at, Solving(states, state, sensors, self.known), errors)
-        # which makes the compliance: with it nuisances are products, where each would have an equilibrium of its own
+        self.switch_states: dict[str, SolvedState] = {}
+        self.effects = Effects(self.at, SolvedSwitches(states, state, sensors, self.switch_states), errors)
+        # first, since it makes the compliance, with which nuisances are products instead of equilibria
         self.lengths = (finder._spacing * beliefs("unknown.lengths")).tolist()
         self.body_forces = body_forces(self.at, self.lengths)
         smooth = np.column_stack(self.body_forces)
         nuisances = nuisances_at(self.at, states, state.hypothesis.theta, finder.prior, self.effects, errors)
-        self.nuisances = nuisances.weakened() if finder._bare else nuisances
-        # what the state has of tissue and field is given back, so that their middle is that of their prior
+        self.nuisances = nuisances.weakened() if finder._without_nuisances else nuisances
+        # with tissue and field at their prior mean, not as the state has them
         self._finder = finder
-        self.residual = self._without(state)
+        self.residual = self._residual_at_mean(state)
         rows = sensors.is_displacement
         size = float(np.sqrt(np.mean(self.residual[rows] ** 2))) if rows.any() else 1.0
         #: Columns of smooth forces as large as the residuals.
-        self.anything = size * smooth
+        self.smooth_force = size * smooth
         self.noise = noise_of(sensors, self.residual, self.nuisances.columns, smooth)
         self.noise_factor = noise_factor(sensors.positions, sensors.directions, sensors.times, self.noise)
         self.typical_noise = float(np.median(self.noise[rows] if rows.any() else self.noise))
         self.points = tuple(rows for alike in rows_of_points(sensors) for rows in alike)
 
-    def _without(self, state: SolvedState) -> Floats:
-        """What is recorded less what a state has, its tissue, field and motion given back."""
+    def _residual_at_mean(self, state: SolvedState) -> Floats:
+        """Residual of the linear model about a state with its tissue, field and motion at their prior mean."""
         z = self.nuisances.coordinates(self._finder.prior, state.hypothesis)
         z[self.nuisances.part("registration")] = self._finder.states.motion / registration_sd()
         return np.asarray(state.sensors.residual + self.nuisances.columns @ z)
 
-    def moved(self, state: SolvedState) -> _Linear:
-        """The same columns with the residuals of a state nearby: a compliance takes as long as many states."""
+    def with_residual_of(self, state: SolvedState) -> _LinearModel:
+        """The same columns with the residual of a state nearby: a compliance costs as much as many states."""
         other = copy.copy(self)
-        other.residual = self._without(state)
+        other.residual = self._residual_at_mean(state)
         return other
 
 
 def _with_likely_fraction(nuisances: Nuisances, factor: Floats, residual: Floats, smooth: Floats) -> Nuisances:
-    """Nuisances with the root mean square of what the unknown part of the mesh's error is after the residuals.
+    """Nuisances with the posterior root mean square of the unknown part of the mesh's error.
 
-    It depends on mesh, load and where is recorded; taken for larger than it is, it hides what is missing. It is weighed
-    with and without any smooth force beside it: what is missing must not be taken for an error of the mesh.
+    It depends on the mesh, the load and the sensors; if it is overestimated it hides what is missing. Its evidence is
+    that of models with and without a smooth force, so that a missing cause is not taken for an error of the mesh.
 
     Parameters
     ----------
@@ -299,7 +301,7 @@ def _with_likely_fraction(nuisances: Nuisances, factor: Floats, residual: Floats
     scores = []
     for fraction in fractions.tolist():
         model = GaussianModel(factor, nuisances.with_fraction(fraction).columns)
-        each = [model, *(model.with_columns(size * smooth) for size in beliefs("unknown.sizes")[1:-1].tolist())]
-        logs = [one.log_marginal(residual, values, log_prior) for one in each]
+        models = [model, *(model.with_columns(size * smooth) for size in beliefs("unknown.sizes")[1:-1].tolist())]
+        logs = [alternative.log_marginal(residual, values, log_prior) for alternative in models]
         scores.append(logsumexp([logs[0], logsumexp(logs[1:]) - np.log(len(logs) - 1)]))
     return nuisances.with_fraction(float(np.sqrt(softmax(scores) @ fractions**2)))

@@ -1,4 +1,4 @@
-"""Everything that may act on a body as causes, alike: mechanisms at their places, fields without a name, no physics."""
+"""Causes of a body: mechanisms at their places, unknown fields, and what is no physics."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpbrain.inference import Cause, Kind, Place
 from warpbrain.inference.beliefs import belief, beliefs
-from warpbrain.inference.subsets import Member
+from warpbrain.inference.hypothesis import Member
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import Candidates
 from warpbrain.worlds.body.effects import Effect
@@ -24,7 +24,7 @@ UNKNOWN = "unknown"
 
 @dataclass(frozen=True, eq=False)
 class BodyCauses:
-    """Causes, and the effects that places of mechanisms stand for.
+    """Causes, and the effects of mechanisms at their places.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class BodyCauses:
         return next(cause for cause in self.causes if cause.name == name)
 
     def effect(self, member: Member) -> Effect | None:
-        """The effect of a mechanism at a place with a size; None of what is none."""
+        """The effect of a mechanism at a place with a size; None if the cause is no mechanism."""
         cause = self.causes[member.cause]
         if cause.kind is not Kind.PHYSICS:
             return None
@@ -53,13 +53,13 @@ class BodyCauses:
         return cause.sizes[member.size] * cause.places[member.place].columns
 
     def mean(self, member: Member) -> Floats | float:
-        """What is expected of it (n,)."""
+        """Expected change of each row (n,)."""
         mean = self.causes[member.cause].places[member.place].mean
         return 0.0 if mean is None else mean
 
 
 def scaled(effect: Effect, size: float) -> Effect:
-    """An effect whose coefficients are so many times as wide beforehand."""
+    """An effect whose coefficients have a prior that is so many times as wide."""
     if size == 1.0:
         return effect
     return replace(
@@ -69,28 +69,30 @@ def scaled(effect: Effect, size: float) -> Effect:
 
 def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
     """The causes at a base."""
-    sizes, wrong = beliefs("causes.sizes"), beliefs("causes.not_physics_sizes")
-    as_it_is = np.ones(len(sizes))
+    sizes, not_physics_sizes = beliefs("causes.sizes"), beliefs("causes.not_physics_sizes")
+    unit_sizes = np.ones(len(sizes))
     causes: list[Cause] = []
     effects: dict[str, tuple[Effect, ...]] = {}
     for kind, numbers in candidates.of_kind.items():
-        own = tuple(candidates.effects[number] for number in numbers.tolist())
-        places = tuple(Place(one.columns, one.mean if one.mean.any() else None) for one in own)
+        of_kind = tuple(candidates.effects[number] for number in numbers.tolist())
+        places = tuple(Place(effect.columns, effect.mean if effect.mean.any() else None) for effect in of_kind)
         if kind in candidates.alternatives:
-            causes.append(Cause(kind, places, math.log(belief("causes.not_physics")), wrong, Kind.NOT_PHYSICS))
+            causes.append(
+                Cause(kind, places, math.log(belief("causes.not_physics")), not_physics_sizes, Kind.NOT_PHYSICS)
+            )
             continue
-        # what is expected to be of a size, such as a weight, has that one
-        known = any(place.mean is not None for place in places)
-        causes.append(Cause(kind, places, math.log(belief("causes.mechanism")), as_it_is if known else sizes))
-        effects[kind] = own
-    # from every recorded time on
+        # a mechanism with an expected size, such as a weight, has that one
+        has_mean = any(place.mean is not None for place in places)
+        causes.append(Cause(kind, places, math.log(belief("causes.mechanism")), unit_sizes if has_mean else sizes))
+        effects[kind] = of_kind
+    # setting in at any recorded time
     courses = main_courses(base.states.times)
     causes.append(unknown_cause(base, [course.factor(base.at.sensors.times) for course in courses]))
     return BodyCauses(tuple(causes), effects)
 
 
 def unknown_cause(base: Base, factors: Sequence[Floats]) -> Cause:
-    """Fields of every kind and length, each with every one of some factors (n,) on the rows."""
+    """Unknown fields of every kind and length, with each of some factors (n,) on the rows."""
     noise = base.typical_noise
     places = tuple(Place(noise * factor[:, None] * columns) for columns in base.unknown.values() for factor in factors)
     return Cause(UNKNOWN, places, math.log(belief("causes.unknown")), beliefs("unknown.sizes"), Kind.UNKNOWN)

@@ -35,17 +35,17 @@ _STEPS, _LAST = 40, 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What is recorded on the way to a state, less what is recorded there, at any pace.
+    """What is recorded on the way to a final state, less what is recorded there, at any pace.
 
     Attributes
     ----------
     sensors : Sensors
     answers : (n, m) array
-        To each vector of a basis of the unknowns.
+        Of the sensors to each vector of a basis of the unknowns.
     times : (m,) array
-        After which what relaxes alone is smaller by a factor of e [s].
+        Relaxation times [s] of the eigenvectors.
     first : (m, m) array
-        What is there of each vector of the basis, as parts that relax alone, after a rate of relaxation of 1/s.
+        Initial amplitudes of the eigenvectors in the basis, times their relaxation times.
     """
 
     sensors: Sensors
@@ -54,23 +54,23 @@ class Course:
     first: Floats
 
     def at(self, pace: float) -> Floats:
-        """Answers (n,) at the recorded times if all goes so many times faster; nothing is left in the end."""
-        left = np.zeros(len(self.sensors))
+        """Difference (n,) from the final state at the recorded times if all goes so many times faster."""
+        remaining = np.zeros(len(self.sensors))
         for time in np.unique(self.sensors.times[np.isfinite(self.sensors.times)]):
             rows = self.sensors.times == time
-            left[rows] = self.answers[rows] @ (self.first @ (np.exp(-pace * time / self.times) / self.times))
-        return left
+            remaining[rows] = self.answers[rows] @ (self.first @ (np.exp(-pace * time / self.times) / self.times))
+        return remaining
 
 
 def consolidation(at: Linearisation, term: Term) -> Course:
-    """What is recorded while a term's own unknowns vanish after all loads came at once.
+    """What is recorded while a term's own unknowns relax to zero after all loads are applied at once.
 
     Parameters
     ----------
     at : Linearisation
-        About the state that is reached.
+        About the final state.
     term : Term
-        With unknowns of its own; bound to the system of that state, but not among what acts there.
+        With unknowns of its own; bound to the system of that state, but not one of its terms.
     """
     from scipy.linalg import eigh_tridiagonal
 
@@ -78,7 +78,7 @@ def consolidation(at: Linearisation, term: Term) -> Course:
     flow = symmetric_factors(H)
     v = flow.solve(-b)
     length = float(np.sqrt(max(v @ (H @ v), np.finfo(np.float64).tiny)))
-    basis, answers, diagonal, beside = [v / length], [], [], []
+    basis, answers, diagonal, off_diagonal = [v / length], [], [], []
     while True:
         v = basis[-1]
         forces = (B.T @ v)[:, None]
@@ -86,42 +86,42 @@ def consolidation(at: Linearisation, term: Term) -> Course:
         w = B @ at.displacements(forces)[:, 0] + N @ v
         diagonal.append(float(v @ w))
         w = flow.solve(w)
-        # less all before, twice: rounding lets the last ones come back
+        # orthogonalised twice against all earlier ones, because of rounding
         V = np.column_stack(basis)
         for _ in range(2):
             w -= V @ (V.T @ (H @ w))
         size = float(np.sqrt(max(w @ (H @ w), 0.0)))
         if len(basis) == _STEPS or size < _LAST * diagonal[0]:
             break
-        beside.append(size)
+        off_diagonal.append(size)
         basis.append(w / size)
-    times, vectors = eigh_tridiagonal(diagonal, beside)
+    times, vectors = eigh_tridiagonal(diagonal, off_diagonal)
     first = length * vectors * vectors[0]
     return Course(at.sensors, np.column_stack(answers), np.maximum(times, np.finfo(np.float64).tiny), first)
 
 
 def _matrices(at: Linearisation, term: Term) -> tuple[Floats, Any, Any, Any]:
-    """`b` (m,), `B` (m, 3 N), `N` and `H` (m, m) at the state, of nodes whose unknown is not given."""
+    """`b` (m,), `B` (m, 3 N), `N` and `H` (m, m) at the state, of nodes whose unknown is free."""
     from scipy.sparse import csr_matrix
 
     system, coupling = at.system, term.coupling
     assert coupling is not None
     system.u.assign(at.u)
-    # takes the shape of the state, in which what flows flows, and what it has taken up
+    # takes the deformed geometry, in which fluid flows, and the content
     term.advance(system.u)
-    taken = coupling.content.numpy().astype(np.float64)
-    # what flows is in proportion to the step
+    content = coupling.content.numpy().astype(np.float64)
+    # the flow is in proportion to the time step
     steps = [_compliance(term, coupling, h) for h in (1.0, 2.0)]
     H = steps[1] - steps[0]
     open_rows = np.flatnonzero(H.diagonal() > 0.0)
     term.evaluate_tangents(system.u)
     columns = coupling.columns.numpy()
     components = (3 * columns[:, None] + np.arange(3)).ravel()
-    own = coupling.own.numpy().astype(np.float64).ravel()
-    B = csr_matrix((own, components, 3 * coupling.offsets.numpy()), shape=(system.size, 3 * system.size))
+    block_values = coupling.own.numpy().astype(np.float64).ravel()
+    B = csr_matrix((block_values, components, 3 * coupling.offsets.numpy()), shape=(system.size, 3 * system.size))
     square = np.ix_(open_rows, open_rows)
     N = (2.0 * steps[0] - steps[1])[square]
-    return taken[open_rows], B[open_rows], N, H[square].tocsc()
+    return content[open_rows], B[open_rows], N, H[square].tocsc()
 
 
 def _compliance(term: Term, coupling: Coupling, step: float) -> Any:

@@ -48,14 +48,14 @@ class DenseFactors:
             self._L = cupy.linalg.cholesky(csr_matrix(matrix.tocsr().astype(np.float64)).toarray())
 
     def solve(self, columns: Any) -> Floats:
-        """What answers to columns (n, k), an array or SciPy sparse: (n, k), column after column in memory."""
+        """Solution (n, k) for right-hand sides (n, k), an array or SciPy sparse, in Fortran order."""
         return self._filled(columns, len(self._L), None)
 
     def between(self, left: Any, columns: Any) -> Floats:
         """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k)."""
         return self._filled(columns, left.shape[0], left)
 
-    def _filled(self, columns: Any, rows: int, left: Any) -> Floats:
+    def _filled(self, columns: Any, rows: int, projection: Any) -> Floats:
         import cupy
         import cupyx
         from cupyx.scipy.linalg import solve_triangular
@@ -64,16 +64,16 @@ class DenseFactors:
         if columns.shape[1] == 0:
             return np.empty((rows, 0))
         with self._device:
-            # pages that stay in place are copied to several times as fast
-            made = cupyx.empty_pinned((rows, columns.shape[1]), dtype=np.float64, order="F")
-            project = None if left is None else csr_matrix(left.tocsr().astype(np.float64))
+            # pinned memory is copied to several times as fast
+            result = cupyx.empty_pinned((rows, columns.shape[1]), dtype=np.float64, order="F")
+            projection_on_gpu = None if projection is None else csr_matrix(projection.tocsr().astype(np.float64))
             for first in range(0, columns.shape[1], _TOGETHER):
-                some = slice(first, first + _TOGETHER)
-                halfway = solve_triangular(self._L, _on_gpu(columns[:, some]), lower=True, overwrite_b=True)
-                answers = solve_triangular(self._L, halfway, lower=True, trans="T", overwrite_b=True)
-                answers = answers if project is None else cupy.asfortranarray(project @ answers)
-                answers.get(out=made[:, some])
-        return np.asarray(made)
+                part = slice(first, first + _TOGETHER)
+                forward = solve_triangular(self._L, _on_gpu(columns[:, part]), lower=True, overwrite_b=True)
+                answers = solve_triangular(self._L, forward, lower=True, trans="T", overwrite_b=True)
+                answers = answers if projection_on_gpu is None else cupy.asfortranarray(projection_on_gpu @ answers)
+                answers.get(out=result[:, part])
+        return np.asarray(result)
 
 
 def dense_factors(matrix: Any, device: Any) -> DenseFactors | None:

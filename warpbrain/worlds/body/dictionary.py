@@ -1,4 +1,4 @@
-"""What is looked for: every mechanism of the registry that the data of a case can show."""
+"""Candidates: proposals of every mechanism of the registry that the data of a case can show, and their effects."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, with_
 
 Floats = NDArray[np.float64]
 
-#: About how many sites there are in the tissue, and on its surface: no patch is far from all of them.
+#: About how many sites a scan has in the tissue, and on its surface.
 _VOLUME_SITES, _SURFACE_SITES = 350, 480
 #: Radii [m] of parts of a held set that may let go, and the distance [m] between their centres.
 RADII, BETWEEN = (0.010, 0.015, 0.023, 0.035, 0.053), 0.014
@@ -58,12 +58,12 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
     held = tuple(patch for nodes in fixed for patch in _patches(mesh, nodes))
     parts = [part.faces for part in connected_parts(case)]
     area = sum(float(np.linalg.norm(face_vectors(mesh.points, part), axis=1).sum()) for part in parts)
-    # points a spacing apart have about 0.7 of its cube each, and 0.85 of its square
+    # farthest-point samples a spacing apart fill about 0.7 of its cube each, and 0.85 of its square on a surface
     spacing = (mesh.volume / (0.7 * _VOLUME_SITES)) ** (1.0 / 3.0)
     between = (area / (0.85 * _SURFACE_SITES)) ** 0.5
     middles = [mesh.points[part].mean(axis=1) for part in parts]
-    # on each surface: a near point of another one, such as the other side of a thin mantle, does not stand for it
-    sites = [np.zeros((0, 3)), *(own[spread_points(own, between)] for own in middles)]
+    # for each surface: a site on the other side of a thin mantle is near, but on another surface
+    sites = [np.zeros((0, 3)), *(points[spread_points(points, between)] for points in middles)]
     return Situation(
         mesh,
         case.gravity_axis,
@@ -81,7 +81,7 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
 
 
 def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
-    """A held node set, and round parts of it: each centre with each radius, however many nodes that is."""
+    """A held node set, and discs of it about each centre with each radius."""
     on_surface = nodes_of(mesh.boundary, len(mesh.points))
     held = mesh.node_sets[nodes] & on_surface
     where = mesh.points[held]
@@ -91,7 +91,7 @@ def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
 
 
 def patch_of(mesh: TetMesh, nodes: str, held: NDArray[np.bool_], centre: Floats, radius: float) -> Patch | None:
-    """What of a held set is within a radius [m] of a point; None without a face, since that has no wall."""
+    """Nodes of a held set within a radius [m] of a point; None if they have no face."""
     members = held & (np.linalg.norm(mesh.points - centre, axis=1) <= radius)
     if not members[mesh.boundary].all(axis=1).any():
         return None
@@ -107,37 +107,37 @@ def dictionary_of(case: Case, kinds: Sequence[str] | None = None, instants: int 
     InputError
         If there is no such kind.
     """
-    known = mechanisms()
-    asked = list(known) if kinds is None else list(kinds)
-    for kind in asked:
-        if kind not in known:
-            raise InputError(f"candidates: no mechanism '{kind}': expected all, or some of {', '.join(known)}")
+    registry = mechanisms()
+    requested = list(registry) if kinds is None else list(kinds)
+    for kind in requested:
+        if kind not in registry:
+            raise InputError(f"candidates: no mechanism '{kind}': expected all, or some of {', '.join(registry)}")
     situation = situation_of(case, instants)
     proposals: dict[str, tuple[Proposal, ...]] = {}
     rejected: dict[str, str] = {}
-    for kind in asked:
+    for kind in requested:
         try:
-            proposals[kind] = _composable(case, situation.mesh, known[kind].proposals(situation))
+            proposals[kind] = _composable(case, situation.mesh, registry[kind].proposals(situation))
         except NotTestableError as error:
             rejected[kind] = f"not testable with these data: {error}"
     return Dictionary(situation, proposals, rejected)
 
 
 def _composable(case: Case, mesh: TetMesh, proposals: Sequence[Proposal]) -> tuple[Proposal, ...]:
-    """Those proposals that have a meaning together with what the case assumes; `NotTestableError` if none has."""
-    found, refused = [], ""
+    """Proposals that can be combined with the mechanisms of the case; `NotTestableError` if none can."""
+    composable, reason = [], ""
     for proposal in proposals:
-        made = proposal.make(proposal.mean)
-        kept = [own for own in case.mechanisms if own.several or own.kind != made.kind]
+        proposed = proposal.make(proposal.mean)
+        others = [mechanism for mechanism in case.mechanisms if mechanism.several or mechanism.kind != proposed.kind]
         try:
-            require_composable([*kept, made], mesh)
+            require_composable([*others, proposed], mesh)
         except CompositionError as error:
-            refused = str(error)
+            reason = str(error)
         else:
-            found.append(proposal)
-    if refused and not found:
-        raise NotTestableError(refused)
-    return tuple(found)
+            composable.append(proposal)
+    if reason and not composable:
+        raise NotTestableError(reason)
+    return tuple(composable)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +153,8 @@ class Candidates:
     alternatives : frozenset of str
         Kinds that are no physics.
     rejected : dict of str to str
-    makes : Effects or None
-        Which makes those of smooth ones at the same state; None if effects did not come from a state.
+    source : Effects or None
+        Which made them at a state; None if they were given.
     """
 
     kinds: tuple[str, ...]
@@ -162,10 +162,10 @@ class Candidates:
     of_kind: dict[str, NDArray[np.int64]]
     alternatives: frozenset[str]
     rejected: dict[str, str]
-    makes: Effects | None = None
+    source: Effects | None = None
 
     def changes_in_time(self, kind: str) -> bool:
-        """Whether what a kind does changes while loads do not."""
+        """Whether the effect of a kind changes under constant loads."""
         proposal = self.effects[self.of_kind[kind][0]].proposal
         return proposal is not None and proposal.changes_in_time
 
@@ -178,38 +178,38 @@ def candidates_at(
 ) -> Candidates:
     """The effects of a dictionary at one state, and of what is no physics.
 
-    What cannot be simulated is rejected and says why.
+    Kinds that cannot be simulated are rejected with a reason.
     """
-    found: list[Effect] = []
+    all_effects: list[Effect] = []
     of_kind: dict[str, NDArray[np.int64]] = {}
     rejected = dict(dictionary.rejected)
     for kind, proposals in dictionary.proposals.items():
         if on_kind is not None:
             on_kind(kind)
-        own: list[Effect] = []
+        of_this_kind: list[Effect] = []
         smooth = [proposal for proposal in proposals if not proposal.is_there_or_not]
         try:
-            own.extend(effects.of(smooth))
+            of_this_kind.extend(effects.of(smooth))
         except SolveError as error:
             rejected[kind] = f"{smooth[0].region}: cannot be simulated here: {error}"
         switches = [proposal for proposal in proposals if proposal.is_there_or_not]
-        for proposal, tried in zip(switches, _tried(effects, switches), strict=True):
-            if isinstance(tried, Effect):
-                own.append(tried)
+        for proposal, result in zip(switches, _switch_effects(effects, switches), strict=True):
+            if isinstance(result, Effect):
+                of_this_kind.append(result)
             else:
-                rejected[kind] = f"{proposal.region}: cannot be simulated here: {tried}"
-        if own:
-            of_kind[kind] = np.arange(len(found), len(found) + len(own))
+                rejected[kind] = f"{proposal.region}: cannot be simulated here: {result}"
+        if of_this_kind:
+            of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
             rejected.pop(kind, None)
-            found.extend(own)
+            all_effects.extend(of_this_kind)
     for name, effect in alternatives.items():
-        of_kind[name] = np.array([len(found)])
-        found.append(effect)
-    return Candidates(tuple(of_kind), tuple(found), of_kind, frozenset(alternatives), rejected, effects)
+        of_kind[name] = np.array([len(all_effects)])
+        all_effects.append(effect)
+    return Candidates(tuple(of_kind), tuple(all_effects), of_kind, frozenset(alternatives), rejected, effects)
 
 
-def _tried(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | InputError | SolveError]:
-    """Effects of what is there or not, or why there is none; what lets go is a dense solution each, in threads."""
+def _switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | InputError | SolveError]:
+    """Effects of switches, or why there is none; patches that let go have a dense solution each, made in threads."""
 
     def attempt(proposal: Proposal) -> Effect | InputError | SolveError:
         try:
@@ -219,22 +219,22 @@ def _tried(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | Inp
 
     solved = [proposal for proposal in proposals if proposal.follows != "release"]
     released = [proposal for proposal in proposals if proposal.follows == "release"]
-    # the first makes the surface, with threads of its own
-    found = [*map(attempt, released[:1]), *in_threads(attempt, released[1:]), *map(attempt, solved)]
-    by_proposal = dict(zip(map(id, (*released, *solved)), found, strict=True))
+    # the first one condenses the surface, with threads of its own
+    results = [*map(attempt, released[:1]), *in_threads(attempt, released[1:]), *map(attempt, solved)]
+    by_proposal = dict(zip(map(id, (*released, *solved)), results, strict=True))
     return [by_proposal[id(proposal)] for proposal in proposals]
 
 
-def candidates_beside(
+def candidates_about_fit(
     state: SolvedState,
     acting: Sequence[Effect],
     candidates: Candidates,
     places: Mapping[str, NDArray[np.int64]],
 ) -> Candidates:
-    """The effects of a dictionary at another state, in which some act.
+    """The effects of a dictionary at the state of a fit, in which some mechanisms act.
 
-    What is solved as a whole or over time keeps the columns that it has at the base, as has what is no physics, and
-    what is at places where it is improbable. A kind of which a case has only one is left out where it acts already.
+    Switches, courses in time and what is no physics keep their columns at the base, as do all at improbable places. A
+    kind of which a case has only one is left out if it acts already.
 
     Parameters
     ----------
@@ -243,26 +243,26 @@ def candidates_beside(
     candidates : Candidates
         At the base.
     places : mapping of str to int array
-        Of each kind, numbers of the places where it is made anew.
+        Of each kind, numbers of the places whose columns are made anew.
     """
-    known = None if candidates.makes is None else candidates.makes.mesh_errors
-    effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=known)
-    made = [effect.proposed.make(effect.proposed.mean) for effect in acting]
-    there = {mechanism.kind for mechanism in made if not mechanism.several}
-    found: list[Effect] = []
+    mesh_errors = None if candidates.source is None else candidates.source.mesh_errors
+    effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=mesh_errors)
+    acting_mechanisms = [effect.proposed.make(effect.proposed.mean) for effect in acting]
+    acting_kinds = {mechanism.kind for mechanism in acting_mechanisms if not mechanism.several}
+    all_effects: list[Effect] = []
     of_kind: dict[str, NDArray[np.int64]] = {}
     for kind, numbers in candidates.of_kind.items():
-        if kind in there:
+        if kind in acting_kinds:
             continue
-        own = [candidates.effects[k] for k in numbers.tolist()]
-        smooth = [k for k in places[kind].tolist() if _is_smooth(own[k])]
-        for k, effect in zip(smooth, effects.of([own[k].proposed for k in smooth]), strict=True):
-            own[k] = effect
-        of_kind[kind] = np.arange(len(found), len(found) + len(own))
-        found.extend(own)
-    return replace(candidates, kinds=tuple(of_kind), effects=tuple(found), of_kind=of_kind, makes=effects)
+        of_this_kind = [candidates.effects[k] for k in numbers.tolist()]
+        smooth = [k for k in places[kind].tolist() if _is_smooth(of_this_kind[k])]
+        for k, effect in zip(smooth, effects.of([of_this_kind[k].proposed for k in smooth]), strict=True):
+            of_this_kind[k] = effect
+        of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
+        all_effects.extend(of_this_kind)
+    return replace(candidates, kinds=tuple(of_kind), effects=tuple(all_effects), of_kind=of_kind, source=effects)
 
 
 def _is_smooth(effect: Effect) -> bool:
-    """Whether it is differentiated at a state: neither solved as a whole nor over time, nor no physics."""
-    return effect.proposal is not None and not effect.proposal.is_there_or_not and effect.about is None
+    """Whether its columns are derivatives at one state: it is a mechanism, no switch, and no course in time."""
+    return effect.proposal is not None and not effect.proposal.is_there_or_not and effect.columns_at is None

@@ -54,18 +54,18 @@ class Factors:
             raise SolveError(f"the state is unstable: its tangent stiffness cannot be factorised ({error})") from None
 
     def solve(self, columns: Any, transposed: bool = False) -> Floats:
-        """What answers to columns (n, k), an array or SciPy sparse: (n, k), column after column in memory.
+        """Solution (n, k) for right-hand sides (n, k), an array or SciPy sparse, in Fortran order.
 
-        `transposed`: of the matrix the other way round.
+        `transposed`: with the transposed matrix.
         """
         if transposed and self._skew is not None:
-            return self._other_way.solve(columns)
+            return self._transposed.solve(columns)
         if self._dense is not None:
             return self._dense.solve(columns)
-        return self._filled(columns, columns.shape[0], lambda found: found)
+        return self._filled(columns, columns.shape[0], lambda solution: solution)
 
     @cached_property
-    def _other_way(self) -> Factors:
+    def _transposed(self) -> Factors:
         """Factors of the transposed: SuperLU answers by the transposed of its factors one column after the other.
 
         That takes three times as long, which a sensor's equilibria make up for many times over.
@@ -77,19 +77,19 @@ class Factors:
         """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k), dense a block at a time only."""
         if self._dense is not None:
             return self._dense.between(left, columns)
-        return self._filled(columns, left.shape[0], lambda found: left @ found)
+        return self._filled(columns, left.shape[0], lambda solution: left @ solution)
 
     def _filled(self, columns: Any, rows: int, of: Callable[[Floats], Floats]) -> Floats:
-        """What is made of the answers to each block, beside each other."""
+        """A function of the solution for each block of columns, side by side."""
         from scipy.sparse import issparse
 
         columns = columns.tocsc() if issparse(columns) else columns
-        made = np.empty((rows, columns.shape[1]), order="F")
+        result = np.empty((rows, columns.shape[1]), order="F")
 
-        def solve_block(some: slice) -> Floats:
-            block = columns[:, some]
+        def solve_block(part: slice) -> Floats:
+            block = columns[:, part]
             block = block.toarray() if issparse(block) else block
             return of(self._factors.solve(np.asfortranarray(block, dtype=np.float64)))
 
-        fill_columns(made, solve_block, _TOGETHER)
-        return made
+        fill_columns(result, solve_block, _TOGETHER)
+        return result

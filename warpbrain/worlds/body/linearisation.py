@@ -1,13 +1,12 @@
-"""A case about one state: what a small force anywhere does to what was recorded.
+"""A case about one state: the response of the sensors to a small force anywhere.
 
-At an equilibrium `u` with tangent stiffness `K`, a nodal force `g` beside the loads moves the free components by
-`K^-1 g` and changes the reactions of the held ones by `K_cf K_ff^-1 g_f - g_c`. Of the sensors `H` only
+At an equilibrium `u` with tangent stiffness `K`, a further nodal force `g` moves the free components by `K^-1 g` and
+changes the reactions of the held ones by `K_cf K_ff^-1 g_f - g_c`. Of the sensors `H` only
 
     A = [ (H_u + H_R K_cf) K_ff^-1 ,  -H_R ]
 
-is needed, one right-hand side a sensor; whatever is looked for costs a product with `A` after that. SciPy's LU has
-the factors of 5,000 nodes in a second, and 100 right-hand sides in another; block conjugate gradients take ten times
-as long for as many as there are sensors.
+is needed, one right-hand side a sensor; after that each cause costs a product with `A`. SciPy's LU has the factors of
+5,000 nodes in a second, and 100 right-hand sides in another; block conjugate gradients take ten times as long.
 """
 
 from __future__ import annotations
@@ -35,13 +34,13 @@ Floats = NDArray[np.float64]
 
 #: Growth by which the derivative of the forces of growing tissue is taken.
 _GROWTH = 1e-4
-#: Patches whose answers one thread makes, and sparse columns of forces: of some mechanisms no node is without any.
+#: Columns that one thread computes at a time: of dense forces, and of sparse ones.
 _TOGETHER, _TOGETHER_SPARSE = 64, 8
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Grown(Mechanism):
-    """Tissue that is larger everywhere."""
+    """Uniform growth of all tissue."""
 
     relative: float
     kind: ClassVar[str] = "growth"
@@ -53,7 +52,7 @@ class _Grown(Mechanism):
 
 
 class Linearisation:
-    """A state of a system, and how the sensors answer to forces there.
+    """A state of a system, and the response of the sensors to forces there.
 
     Parameters
     ----------
@@ -69,13 +68,13 @@ class Linearisation:
         self.u = u
         self.reactions = reactions
         self.sensors = sensors
-        # held surfaces of the state, and what its sensors record of each
+        # held surfaces of the state, and the responses of its sensors to each
         self._surfaces: dict[bytes, HeldSurface] = {}
-        self._of_surfaces: dict[bytes, Floats] = {}
-        # threads ask for patches of one surface
-        self._making = threading.Lock()
-        # forces that were answered one by one so far
-        self._answered = 0
+        self._surface_responses: dict[bytes, Floats] = {}
+        # patches of one surface are computed in several threads
+        self._surface_lock = threading.Lock()
+        # forces whose response was computed by an equilibrium each so far
+        self._equilibria = 0
         self._factorise()
 
     def _factorise(self) -> None:
@@ -83,33 +82,33 @@ class Linearisation:
         system.u.assign(self.u)
         K = system.stiffness().tocsr()
         skew = system.skew_stiffness()
-        # without it what 1.5 kPa on the wall of a cavity do beside each other is an eighth off
+        # without it the response to 1.5 kPa on the wall of a cavity is an eighth off
         K = K if skew is None else (K + skew).tocsr()
         free = ~system.model.constrained.ravel()
         #: `K` [N/m] on every component, SciPy CSR (3 N, 3 N).
         self.stiffness: Any = K
         self._free, self._held_free = free, K[~free][:, free]
-        # factors on a GPU are Cholesky's
+        # Cholesky factors on a GPU need a symmetric matrix
         self._factors = Factors(K[free][:, free], system.device if skew is None else None, symmetric=skew is None)
 
     def with_sensors(self, sensors: Sensors) -> Linearisation:
-        """The same state with other sensors; nothing is factorised again."""
+        """The same state with other sensors, without factorising again."""
         other = copy.copy(self)
         other.sensors = sensors
-        other._of_surfaces, other._answered = {}, 0
-        for made in ("compliance", "_rows"):
-            other.__dict__.pop(made, None)
+        other._surface_responses, other._equilibria = {}, 0
+        for name in ("compliance", "_rows"):
+            other.__dict__.pop(name, None)
         return other
 
     @cached_property
     def compliance(self) -> Floats:
-        """`A` (n, 3 N): made when it is needed, since few forces are answered sooner without it."""
+        """`A` (n, 3 N), made when it is needed: for few forces equilibria are cheaper."""
         rows, which = self._rows
         return np.asarray(rows[which])
 
     @cached_property
     def _rows(self) -> tuple[Floats, NDArray[np.intp]]:
-        """Rows of `A` that differ, and which of them (n,) is whose: what was recorded at several times is one row."""
+        """Distinct rows of `A`, and the number of its row for each sensor (n,): several times share one row."""
         free, sensors = self._free, self.sensors
         by_R = sensors.by_reactions[:, ~free]
         moved = (sensors.by_displacement[:, free] + by_R @ self._held_free).tocsr()
@@ -117,16 +116,16 @@ class Linearisation:
         rng = np.random.default_rng(0)
         mark = moved @ rng.normal(size=moved.shape[1]) + held @ rng.normal(size=held.shape[1])
         _, different, which = np.unique(mark, return_index=True, return_inverse=True)
-        # by columns: products with sparse forces then need no copy of it
+        # Fortran order: products with sparse forces then need no copy
         A = np.empty((len(different), len(free)), order="F")
         A[:, free] = self._factors.solve(moved[different].T, transposed=True).T
         A[:, ~free] = held[different]
         return A, which.ravel()
 
     def released(self, patch: NDArray[np.bool_], held: NDArray[np.bool_], lifts: bool) -> Floats:
-        """What is recorded where held nodes let go, to first order: (n,).
+        """Change (n,) of what is recorded if held nodes are released, to first order.
 
-        They slide along the surface; where the skull pulls at them they also leave it, if they can.
+        They slide along the surface; where they are under tension they also leave it, if they can.
 
         Parameters
         ----------
@@ -141,14 +140,14 @@ class Linearisation:
             If too little holds the body without the patch.
         """
         key = held.tobytes()
-        with self._making:
+        with self._surface_lock:
             surface = self._surface(key, held)
         moved = surface.moved(patch, lifts)
         loose = np.flatnonzero(moved)
-        return np.asarray(self._of_surfaces[key][:, loose] @ moved[loose])
+        return np.asarray(self._surface_responses[key][:, loose] @ moved[loose])
 
     def _surface(self, key: bytes, held: NDArray[np.bool_]) -> HeldSurface:
-        """A held surface, and what the sensors record of it: made once."""
+        """A held surface with the responses of the sensors to it, made once."""
         if key not in self._surfaces:
             mesh = self.system.model.mesh
             self._surfaces[key] = HeldSurface(
@@ -160,49 +159,49 @@ class Linearisation:
                 self.reactions,
                 float(np.linalg.norm(np.ptp(mesh.points, axis=0))),
             )
-        if key not in self._of_surfaces:
+        if key not in self._surface_responses:
             sensors = self.sensors
             answers = self._surfaces[key].answers(
                 self.stiffness, self._free, self.compliance, sensors.by_displacement, sensors.by_reactions
             )
-            # by columns: of each patch a few are asked for
-            self._of_surfaces[key] = np.asfortranarray(answers)
+            # Fortran order: of each patch a few columns are used
+            self._surface_responses[key] = np.asfortranarray(answers)
         return self._surfaces[key]
 
     def answers(self, forces: Floats) -> Floats:
-        """What nodal forces (..., N, 3) [N] change of what is recorded: (n, ...)."""
+        """Response (n, ...) of the sensors to nodal forces (..., N, 3) [N]."""
         flat = np.asarray(forces).reshape(-1, len(self._free))
         return self._answers(flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
 
     def answers_of_patches(self, weights: Floats) -> Floats:
-        """What forces of 1 N in each direction, spread over nodes with weights (N, s), change: (n, s, 3)."""
+        """Response (n, s, 3) to forces of 1 N in each direction, spread over nodes with weights (N, s)."""
         rows, which = self._rows
-        found = np.empty((3, weights.shape[1], len(rows)))
+        answers = np.empty((3, weights.shape[1], len(rows)))
 
-        def fill(part: tuple[int, int]) -> None:
-            axis, first = part
-            some = slice(first, first + _TOGETHER)
-            found[axis, some] = (rows[:, axis::3] @ weights[:, some]).T
+        def fill(task: tuple[int, int]) -> None:
+            axis, first = task
+            columns = slice(first, first + _TOGETHER)
+            answers[axis, columns] = (rows[:, axis::3] @ weights[:, columns]).T
 
         in_threads(fill, list(itertools.product(range(3), range(0, weights.shape[1], _TOGETHER))))
-        return np.asarray(found.transpose(2, 1, 0)[which])
+        return np.asarray(answers.transpose(2, 1, 0)[which])
 
     def answers_of_columns(self, forces: Any) -> Floats:
-        """The same of forces that act here and there, SciPy CSC (3 N, k): (n, k)."""
+        """Response (n, k) to sparse forces, SciPy CSC (3 N, k)."""
         return self._answers(forces)
 
     def _answers(self, forces: Any) -> Floats:
-        """What forces (3 N, k) change: by the compliance, or by equilibria until these are as many as it takes."""
+        """Response to forces (3 N, k): by equilibria until these are as many as the compliance takes, then by that."""
         from scipy.sparse import issparse
 
         count = forces.shape[1]
-        self._answered += count
-        if "_rows" in self.__dict__ or self._answered >= len(self.sensors):
+        self._equilibria += count
+        if "_rows" in self.__dict__ or self._equilibria >= len(self.sensors):
             rows, which = self._rows
-            found = np.empty((len(rows), count))
+            answers = np.empty((len(rows), count))
             together = _TOGETHER_SPARSE if issparse(forces) else _TOGETHER
-            fill_columns(found, lambda some: rows @ forces[:, some], together)
-            return found[which]
+            fill_columns(answers, lambda columns: rows @ forces[:, columns], together)
+            return answers[which]
         forces = forces.toarray() if issparse(forces) else forces
         du = self.displacements(forces)
         dR = np.where(self._free[:, None], 0.0, self.stiffness @ du - forces)
@@ -225,7 +224,7 @@ class Linearisation:
         return toward_equilibrium(system, external, start, lambda r: solve(r.reshape(-1, 1)).reshape(-1, 3), tolerance)
 
     def answers_of_elements(self, element_forces: Floats, weights: Any) -> Floats:
-        """What internal forces of elements (m, 4, 3) [N], times weights (m, k), change: (n, k).
+        """Response (n, k) to internal forces of elements (m, 4, 3) [N] times weights (m, k).
 
         Weights are an array, or SciPy CSC where most of them are zero.
         """
@@ -240,7 +239,7 @@ class Linearisation:
 
     @cached_property
     def element_forces(self) -> Floats:
-        """Internal forces (m, 4, 3) [N] of the elements that go with their moduli: of laws, fibres and viscosity."""
+        """Internal forces (m, 4, 3) [N] of the elements in proportion to moduli: of laws, fibres and viscosity."""
         return _element_forces(self.system, self.u, of_moduli=True)
 
     @cached_property
@@ -252,26 +251,26 @@ class Linearisation:
         for amount in (-_GROWTH, _GROWTH):
             model = self.system.model
             grown = replace(model, mechanisms=(*model.mechanisms, _Grown(relative=amount)))
-            beside = System(grown, str(self.system.device), self.system.precision.name)
-            beside.remember_as(self.system)
-            sides.append(_element_forces(beside, self.u))
+            grown_system = System(grown, str(self.system.device), self.system.precision.name)
+            grown_system.remember_as(self.system)
+            sides.append(_element_forces(grown_system, self.u))
         return (sides[1] - sides[0]) / (2.0 * _GROWTH)
 
     def internal_forces(self, system: System | None = None) -> Floats:
         """Internal forces (N, 3) [N] at the state, of this system or of another with the same nodes."""
-        asked = self.system if system is None else system
-        asked.u.assign(self.u)
-        asked.evaluate_forces()
-        asked.gather_forces()
-        return np.asarray(asked.internal.numpy().astype(np.float64))
+        other = self.system if system is None else system
+        other.u.assign(self.u)
+        other.evaluate_forces()
+        other.gather_forces()
+        return np.asarray(other.internal.numpy().astype(np.float64))
 
 
 def _element_forces(system: System, u: Floats, of_moduli: bool = False) -> Floats:
-    """Internal forces (m, 4, 3) [N] of the tissue of a system at a displacement; of its moduli alone, if asked."""
+    """Internal forces (m, 4, 3) [N] of the tissue of a system; `of_moduli`: those in proportion to moduli alone."""
     system.u.assign(u)
     system.evaluate_forces()
-    found = system.element_forces.numpy().astype(np.float64)
+    forces = system.element_forces.numpy().astype(np.float64)
     for term in system.terms:
         if term.elements is not None and (term.of_moduli or not of_moduli):
-            found[term.elements] += term.forces.numpy()
-    return np.asarray(found)
+            forces[term.elements] += term.forces.numpy()
+    return np.asarray(forces)

@@ -1,10 +1,10 @@
 """The error of the mesh under a hypothesis: the state on elements of half the size, less the state.
 
-Linear tetrahedra answer too little, and to each mechanism in its own measure: a pressure in a cavity moves a coarse
-mesh far less than weight does. So the error is computed with the mechanism that is fitted, not once for all: otherwise
-its size would come out wrong by as much. And it changes with the tissue: with its stiffness as the displacement does,
-but not alike everywhere, and as it is less compressible by more than the displacement itself. What stiffness and
-compressibility may explain has these changes, or a tenth more stiffness would be taken for something that is missing.
+Linear tetrahedra are too stiff, and to a different degree for each mechanism: of a pressure in a cavity a coarse mesh
+loses far more than of weight. So the error is computed with the mechanism that is fitted, whose size would be wrong
+by as much otherwise. It also depends on the tissue: on stiffness as the displacement does, but not uniformly, and on
+compressibility more than the displacement does. The columns of stiffness and compressibility include these changes, or
+a tenth more stiffness would be taken for something that is missing.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 _ROUGH, ENOUGH = 10.0 * TOLERANCE, 1e-3
 #: Iterations of conjugate gradients at most, where the two levels are of no help.
 _MOST = 10_000
-#: States that are remembered beside the last one.
+#: Earlier states that are kept beside the last one.
 _KEPT = 11
 #: Change of the tissue [standard deviations] whose error is compared: far more than rounding, little beside the error.
 _STEP = 0.2
@@ -51,37 +51,38 @@ class MeshErrors:
 
     Attributes
     ----------
-    own : Difference
+    error : Difference
+        At that state.
     volume : float
         `volume_of` the tissue there.
     by_volume : Difference
-        What it gains for each unit of that.
+        Its derivative by that.
     by_tissue : tuple of Difference
-        What one standard deviation of each coordinate of the tissues' prior adds to it.
+        Its derivative by each standard normal coordinate of the tissues' prior.
     finer : FinerStates
-        Which finds it at other states.
+        Which compute it at other states.
     """
 
-    own: Difference
+    error: Difference
     volume: float
     by_volume: Difference
     by_tissue: tuple[Difference, ...]
     finer: FinerStates
 
     def with_tissue(self, theta: Floats, volume: float, prior: Gaussian) -> Difference:
-        """The error with other tissue (p,) of another `volume_of`, without what belongs to a mechanism beside."""
-        found = self.own
-        for z, change in zip(np.linalg.solve(prior.factor, theta - found.theta), self.by_tissue, strict=True):
-            found = found.plus(change.times(float(z)))
-        return found if volume == self.volume else found.plus(self.by_volume.times(volume - self.volume))
+        """The error with other tissue (p,) of another `volume_of`, without the share of mechanisms."""
+        error = self.error
+        for z, change in zip(np.linalg.solve(prior.factor, theta - error.theta), self.by_tissue, strict=True):
+            error = error.plus(change.times(float(z)))
+        return error if volume == self.volume else error.plus(self.by_volume.times(volume - self.volume))
 
     def of(self, hypothesis: Hypothesis, prior: Gaussian) -> Difference:
-        """The error that the tissue of a hypothesis is known to have."""
+        """The error that the tissue of a hypothesis has, to first order."""
         return self.with_tissue(hypothesis.theta, volume_of(self.finer.states.materials(hypothesis)), prior)
 
 
 def volume_of(materials: Mapping[int, Material]) -> float:
-    """`-ln(1 - 2 nu)` in the mean of tissues: even steps of it are even steps of the logarithm of bulk moduli."""
+    """`-ln(1 - 2 nu)` in the mean of tissues: nearly the logarithm of bulk over shear moduli."""
     return -float(np.mean([math.log1p(-2.0 * material.poisson) for material in materials.values()]))
 
 
@@ -91,16 +92,16 @@ def expected(known: Difference) -> Difference:
 
 
 def expected_answer(sensors: Sensors, known: Difference) -> Floats:
-    """What the whole error changes (n,) of what is recorded."""
+    """Response (n,) of the sensors to the whole error."""
     change = expected(known)
     return sensors.answer(change.u, change.reactions)
 
 
 class FinerStates:
-    """Solves hypotheses on elements of half the size, each from what others near to it were beyond their mesh.
+    """Solves hypotheses on elements of half the size, begun at the coarse state plus the error of earlier ones.
 
-    On the CPU the mesh that there was, factorised at the first of them, preconditions all of them: see
-    `warpbrain.kernels.two_level`. It is factorised anew when it helps less.
+    On the CPU the factorised stiffness of the coarse mesh preconditions them: see `warpbrain.kernels.two_level`. It is
+    factorised anew when it helps less.
 
     Parameters
     ----------
@@ -109,15 +110,15 @@ class FinerStates:
 
     def __init__(self, states: States) -> None:
         self.states = states
-        # kinds of mechanisms that acted, displacements that were found, flat, and what the finer ones were beyond them
-        self._beyond: list[tuple[frozenset[str], Floats, Floats]] = []
+        # of earlier states: kinds of mechanisms, coarse displacements, flat, and the finer ones less those
+        self._earlier: list[tuple[frozenset[str], Floats, Floats]] = []
         self._system: System | None = None
         self._factors: tuple[Factors, NDArray[np.bool_]] | None = None
-        # of the system and the factors that there are
+        # solver of the system with these factors
         self._linear: TwoLevelGradient | None = None
 
     def errors(self, state: SolvedState, volume: Proposal, prior: Gaussian) -> MeshErrors:
-        """The error of a state, and what it is beside that with other tissue.
+        """The error of a state, and its derivatives by the tissue.
 
         Parameters
         ----------
@@ -132,23 +133,23 @@ class FinerStates:
         SolveError
             If there is no equilibrium on the finer mesh.
         """
-        own, here = self.error(state.hypothesis, state), state.hypothesis
+        error, hypothesis = self.error(state.hypothesis, state), state.hypothesis
         less_compressible = volume.make(volume.mean + volume.sd)
-        other = self.error(replace(here, mechanisms=(*here.mechanisms, less_compressible)), state)
+        other = self.error(replace(hypothesis, mechanisms=(*hypothesis.mechanisms, less_compressible)), state)
         by_tissue = []
         for axis in prior.factor.T:
-            beside = self.error(replace(here, theta=here.theta + _STEP * axis), state)
-            by_tissue.append(beside.less(own).times(1.0 / _STEP))
-        by_volume = other.less(own).times(1.0 / float(volume.sd[0]))
-        return MeshErrors(own, volume_of(self.states.materials(here)), by_volume, tuple(by_tissue), self)
+            shifted = self.error(replace(hypothesis, theta=hypothesis.theta + _STEP * axis), state)
+            by_tissue.append(shifted.less(error).times(1.0 / _STEP))
+        by_volume = other.less(error).times(1.0 / float(volume.sd[0]))
+        return MeshErrors(error, volume_of(self.states.materials(hypothesis)), by_volume, tuple(by_tissue), self)
 
-    def error(self, hypothesis: Hypothesis, near: SolvedState, tolerance: float = _ROUGH) -> Difference:
-        """The error of a hypothesis without its stiffness field, which it hardly depends on.
+    def error(self, hypothesis: Hypothesis, nearby: SolvedState, tolerance: float = _ROUGH) -> Difference:
+        """The error of a hypothesis with a uniform stiffness within tissues, on which it hardly depends.
 
         Parameters
         ----------
         hypothesis : Hypothesis
-        near : SolvedState
+        nearby : SolvedState
             A state near to it.
         tolerance : float
             Out-of-balance force of the finer state, relative.
@@ -158,33 +159,33 @@ class FinerStates:
         SolveError
             If there is no equilibrium on the finer mesh.
         """
-        even = replace(hypothesis, field=np.zeros_like(hypothesis.field))
-        coarse = self.states.solve(even, near.u)
-        finer = FinerCase(self.states.case_of(even))
+        uniform = replace(hypothesis, field=np.zeros_like(hypothesis.field))
+        coarse = self.states.solve(uniform, nearby.u)
+        finer = FinerCase(self.states.case_of(uniform))
         model = finer.model(coarse.system.model)
         external = model.external_forces()
         system = self._system_of(model)
         linear = self._two_level(system, coarse, finer.prolongation)
         solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=tolerance), linear=linear)
         flat = finer.prolongation @ coarse.u
-        acting = frozenset(mechanism.kind for mechanism in even.mechanisms)
-        # what another mechanism has at its edges is not here: begun from that, elements are nearly inside out
-        alike = [(u, beyond) for kinds, u, beyond in self._beyond if kinds <= acting]
-        begin = flat + extrapolated(alike, coarse.u.ravel()) if alike else flat
+        acting = frozenset(mechanism.kind for mechanism in uniform.mechanisms)
+        # the error at the edges of another mechanism would nearly invert elements
+        earlier = [(u, difference) for kinds, u, difference in self._earlier if kinds <= acting]
+        start = flat + extrapolated(earlier, coarse.u.ravel()) if earlier else flat
         try:
-            found = solver.solve(external, begin)
+            solution = solver.solve(external, start)
         except SolveError:
-            found = solver.solve(external, flat)
+            solution = solver.solve(external, flat)
         if linear is not None and linear.slow:
             self._factors = self._linear = None
-        self._beyond = [*self._beyond[-_KEPT:], (acting, coarse.u.ravel(), found.u - flat)]
-        u, reactions = restricted(finer.prolongation, found.u, model.reactions(found.internal, external))
+        self._earlier = [*self._earlier[-_KEPT:], (acting, coarse.u.ravel(), solution.u - flat)]
+        u, reactions = restricted(finer.prolongation, solution.u, model.reactions(solution.internal, external))
         return Difference(u - coarse.u, reactions - coarse.reactions, hypothesis.theta)
 
     def _two_level(self, system: System, coarse: SolvedState, prolongation: Any) -> TwoLevelGradient | None:
-        """What solves the finer system's linear systems with the factors of the coarse one; None for what does always.
+        """A solver of the finer system with the factors of the coarse one; None for the system's own solver.
 
-        Terms with unknowns of their own, and midside nodes, which are not on the mesh of corners, are for that one.
+        That is needed for terms with unknowns of their own, and for midside nodes, which the coarse mesh has not.
         """
         if not system.device.is_cpu or system.quadratic is not None:
             return None
@@ -206,7 +207,7 @@ class FinerStates:
         return self._linear
 
     def _system_of(self, model: Model) -> System:
-        """The system of the last state with other numbers, or another one where numbers are not all that changed."""
+        """The system of the last state with other parameters, or a new one if more than parameters changed."""
         if self._system is not None:
             try:
                 self._system.set_model(model)

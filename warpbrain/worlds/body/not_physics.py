@@ -1,4 +1,4 @@
-"""Explanations that are no physics: nuisances far larger than they should be, which compete with mechanisms."""
+"""Explanations that are no physics: nuisances far larger than expected, which compete with mechanisms."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.nuisances import Nuisances
-from warpbrain.worlds.body.sensors import Sensors, alike_near, spread_points
+from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
 from warpbrain.worlds.body.stiffness_field import stiffness_modes
 
 Floats = NDArray[np.float64]
 
-#: What each says to people.
+#: What each means, in a sentence.
 SENTENCES = {
     "registration": "Recordings and anatomy are registered wrongly.",
     "mesh": "The mesh is too coarse, or not the shape of the anatomy.",
@@ -29,7 +29,7 @@ def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]
     """Effects by name."""
     sensors, mesh = at.sensors, at.system.model.mesh
     by_name = {family.name: family.columns for family in nuisances.families}
-    wide = {
+    columns_by_name = {
         "registration": sensors.rigid
         * np.repeat([belief("registration.wrong_shift"), belief("registration.wrong_turn")], 3),
         "stiffness": belief("tissue.larger")
@@ -37,11 +37,11 @@ def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]
         "loads": belief("tissue.larger") * by_name["known loads"],
     }
     if "mesh" in by_name:
-        wide["mesh"] = belief("tissue.larger") * by_name["mesh"]
-    wide["segmentation"] = _off_surfaces(sensors)
-    wide["forces"] = _wrong_forces(sensors)
-    nothing = np.zeros(len(sensors))
-    return {name: Effect(None, nothing, columns) for name, columns in wide.items() if columns.any()}
+        columns_by_name["mesh"] = belief("tissue.larger") * by_name["mesh"]
+    columns_by_name["segmentation"] = _off_surfaces(sensors)
+    columns_by_name["forces"] = _wrong_forces(sensors)
+    zero = np.zeros(len(sensors))
+    return {name: Effect(None, zero, columns) for name, columns in columns_by_name.items() if columns.any()}
 
 
 def _wrong_forces(sensors: Sensors) -> Floats:
@@ -50,23 +50,23 @@ def _wrong_forces(sensors: Sensors) -> Floats:
     groups = sensors.groups[rows]
     recorded = sensors.computed[rows] + sensors.residual[rows]
     squares = np.bincount(groups, weights=recorded**2, minlength=1)
-    found = np.zeros((len(sensors), len(rows)))
-    found[rows, np.arange(len(rows))] = belief("loads.force") * np.sqrt(squares[groups])
-    return found
+    columns = np.zeros((len(sensors), len(rows)))
+    columns[rows, np.arange(len(rows))] = belief("loads.force") * np.sqrt(squares[groups])
+    return columns
 
 
 def _off_surfaces(sensors: Sensors) -> Floats:
     """Columns (n, k) of recorded surfaces that are off: shifted from place to place, or too far out or in."""
     rows = np.flatnonzero(sensors.of_surfaces)
-    where = sensors.positions[rows]
-    near = alike_near(
-        where, where[spread_points(where, belief("mesh.surface_alike"), 60)], belief("mesh.surface_alike")
+    places = sensors.positions[rows]
+    weights = kernel_columns(
+        places, places[spread_points(places, belief("mesh.surface_alike"), 60)], belief("mesh.surface_alike")
     )
-    along = np.column_stack([sensors.directions[rows], np.ones(len(rows))])
-    found = np.zeros((len(sensors), 4 * near.shape[1]))
-    found[rows] = (
+    coordinates = np.column_stack([sensors.directions[rows], np.ones(len(rows))])
+    columns = np.zeros((len(sensors), 4 * weights.shape[1]))
+    columns[rows] = (
         belief("mesh.surface_off")
         / np.sqrt(2.0)
-        * (near[:, :, None] * along[:, None, :]).reshape(len(rows), 4 * near.shape[1])
+        * (weights[:, :, None] * coordinates[:, None, :]).reshape(len(rows), 4 * weights.shape[1])
     )
-    return found
+    return columns

@@ -1,7 +1,7 @@
-"""What may explain residuals without any physics missing: columns over the sensors of one standard deviation each.
+"""Nuisances, which may explain residuals without any missing physics: columns over the sensors, one per coordinate.
 
 Tissue (its prior), stiffness that varies within it, compressibility, the shape of its law, how large the known loads
-were, a rigid error of registration, and the error of the mesh. A cause is credited only with what they cannot explain.
+were, a rigid error of registration, and the error of the mesh. A cause is credited only with what these cannot explain.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from warpbrain.simulation.system import System
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
-from warpbrain.worlds.body.sensors import Sensors, alike_near, spread_points
+from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
 from warpbrain.worlds.body.states import Hypothesis, States
 
 Floats = NDArray[np.float64]
@@ -48,9 +48,8 @@ class Family:
     Attributes
     ----------
     name : str
-        For people.
     columns : (n, k) array
-        What one standard deviation of each changes of what is recorded.
+        Change of what is recorded by one standard deviation of each.
     """
 
     name: str
@@ -66,7 +65,7 @@ class Nuisances:
     families : tuple of Family
         The first is the tissue's parameters, the second the stiffness field.
     anchors : (a, 3) array
-        Points [m] about which the unknown part of the mesh's error is alike.
+        Points [m] of the kernel functions of the unknown part of the mesh's error.
     fraction : float
         That part, relative to the displacement.
     """
@@ -81,7 +80,7 @@ class Nuisances:
         return np.concatenate([family.columns for family in self.families], axis=1)
 
     def weakened(self) -> Nuisances:
-        """The same as if nothing of them could be: columns that are next to nothing."""
+        """The same with columns that are next to nothing, so that they explain nothing."""
         return replace(self, families=tuple(Family(f.name, 1e-9 * f.columns) for f in self.families))
 
     def with_fraction(self, fraction: float) -> Nuisances:
@@ -92,10 +91,10 @@ class Nuisances:
 
     def coordinates(self, prior: Gaussian, hypothesis: Hypothesis) -> Floats:
         """Coordinates (q,) of the tissue, by its prior, and of the field of a hypothesis; the others are zero."""
-        found = np.zeros(self.columns.shape[1])
-        found[self.part("tissue")] = np.linalg.solve(prior.factor, hypothesis.theta - prior.mean)
-        found[self.part("stiffness field")] = hypothesis.field
-        return found
+        z = np.zeros(self.columns.shape[1])
+        z[self.part("tissue")] = np.linalg.solve(prior.factor, hypothesis.theta - prior.mean)
+        z[self.part("stiffness field")] = hypothesis.field
+        return z
 
     def part(self, name: str) -> slice:
         """Where the columns of a family are."""
@@ -141,8 +140,8 @@ def nuisances_at(
         fraction = float(beliefs("mesh.unknown").max())
     sensors = at.sensors
     if anchors is None:
-        where = sensors.positions[sensors.is_displacement]
-        anchors = where[spread_points(where, belief("mesh.alike"), 60)]
+        places = sensors.positions[sensors.is_displacement]
+        anchors = places[spread_points(places, belief("mesh.alike"), 60)]
     families = [
         Family("tissue", tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors)),
         Family("stiffness field", field_columns(at, states)),
@@ -152,8 +151,8 @@ def nuisances_at(
         Family("registration", sensors.rigid * registration_sd()),
     ]
     if mesh_errors is not None:
-        own = mesh_errors.own
-        families.append(Family("mesh", Discretisation().deviation * sensors.answer(own.u, own.reactions)[:, None]))
+        error = mesh_errors.error
+        families.append(Family("mesh", Discretisation().deviation * sensors.answer(error.u, error.reactions)[:, None]))
     families.append(Family("mesh, unknown", _fractional(at, anchors, fraction)))
     return Nuisances(tuple(families), anchors, fraction)
 
@@ -164,9 +163,9 @@ def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaus
     forces = np.zeros((len(theta), system.size, 3))
     for k in range(len(theta)):
         for sign in (-1.0, 1.0):
-            beside = theta.copy()
-            beside[k] += sign * _STEP
-            system.set_materials(_materials(system, states, beside))
+            shifted = theta.copy()
+            shifted[k] += sign * _STEP
+            system.set_materials(_materials(system, states, shifted))
             forces[k] -= sign * at.internal_forces() / (2.0 * _STEP)
     system.set_materials(_materials(system, states, theta))
     return at.answers(forces) @ prior.factor
@@ -192,13 +191,13 @@ def other_volume(states: States) -> Proposal:
 
 
 def _always(states: States, key: str) -> Proposal:
-    """The mechanism of which every tissue has as much as a belief says."""
-    [known] = [mechanism for mechanism in mechanisms().values() if mechanism.always == key]
-    return known.about_law(states.case.poisson, belief(key))
+    """The proposal of the mechanism that every tissue has to a degree given by a belief."""
+    [mechanism] = [candidate for candidate in mechanisms().values() if candidate.always == key]
+    return mechanism.about_law(states.case.poisson, belief(key))
 
 
 def mesh_by_tissue(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:
-    """What the mesh's error adds (n, p) to `tissue_columns`; 0 where the mesh is taken for exact."""
+    """Change (n, p) of the mesh's error by one standard deviation of each tissue parameter; 0 for an exact mesh."""
     if mesh_errors is None:
         return np.zeros((len(sensors), 1))
     return np.column_stack([expected_answer(sensors, change) for change in mesh_errors.by_tissue])
@@ -232,27 +231,29 @@ def _known_loads(at: Linearisation) -> Floats:
     model = at.system.model
     columns = [belief("loads.size") * at.answers(model.external_forces()[None])]
     if model.prescribed.any():
-        moved = (at.stiffness @ model.prescribed.ravel()).reshape(-1, 3)
-        own = at.sensors.answer(model.prescribed, np.where(model.constrained, moved, 0.0))
-        answer = own + at.answers(np.where(model.constrained, 0.0, -moved)[None])[:, 0]
+        forces = (at.stiffness @ model.prescribed.ravel()).reshape(-1, 3)
+        direct = at.sensors.answer(model.prescribed, np.where(model.constrained, forces, 0.0))
+        answer = direct + at.answers(np.where(model.constrained, 0.0, -forces)[None])[:, 0]
         columns.append(belief("loads.size") * answer[:, None])
-    found = np.concatenate(columns, axis=1)
-    return found[:, found.any(axis=0)]
+    all_columns = np.concatenate(columns, axis=1)
+    return all_columns[:, all_columns.any(axis=0)]
 
 
 def _fractional(at: Linearisation, anchors: Floats, fraction: float) -> Floats:
-    """A part of the displacement in any direction, alike among neighbours."""
+    """A part of the displacement in any direction, correlated among neighbours."""
     from scipy.spatial import cKDTree
 
     sensors = at.sensors
     rows = np.flatnonzero(sensors.is_displacement)
     if not len(rows):
         return np.zeros((len(sensors), 0))
-    where = sensors.positions[rows]
-    nearest = cKDTree(at.system.model.mesh.points).query(where)[1]
+    places = sensors.positions[rows]
+    nearest = cKDTree(at.system.model.mesh.points).query(places)[1]
     size = np.linalg.norm(at.u, axis=1)[nearest]
-    near = alike_near(where, anchors, belief("mesh.alike"))
-    found = np.zeros((len(sensors), 3 * len(anchors)))
-    along = sensors.directions[rows]
-    found[rows] = (fraction * size[:, None, None] * near[:, :, None] * along[:, None, :]).reshape(len(rows), -1)
-    return found
+    weights = kernel_columns(places, anchors, belief("mesh.alike"))
+    columns = np.zeros((len(sensors), 3 * len(anchors)))
+    directions = sensors.directions[rows]
+    columns[rows] = (fraction * size[:, None, None] * weights[:, :, None] * directions[:, None, :]).reshape(
+        len(rows), -1
+    )
+    return columns

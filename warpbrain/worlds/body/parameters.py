@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, ...]:
-    """Parameters that differ among proposals, such as a level or a radius: mean and spread over them.
+    """Parameters that differ among proposals, such as a level or a radius: mean and standard deviation over them.
 
     Parameters
     ----------
@@ -25,16 +25,16 @@ def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, .
         Their probabilities, with the sum 1.
     """
     numbers = [numbers_of(effect, np.zeros(effect.columns.shape[1])) for effect in effects]
-    found = []
+    result = []
     for name, (_, unit) in numbers[0].items():
-        values = np.array([one[name][0] if name in one else np.nan for one in numbers])
+        values = np.array([of_effect[name][0] if name in of_effect else np.nan for of_effect in numbers])
         if np.isnan(values).any() or np.ptp(values) == 0.0:
             continue
         mean = float(weights @ values)
-        # half of the step between neighbours is not known either
+        # with the variance of a uniform distribution over the step between neighbours
         step = float(np.ptp(values)) / max(len(np.unique(values)) - 1, 1)
-        found.append(Value(name, mean, float(np.sqrt(weights @ (values - mean) ** 2 + step**2 / 12.0)), unit))
-    return tuple(found)
+        result.append(Value(name, mean, float(np.sqrt(weights @ (values - mean) ** 2 + step**2 / 12.0)), unit))
+    return tuple(result)
 
 
 def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...]:
@@ -45,18 +45,18 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
     """
     if effect.proposed.is_there_or_not:
         return ()
-    here = numbers_of(effect, z)
-    # a covariance that rounding has left not quite positive is no reason to fail
+    parameters = numbers_of(effect, z)
+    # rounding may leave a covariance slightly indefinite
     spread, along = np.linalg.eigh(covariance)
     factor = along * np.sqrt(np.maximum(spread, 1e-18))
-    beside = [(numbers_of(effect, z + 0.1 * column), numbers_of(effect, z - 0.1 * column)) for column in factor.T]
-    found = []
-    for name, (value, unit) in here.items():
-        change = np.array([(up[name][0] - down[name][0]) / 0.2 for up, down in beside if name in up and name in down])
+    shifted = [(numbers_of(effect, z + 0.1 * column), numbers_of(effect, z - 0.1 * column)) for column in factor.T]
+    result = []
+    for name, (value, unit) in parameters.items():
+        change = np.array([(up[name][0] - down[name][0]) / 0.2 for up, down in shifted if name in up and name in down])
         sd = float(np.linalg.norm(change))
         if sd > 0.0:
-            found.append(Value(name, value, sd, unit))
-    return tuple(found)
+            result.append(Value(name, value, sd, unit))
+    return tuple(result)
 
 
 def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
@@ -68,25 +68,25 @@ def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
             "radius": (1e3 * radius, "mm"),
         }
     mechanism: Mechanism = effect.proposed.make(effect.coefficients(z))
-    found: dict[str, tuple[float, str]] = {}
+    parameters: dict[str, tuple[float, str]] = {}
     if mechanism.ramp:
-        found["share"] = (mechanism.factor(), "")
+        parameters["share"] = (mechanism.factor(), "")
     for name, says in mechanism.parameters().items():
         value = getattr(mechanism, name)
         if value is None or isinstance(value, str):
             continue
         numbers = np.ravel(np.asarray(value, dtype=float)) / says.si
         if len(numbers) == 1 or says.adds_up:
-            found[name] = (float(numbers.sum()), says.unit)
+            parameters[name] = (float(numbers.sum()), says.unit)
         if says.kind == "numbers" and len(numbers) > 1:
-            found |= {f"{name}_{k}": (number, says.unit) for k, number in enumerate(numbers.tolist(), 1)}
+            parameters |= {f"{name}_{k}": (number, says.unit) for k, number in enumerate(numbers.tolist(), 1)}
         if len(numbers) == 3 and says.kind in ("vector", "position"):
             unit = says.unit if says.kind == "vector" else "m"
             for axis, number in zip("xyz", numbers.tolist(), strict=True):
-                found[f"{name}_{axis}"] = (number, unit)
+                parameters[f"{name}_{axis}"] = (number, unit)
             if says.kind == "vector":
-                found[f"{name}_size"] = (float(np.linalg.norm(numbers)), unit)
-    return found
+                parameters[f"{name}_size"] = (float(np.linalg.norm(numbers)), unit)
+    return parameters
 
 
 def smallest_of(effect: Effect, whitened_length: float, seen: float, named: float) -> Smallest:
@@ -106,18 +106,18 @@ def smallest_of(effect: Effect, whitened_length: float, seen: float, named: floa
 
 def _size_at(effect: Effect, factor: float) -> tuple[float, str, str]:
     """Size, unit and parameter of an effect that is so many times one standard deviation of its first coefficient."""
-    if effect.proposed.is_there_or_not or effect.about is not None:
+    if effect.proposed.is_there_or_not or effect.columns_at is not None:
         return factor, "of being there", "share"
     z = np.zeros(effect.columns.shape[1])
     start = -effect.proposed.mean / effect.proposed.sd if effect.proposed.follows == "proportional" else z
-    base = numbers_of(effect, start)
+    initial = numbers_of(effect, start)
     z = start.copy()
     z[0] += min(factor, 1e3)
     try:
-        there = numbers_of(effect, z)
+        reached = numbers_of(effect, z)
     except Exception:  # a mechanism refuses sizes that cannot be
         return float("inf"), "", ""
-    for name, (value, unit) in there.items():
-        if name in base and abs(value - base[name][0]) > 0.0:
-            return (abs(value - base[name][0]) if factor < 1e3 else float("inf")), unit, name
+    for name, (value, unit) in reached.items():
+        if name in initial and abs(value - initial[name][0]) > 0.0:
+            return (abs(value - initial[name][0]) if factor < 1e3 else float("inf")), unit, name
     return float("inf"), "", ""

@@ -1,7 +1,7 @@
-"""A mechanism between the places of its scan: a cell about the best place, looked through more finely.
+"""A mechanism between the places of its scan: the cell about the best place, scanned more finely.
 
-The scan stands for the cell about each of its places. So of the finer places in the cell of the best one the mean
-counts for the evidence, and the best of them is where a fit begins.
+Each place of a scan stands for a cell about it. So the evidence of the best one becomes the mean over finer places in
+its cell, and the best of these is where a fit begins.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from warpbrain.inference import GaussianModel
 from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import scaled
-from warpbrain.worlds.body.effects import Effect, Effects
+from warpbrain.worlds.body.effects import Effect
 
 Floats = NDArray[np.float64]
 
@@ -25,23 +25,21 @@ _RADII = (0.8, 1.0, 1.25)
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class BestInCell:
     """The best effect of a cell, and by how much [nats] the mean of the cell is more probable than its middle."""
 
     effect: Effect
     gain: float
 
 
-def placed(
-    base: Base, effects: Effects, effect: Effect, size: float, spacing: float, without: GaussianModel, residual: Floats
-) -> Placed:
-    """Look through the cell of an effect.
+def best_in_cell(
+    base: Base, effect: Effect, size: float, spacing: float, without: GaussianModel, residual: Floats
+) -> BestInCell:
+    """Scan the cell of an effect.
 
     Parameters
     ----------
     base : Base
-    effects : Effects
-        Which makes columns at the state that the model is linear about.
     effect : Effect
         Of a proposal that can be elsewhere.
     size : float
@@ -53,16 +51,15 @@ def placed(
     residual : (n,) array
         Less what is expected of all else.
     """
-    middle = effect
-    gain = 0.0
+    best, gain = effect, 0.0
     for step in (0.5, 0.25):
-        tried = [middle, *effects.of(_around(base, middle, step * spacing))]
-        tried = [tried[0], *(scaled(one, size) for one in tried[1:])]
-        logs = np.array([float(without.with_columns(one.columns).log_density(residual - one.mean)) for one in tried])
+        around = base.effects.of(_around(base, best, step * spacing))
+        tried = [best, *(scaled(other, size) for other in around)]
+        logs = np.array([float(without.with_columns(e.columns).log_density(residual - e.mean)) for e in tried])
         if step == 0.5:
             gain = float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs[0])
-        middle = tried[int(np.argmax(logs))]
-    return Placed(middle, gain)
+        best = tried[int(np.argmax(logs))]
+    return BestInCell(best, gain)
 
 
 def _around(base: Base, effect: Effect, step: float) -> list[Proposal]:
@@ -70,14 +67,14 @@ def _around(base: Base, effect: Effect, step: float) -> list[Proposal]:
     proposed = effect.proposed
     assert proposed.elsewhere is not None and proposed.centre is not None and proposed.radius is not None
     offsets = [np.zeros(3), *(sign * step * axis for axis in np.eye(3) for sign in (-1.0, 1.0))]
-    found = []
+    proposals = []
     for offset, radius in itertools.product(offsets, _RADII):
         centre = proposed.centre + offset
         if proposed.on_surface:
             centre = _on_surface(base, centre)
         if offset.any() or radius != 1.0:
-            found.append(proposed.elsewhere(centre, radius * proposed.radius))
-    return found
+            proposals.append(proposed.elsewhere(centre, radius * proposed.radius))
+    return proposals
 
 
 def _on_surface(base: Base, centre: Floats) -> Floats:

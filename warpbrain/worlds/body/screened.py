@@ -1,4 +1,4 @@
-"""From a case to its sets of causes, weighed in the linear model about its base."""
+"""Screening of a case: its sets of causes, weighed in the linear model about its base."""
 
 from __future__ import annotations
 

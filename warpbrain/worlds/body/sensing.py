@@ -1,4 +1,4 @@
-"""Standard deviation of what was recorded without a declared one: the likeliest beside any smooth force."""
+"""Standard deviation of recordings that declare none: the most likely one given nuisances and a smooth force."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from warpbrain.worlds.body.sensors import Sensors
 
 Floats = NDArray[np.float64]
 
-#: Distance from zero [robust standard deviations] beyond which a row says nothing of the noise of most.
+#: Residual [robust standard deviations] above which a row does not count for the noise.
 _FAR = 3.0
 
 
@@ -33,24 +33,24 @@ def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Float
     lengths = sensors.is_displacement
     size = float(np.sqrt(np.mean(residual[lengths] ** 2))) if lengths.any() else 0.0
     explained = np.column_stack([nuisances, max(size, 1e-9) * field])
-    ordinary = _ordinary(residual, explained)
+    inliers = _inliers(residual, explained)
     for number in undeclared:
         rows = sensors.recordings == number
-        rows = rows & ordinary if (rows & ordinary).any() else rows
+        rows = rows & inliers if (rows & inliers).any() else rows
         scale = max(float(np.sqrt(np.mean(residual[rows] ** 2))), 1e-12)
         low, high = beliefs("noise.undeclared").tolist()
-        tried = scale * np.geomspace(low, high, 25)
-        scores = [_log_density(residual[rows], explained[rows], sigma) for sigma in tried.tolist()]
-        sigma[sensors.recordings == number] = tried[int(np.argmax(scores))]
+        candidates = scale * np.geomspace(low, high, 25)
+        scores = [_log_density(residual[rows], explained[rows], sigma) for sigma in candidates.tolist()]
+        sigma[sensors.recordings == number] = candidates[int(np.argmax(scores))]
     return sigma
 
 
-def _ordinary(residual: Floats, explained: Floats) -> NDArray[np.bool_]:
-    """Rows that a smooth fit leaves no more of than most: a few gross errors must not make a noise of all."""
+def _inliers(residual: Floats, explained: Floats) -> NDArray[np.bool_]:
+    """Rows without outliers from a smooth fit: a few gross errors must not set the noise of all."""
     scale = max(float(np.median(np.abs(residual))), 1e-12)
     W = explained / scale
-    left = residual - explained @ np.linalg.solve(np.eye(W.shape[1]) + W.T @ W, W.T @ (residual / scale))
-    return np.asarray(np.abs(left) <= _FAR * 1.4826 * np.median(np.abs(left)))
+    remaining = residual - explained @ np.linalg.solve(np.eye(W.shape[1]) + W.T @ W, W.T @ (residual / scale))
+    return np.asarray(np.abs(remaining) <= _FAR * 1.4826 * np.median(np.abs(remaining)))
 
 
 def _log_density(residual: Floats, columns: Floats, sigma: float) -> float:

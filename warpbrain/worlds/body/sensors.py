@@ -1,4 +1,4 @@
-"""Everything that was recorded as rows of one linear system: residuals, and what moves them."""
+"""Everything that was recorded as rows of one linear model: residuals, and their derivatives."""
 
 from __future__ import annotations
 
@@ -72,11 +72,11 @@ class Sensors:
 
     @property
     def of_surfaces(self) -> NDArray[np.bool_]:
-        """Which rows are of points of a surface: they are known along its normals alone, each by one number."""
+        """Which rows are of points of a surface: each of these has one number, along the normal."""
         return np.asarray(self.is_displacement & (np.bincount(self.groups)[self.groups] == 1))
 
     def answer(self, du: Floats, dR: Floats) -> Floats:
-        """What changes of displacement and reactions (N, 3) change of what is computed: (n,)."""
+        """Change (n,) of what is computed by changes of displacement and reactions (N, 3)."""
         return np.asarray(self.by_displacement @ du.ravel() + self.by_reactions @ dR.ravel())
 
 
@@ -89,11 +89,11 @@ def rows_of_points(sensors: Sensors) -> list[Ints]:
     return [order[size_of == size].reshape(-1, size) for size in np.unique(size_of).tolist()]
 
 
-def alike_near(where: Floats, anchors: Floats, reach: float) -> Floats:
-    """A random field of variance one at places (k, 3), alike within a reach [m], in columns (k, a) of anchors."""
-    squares = np.sum((where[:, None] - anchors[None]) ** 2, axis=2)
-    near: Any = np.exp(-squares / reach**2)
-    return np.asarray(near / np.sqrt(np.sum(near**2, axis=1, keepdims=True)))
+def kernel_columns(places: Floats, anchors: Floats, reach: float) -> Floats:
+    """Kernel columns (k, a) of anchors: a random field of variance one at places (k, 3), correlated over a reach."""
+    squares = np.sum((places[:, None] - anchors[None]) ** 2, axis=2)
+    weights: Any = np.exp(-squares / reach**2)
+    return np.asarray(weights / np.sqrt(np.sum(weights**2, axis=1, keepdims=True)))
 
 
 #: What was recorded at a time, with displacement and reactions (N, 3) then.
@@ -104,15 +104,15 @@ def sensors_at(instants: Sequence[Instant], centre: Floats) -> Sensors:
     """The rows of all recordings at the states of one or several times; `centre` as in `Observations.at`."""
     from scipy.sparse import vstack
 
-    parts = [one for time, observations, u, R in instants for one in _rows(time, observations, u, R, centre)]
+    parts = [row for time, observations, u, R in instants for row in _rows(time, observations, u, R, centre)]
     states = [(u, R) for _, observations, u, R in instants for _ in observations.recordings]
     first = np.cumsum([0, *(len(part.values) for _, _, part in parts)])
     sizes = [part.values.size for _, _, part in parts]
-    repeat = [one.size for _, one, _ in parts]
-    names = tuple(dict.fromkeys(one.name for _, one, _ in parts))
+    repeat = [observation.size for _, observation, _ in parts]
+    names = tuple(dict.fromkeys(observation.name for _, observation, _ in parts))
     rigid = np.concatenate([part.rigid.reshape(-1, 6) for _, _, part in parts])
-    sigma = [np.full(len(one.rows), np.nan) if one.sigma is None else one.sigma for _, one, _ in parts]
-    nowhere = [one.positions if len(one.positions) else np.full((len(one.rows), 3), np.nan) for _, one, _ in parts]
+    sigma = [np.full(len(o.rows), np.nan) if o.sigma is None else o.sigma for _, o, _ in parts]
+    positions = [o.positions if len(o.positions) else np.full((len(o.rows), 3), np.nan) for _, o, _ in parts]
     numbers = [start + np.arange(len(part.values)) for start, (_, _, part) in zip(first, parts, strict=False)]
     return Sensors(
         np.concatenate([part.values.ravel() for _, _, part in parts]),
@@ -125,11 +125,11 @@ def sensors_at(instants: Sequence[Instant], centre: Floats) -> Sensors:
         vstack([part.by_displacement for _, _, part in parts]).tocsr(),
         vstack([part.by_reactions for _, _, part in parts]).tocsr(),
         rigid,
-        np.concatenate([np.repeat(own, size) for own, size in zip(sigma, repeat, strict=True)]),
-        np.concatenate([np.repeat(where, size, axis=0) for where, size in zip(nowhere, repeat, strict=True)]),
+        np.concatenate([np.repeat(values, size) for values, size in zip(sigma, repeat, strict=True)]),
+        np.concatenate([np.repeat(where, size, axis=0) for where, size in zip(positions, repeat, strict=True)]),
         rigid[:, :3].copy(),
-        np.concatenate([np.repeat(own, size) for own, size in zip(numbers, repeat, strict=True)]),
-        np.repeat([names.index(one.name) for _, one, _ in parts], sizes),
+        np.concatenate([np.repeat(values, size) for values, size in zip(numbers, repeat, strict=True)]),
+        np.repeat([names.index(observation.name) for _, observation, _ in parts], sizes),
         np.repeat([time for time, _, _ in parts], sizes),
         names,
     )
@@ -139,7 +139,7 @@ def _rows(
     time: float, observations: Observations, u: Floats, reactions: Floats, centre: Floats
 ) -> list[tuple[float, Observation, Residuals]]:
     parts = observations.at(u, reactions, centre)
-    return [(time, one, part) for one, part in zip(observations.recordings, parts, strict=True)]
+    return [(time, observation, part) for observation, part in zip(observations.recordings, parts, strict=True)]
 
 
 def tracked_points(mesh: TetMesh, points: Floats, centre: Floats) -> Sensors:
@@ -175,7 +175,7 @@ def spread_points(points: Floats, spacing: float, most: int = 2000) -> Ints:
 
 @lru_cache(maxsize=16)
 def _spread(points_as_bytes: bytes, spacing: float, most: int) -> Ints:
-    """The same of points given as bytes: every state of a diagnosis asks for sites of the same nodes."""
+    """The same of points given as bytes, cached: every state of a diagnosis samples the same nodes."""
     from scipy.spatial.distance import cdist
 
     points = np.frombuffer(points_as_bytes).reshape(-1, 3)
@@ -186,6 +186,6 @@ def _spread(points_as_bytes: bytes, spacing: float, most: int) -> Ints:
     while len(chosen) < most and distance.max() > spacing:
         chosen.append(int(np.argmax(distance)))
         distance = np.minimum(distance, cdist(points, points[chosen[-1:]])[:, 0])
-    found = np.array(chosen, dtype=np.int64)
-    found.flags.writeable = False
-    return found
+    numbers = np.array(chosen, dtype=np.int64)
+    numbers.flags.writeable = False
+    return numbers

@@ -1,4 +1,4 @@
-"""Columns of which most are zero almost everywhere, side by side: what thousands of patches do to one mesh."""
+"""A sparse matrix collected column by column, such as the forces of thousands of patches on one mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 
 
 class SparseColumns:
-    """Collects columns of one length; of those that are zero nothing is kept.
+    """Collects columns of one length; those that are zero are left out.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class SparseColumns:
 
     def add(self, number: int, column: Floats) -> None:
         """Add a column (size,)."""
-        # of numbers it takes eight times as long as of truth values
+        # `flatnonzero` of booleans is eight times as fast as of numbers
         rows = np.flatnonzero(column != 0.0)
         if len(rows):
             self.numbers.append(number)

@@ -1,4 +1,4 @@
-"""States of a case under hypotheses: other tissue, a stiffness field, one or several mechanisms more."""
+"""States of a case under hypotheses: other tissue, a stiffness field, further mechanisms."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _SHORT = (1e-3, 0.1, 0.4)
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """What is taken to be so.
+    """Tissue, stiffness field and mechanisms that a state is computed with.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Hypothesis:
     mechanisms : tuple of Mechanism
         Beside those of the case.
     patches : tuple of Patch
-        What the case's boundaries no longer hold.
+        Nodes that the case's boundaries no longer hold.
     """
 
     theta: Floats
@@ -73,8 +73,8 @@ class SolvedState:
     system : System
     u, reactions : (N, 3) array
     sensors : Sensors
-        There, the expected error of the mesh put right: with walls where they are, not where elements that are too
-        stiff leave them, or a point in a narrow ventricle is taken for one of the other wall.
+        At that state, corrected by the expected error of the mesh: with walls where elements that are too stiff leave
+        them a point in a narrow ventricle would be taken for one of the opposite wall.
     course : tuple of (N, 3) arrays
         Displacement [m] at each of `steps_to` where it was followed over time; empty where it was not.
     """
@@ -98,7 +98,7 @@ class States:
     Attributes
     ----------
     times : tuple of float
-        Recorded ones [s], increasing; infinity alone where no times were recorded, or they do not matter.
+        Recorded ones [s], increasing; infinity alone if no times were recorded, or they do not matter.
     motion : (6,) array
         Rigid motion that recordings are taken to have been moved by.
     solves : int
@@ -117,22 +117,23 @@ class States:
         self._factors: dict[tuple[str, ...], KeptFactors | None] = {}
 
     def realign(self, motion: Floats) -> None:
-        """Take recordings for moved by a rigid motion (6,); see `realigned`."""
+        """Move recordings back by a rigid motion (6,); see `realigned`."""
         self.motion = motion
         case = realigned(self.case, motion, self.centre)
         self.observations = tuple(Observations.to_fit(case, None if np.isinf(time) else time) for time in self.times)
 
     def case_of(self, hypothesis: Hypothesis) -> Case:
-        """The case that a user would write for a hypothesis, but for the stiffness field."""
+        """The case as a user would write it for a hypothesis, without the stiffness field."""
         applied = self.parameters.applied(self.case, hypothesis.theta)
         mesh, boundaries = _released(applied, hypothesis.patches)
         return replace(applied, mesh=mesh, boundaries=boundaries, mechanisms=self._acting(hypothesis))
 
     def _acting(self, hypothesis: Hypothesis) -> tuple[Mechanism, ...]:
-        """The case's own mechanisms, but of a kind that a case has one of the hypothesis' own."""
-        new = hypothesis.mechanisms
-        kept = (m for m in self.case.mechanisms if all(one.several or one.kind != m.kind for one in new))
-        return (*kept, *new)
+        """Mechanisms of the case and of the hypothesis, which replace those of a kind of which a case has only one."""
+        added = hypothesis.mechanisms
+        replaced = {mechanism.kind for mechanism in added if not mechanism.several}
+        kept = (mechanism for mechanism in self.case.mechanisms if mechanism.kind not in replaced)
+        return (*kept, *added)
 
     def materials(self, hypothesis: Hypothesis) -> Mapping[int, Material]:
         """Those of a hypothesis, by label."""
@@ -155,7 +156,7 @@ class States:
         start : (N, 3) array, optional
             A displacement [m] that is near to it.
         expected : Difference, optional
-            What it lacks of the state without the error of the mesh; sensors are there.
+            Expected error of the mesh, by which the sensors are corrected.
         course : sequence of (N, 3) arrays, optional
             Of a state that is near to it, if it is followed over time.
         iterations : int
@@ -174,17 +175,17 @@ class States:
         system = self._system(hypothesis)
         model, external = system.model, system.model.external_forces()
         options = EquilibriumOptions(tolerance=TOLERANCE, max_total_newton=iterations)
-        # relaxing stress or fluid of its own: what a term has in its memory beside that changes no state in time
+        # relaxing stress or a fluid of its own: no other memory of a term changes a state in time
         in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
         if in_time and np.isfinite(self.times[0]):
-            near = course or (() if start is None else (start,))
-            moments = follow_slowly(system, steps_to(self.times), options, near=near, factors=self._factors_of(system))
-            found = {moment.time: moment.state for moment in moments}
-            course = tuple(state.u for state in found.values())
-            states = [found[time] for time in self.times]
+            starts, factors = course or (() if start is None else (start,)), self._factors_of(system)
+            moments = follow_slowly(system, steps_to(self.times), options, near=starts, factors=factors)
+            by_time = {moment.time: moment.state for moment in moments}
+            course = tuple(state.u for state in by_time.values())
+            states = [by_time[time] for time in self.times]
         else:
             course = ()
-            # on a CPU conjugate gradients have found a single state as soon as factors are made
+            # on a CPU conjugate gradients solve a single state in the time that factors take
             factors = None if system.device.is_cpu else self._factors_of(system)
             if nearby is not None and start is not None:
                 start = nearby.toward_equilibrium(system, external, start, TOLERANCE)
@@ -200,10 +201,13 @@ class States:
 
     def _sensors(self, moments: Sequence[tuple[Floats, Floats]], expected: Difference | None) -> Sensors:
         if expected is not None:
-            # known of the end; before it as much smaller as the state is
+            # known for the end; earlier in proportion to the state
             u_end, reactions_end = moments[-1]
             moments = [
-                (u + _part(u, u_end) * expected.u, reactions + _part(reactions, reactions_end) * expected.reactions)
+                (
+                    u + _projection(u, u_end) * expected.u,
+                    reactions + _projection(reactions, reactions_end) * expected.reactions,
+                )
                 for u, reactions in moments
             ]
         parts = zip(self.times, self.observations, moments, strict=True)
@@ -224,7 +228,7 @@ class States:
         try:
             model, _ = model_of(self.case_of(hypothesis))
         except CompositionError as error:
-            # there is no such state, as of loads without an equilibrium
+            # treated like loads without an equilibrium
             raise SolveError(str(error)) from None
         if hypothesis.field.any():
             field = StiffnessField(log_factor=self.modes @ hypothesis.field)
@@ -232,24 +236,24 @@ class States:
         return System(model, self.device)
 
 
-def _part(of: Floats, whole: Floats) -> float:
-    """How many times the one (N, 3) the other is, as far as it is alike."""
+def _projection(field: Floats, whole: Floats) -> float:
+    """Coefficient of the projection of a field (N, 3) on another one."""
     square = float(np.vdot(whole, whole))
-    return float(np.vdot(of, whole)) / square if square > 0.0 else 1.0
+    return float(np.vdot(field, whole)) / square if square > 0.0 else 1.0
 
 
 def steps_to(times: Sequence[float]) -> list[float]:
     """Times [s] of the steps from rest to the last recorded one: short ones after the load, longer ones later."""
-    found = [times[0] * part for part in _SHORT]
+    steps = [times[0] * part for part in _SHORT]
     for before, after in itertools.pairwise((0.0, *times)):
-        found += [before + part * (after - before) for part in (() if before == 0.0 else (0.3, 0.6))]
-        # the very number by which states are asked for, not a sum that rounds to another
-        found.append(after)
-    return found
+        steps += [before + part * (after - before) for part in (() if before == 0.0 else (0.3, 0.6))]
+        # exactly the number by which states are looked up, not a sum that rounds differently
+        steps.append(after)
+    return steps
 
 
 def _released(case: Case, patches: tuple[Patch, ...]) -> tuple[TetMesh, tuple[Boundary, ...]]:
-    """Mesh and boundaries of a case that no longer holds some nodes, which are node sets then."""
+    """Mesh and boundaries of a case that no longer holds some nodes, which become node sets."""
     if not patches:
         return case.mesh, case.boundaries
     nodes = case.remaining[1]
@@ -281,10 +285,10 @@ def recorded_times(case: Case) -> tuple[float, ...]:
     for recording in fitted:
         times = getattr(recording, "time", None)
         series.append(set() if times is None else set(np.unique(times).tolist()))
-    found = sorted(set.intersection(*series)) if series else []
-    if len(found) < 2 or found[0] <= 0.0:
+    common = sorted(set.intersection(*series)) if series else []
+    if len(common) < 2 or common[0] <= 0.0:
         return (np.inf,)
-    ramps = [ramp for one in (*case.boundaries, *case.mechanisms) if (ramp := getattr(one, "ramp", ()))]
-    changing = any(ramp[-1][0] > found[0] for ramp in ramps)
+    ramps = [ramp for acting in (*case.boundaries, *case.mechanisms) if (ramp := getattr(acting, "ramp", ()))]
+    changing = any(ramp[-1][0] > common[0] for ramp in ramps)
     moving = any(getattr(boundary, "has_history", False) for boundary in case.boundaries)
-    return (np.inf,) if changing or moving else tuple(found)
+    return (np.inf,) if changing or moving else tuple(common)

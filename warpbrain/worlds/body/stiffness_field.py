@@ -1,7 +1,7 @@
-"""Stiffness that varies from place to place within tissues: a nuisance, never named.
+"""Stiffness that varies from place to place within tissues: a nuisance, never a cause.
 
-`ln mu(X)` has a normal distribution with a squared exponential covariance. Its largest modes are found from some of the
-elements and carried to all of them (Nystroem's method; Williams and Seeger 2001).
+`ln mu(X)` has a normal distribution with a squared exponential covariance. Its largest modes are computed on some
+of the elements and extended to all of them (Nystroem's method; Williams and Seeger 2001).
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ Floats = NDArray[np.float64]
 def stiffness_modes(mesh: TetMesh, count: int | None = None) -> Floats:
     """Modes (m, count) of `ln mu` of each element, each times its standard deviation."""
     count = int(belief("tissue.field_modes")) if count is None else count
-    some = mesh.centres[spread_points(mesh.centres, 0.5 * belief("tissue.field_reach"), 400)]
-    values, vectors = np.linalg.eigh(_covariance(some, some))
+    sites = mesh.centres[spread_points(mesh.centres, 0.5 * belief("tissue.field_reach"), 400)]
+    values, vectors = np.linalg.eigh(_covariance(sites, sites))
     largest = np.argsort(values)[::-1][:count]
-    return np.asarray(_covariance(mesh.centres, some) @ vectors[:, largest] / np.sqrt(values[largest]))
+    return np.asarray(_covariance(mesh.centres, sites) @ vectors[:, largest] / np.sqrt(values[largest]))
 
 
 def _covariance(a: Floats, b: Floats) -> Floats:

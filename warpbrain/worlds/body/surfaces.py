@@ -1,7 +1,7 @@
 """The free surfaces of a case by name: node sets that it declares, and sets made for the others.
 
-Every connected surface that nothing holds is a place on which something may act, whether a case declares a node set for
-it or not. What is said of one that has no set must be something that a `case.toml` can say: it gets a set of its own.
+Something may act on every connected surface that nothing holds, whether a case declares a node set for it or not. A
+surface without a set gets one, so that a `case.toml` can refer to it.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from warpbrain.mesh.surface import in_rows
 
 Bools = NDArray[np.bool_]
 
-#: What people call the wall that a resection leaves, and the outside.
+#: Names of the wall that a resection leaves, and of the outside.
 WALL, OUTSIDE = "wall of the cavity", "outer surface"
-#: Where in a body one of several alike is, by axis: the lower end of it, and the upper (RAS).
+#: Names of the lower and the upper end of each axis (RAS).
 _SIDES = (("left", "right"), ("back", "front"), ("lower", "upper"))
 #: Words in the names of a brain's tissues: a void within it is a ventricle.
 _OF_BRAIN = ("matter", "brain", "cortex", "cerebr")
@@ -49,21 +49,23 @@ def free_surfaces(case: Case) -> tuple[FreeSurface, ...]:
     """
     mesh, _ = case.remaining
     held = held_nodes(case)
-    parts = [(words, set_of(mesh, part), part.origin) for words, part in _called(case, connected_parts(case))]
+    parts = [(words, set_of(mesh, part), part.origin) for words, part in _named_parts(case, connected_parts(case))]
     used = {boundary.nodes for boundary in case.boundaries}
     corners = rim_corners(mesh)
-    taken = {_key(free_faces(mesh, mesh.node_sets[name], held), corners) for name in used}
+    known = {_triangles_key(free_faces(mesh, mesh.node_sets[name], held), corners) for name in used}
     walls = {
-        _key(free_faces(mesh, members, held), corners): words for words, members, origin in parts if origin == "cut"
+        _triangles_key(free_faces(mesh, members, held), corners): words
+        for words, members, origin in parts
+        if origin == "cut"
     }
-    found: list[FreeSurface] = []
+    surfaces: list[FreeSurface] = []
 
     def add(name: str, words: str, members: Bools) -> None:
         faces = free_faces(mesh, members, held)
-        key = _key(faces, corners)
-        if len(faces) and key not in taken:
-            taken.add(key)
-            found.append(FreeSurface(name, walls.get(key, words), members, faces))
+        key = _triangles_key(faces, corners)
+        if len(faces) and key not in known:
+            known.add(key)
+            surfaces.append(FreeSurface(name, walls.get(key, words), members, faces))
 
     for name, members in mesh.node_sets.items():
         if name not in used:
@@ -73,10 +75,10 @@ def free_surfaces(case: Case) -> tuple[FreeSurface, ...]:
         add(case.resection.elements, WALL, nodes_of(mesh.cut, len(mesh.points)))
     names = {*mesh.node_sets, *mesh.element_sets}
     for words, members, _ in parts:
-        name = _new(words.replace(" ", "-"), names)
+        name = _unused(words.replace(" ", "-"), names)
         names.add(name)
         add(name, words, members)
-    return tuple(found)
+    return tuple(surfaces)
 
 
 def connected_parts(case: Case) -> list[FreePart]:
@@ -104,36 +106,36 @@ def with_sets_that_act(case: Case, declared: TetMesh) -> Case:
     for mechanism in case.mechanisms:
         kinds = mechanism.parameters().items()
         named |= {getattr(mechanism, name) for name, says in kinds if says.kind == "node set"}
-    sets, own = case.mesh.node_sets.items(), declared.node_sets
-    kept = {name: members for name, members in sets if name in own or name in named}
+    sets, declared_sets = case.mesh.node_sets.items(), declared.node_sets
+    kept = {name: members for name, members in sets if name in declared_sets or name in named}
     return replace(case, mesh=case.mesh.with_node_sets(kept))
 
 
-def _key(faces: NDArray[np.int32], corners: NDArray[np.int32]) -> bytes:
-    """Of the same triangles the same, whether or not they hold corners of a cut."""
-    own = faces[~in_rows(faces, corners)]
-    rows = np.sort(own if len(own) else faces, axis=1)
+def _triangles_key(faces: NDArray[np.int32], corners: NDArray[np.int32]) -> bytes:
+    """A key that is equal for equal triangles, those with corners of a cut left out."""
+    inner = faces[~in_rows(faces, corners)]
+    rows = np.sort(inner if len(inner) else faces, axis=1)
     return rows[np.lexsort(rows.T)].tobytes()
 
 
-def _called(case: Case, parts: Sequence[FreePart]) -> Iterator[tuple[str, FreePart]]:
-    """Parts, and what people call them: of several alike by where they are."""
+def _named_parts(case: Case, parts: Sequence[FreePart]) -> Iterator[tuple[str, FreePart]]:
+    """Parts with their names: those of the same kind are told apart by where they are."""
     inside = np.zeros(len(case.remaining[0].points), dtype=bool)
     for part in parts:
         if part.origin == "inner":
             inside[part.faces] = True
-    alike: dict[str, list[FreePart]] = {}
+    by_word: dict[str, list[FreePart]] = {}
     for part in parts:
-        alike.setdefault(_word(case, part, inside), []).append(part)
-    for word, own in alike.items():
-        centres = np.array([part.centre for part in own])
+        by_word.setdefault(_name_of(case, part, inside), []).append(part)
+    for word, of_word in by_word.items():
+        centres = np.array([part.centre for part in of_word])
         axis = int(np.ptp(centres, axis=0).argmax())
         for rank, number in enumerate(np.argsort(centres[:, axis]).tolist()):
-            yield _placed(word, _SIDES[axis], rank, len(own)), own[number]
+            yield _with_side(word, _SIDES[axis], rank, len(of_word)), of_word[number]
 
 
-def _placed(word: str, sides: tuple[str, str], rank: int, count: int) -> str:
-    """A word for one of some along an axis."""
+def _with_side(word: str, sides: tuple[str, str], rank: int, count: int) -> str:
+    """The name of one of several parts of a kind, in their order along an axis."""
     if count == 1:
         return word
     before, _, after = word.partition(" of ")
@@ -142,8 +144,8 @@ def _placed(word: str, sides: tuple[str, str], rank: int, count: int) -> str:
     return f"{end} {before}{f' of {after}' if after else ''}{number}"
 
 
-def _word(case: Case, part: FreePart, inside: Bools) -> str:
-    """What one of its kind is called; of a void what the set of voids is that it is a part of, if there is one."""
+def _name_of(case: Case, part: FreePart, inside: Bools) -> str:
+    """The name of a part of a kind; of a void that of the node set that it is a part of, if there is one."""
     if part.origin != "inner":
         return WALL if part.origin == "cut" else OUTSIDE
     mesh, _ = case.remaining
@@ -155,10 +157,10 @@ def _word(case: Case, part: FreePart, inside: Bools) -> str:
     return "ventricle" if of_brain else "wall of the void"
 
 
-def _new(name: str, taken: set[str]) -> str:
-    """A name that nothing has."""
-    number, found = 1, name
-    while found in taken:
+def _unused(name: str, names: set[str]) -> str:
+    """A name that is not yet used."""
+    number, candidate = 1, name
+    while candidate in names:
         number += 1
-        found = f"{name}-{number}"
-    return found
+        candidate = f"{name}-{number}"
+    return candidate

@@ -1,4 +1,4 @@
-"""States with a mechanism that no derivative stands for: solved anew, and remembered."""
+"""Effects of switches, such as contact, that have no derivative: states with them are solved, and kept."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from warpbrain.worlds.body.states import SolvedState, States
 
 Floats = NDArray[np.float64]
 
-#: Iterations after which a state beside the base is taken not to exist: those that do take 3 to 18.
+#: Newton iterations after which a state is taken not to exist: those that exist take 3 to 18.
 _ITERATIONS = 30
 
 
-class Solving:
-    """Answers of the sensors to what is solved anew beside a state.
+class SolvedSwitches:
+    """Effects of mechanisms on the sensors by solving the state with each.
 
     Parameters
     ----------
@@ -26,20 +26,22 @@ class Solving:
     state : SolvedState
         Without the mechanisms.
     sensors : Sensors
-        Whose answers are asked for.
-    known : dict of str to SolvedState
-        States that were solved already, by what acts there; more are put there.
+        Whose response is computed.
+    solved_states : dict of str to SolvedState
+        States that were solved already, by the mechanism; further ones are added.
     """
 
-    def __init__(self, states: States, state: SolvedState, sensors: Sensors, known: dict[str, SolvedState]) -> None:
+    def __init__(
+        self, states: States, state: SolvedState, sensors: Sensors, solved_states: dict[str, SolvedState]
+    ) -> None:
         self._states, self._state, self._sensors = states, state, sensors
-        self.known = known
+        self._solved_states = solved_states
 
-    def there(self, mechanism: Mechanism) -> Floats:
-        """Of the state with the mechanism, less those without it: (n,)."""
+    def effect_of(self, mechanism: Mechanism) -> Floats:
+        """What sensors (n,) record in the state with a mechanism, less that without it."""
         key, state = repr(mechanism), self._state
-        if key not in self.known:
-            asked = replace(state.hypothesis, mechanisms=(mechanism,))
-            self.known[key] = self._states.solve(asked, state.u, iterations=_ITERATIONS)
-        solved = self.known[key]
+        if key not in self._solved_states:
+            hypothesis = replace(state.hypothesis, mechanisms=(mechanism,))
+            self._solved_states[key] = self._states.solve(hypothesis, state.u, iterations=_ITERATIONS)
+        solved = self._solved_states[key]
         return self._sensors.answer(solved.u - state.u, solved.reactions - state.reactions)

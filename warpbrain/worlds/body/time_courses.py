@@ -1,12 +1,11 @@
-"""How something may have come while recordings were made: parts of its full size over the recorded times.
+"""Time courses of a cause that sets in while recordings are made: its size over the recorded times.
 
-Between two recorded times nothing is known of when it began, so what is told apart is the interval: before the first
-time, or between two that follow each other. What begins there comes all at once, grows evenly, or nears its full size
-ever more slowly,
+Recordings tell only the interval in which it sets in: before the first time, or between two consecutive ones. From then
+on it is there all at once, grows evenly, or approaches its full size exponentially,
 
     f(t) = 1,    (t - t0) / (T - t0),    1 - exp(-3 (t - t0) / (T - t0)),      f = 0 before,
 
-`t0` the beginning of the interval and `T` the last time. What begins before the last time alone has no course.
+`t0` the beginning of the interval and `T` the last time. A cause that is seen at the last time alone has no course.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 AT_ONCE, EVENLY, SLOWER = "all at once", "growing evenly", "growing ever more slowly"
-#: From the part of the time that has gone by since the beginning.
+#: Size over the elapsed part of the time from onset to the last recording.
 _SHAPES: dict[str, Callable[[Floats], Floats]] = {
     AT_ONCE: np.ones_like,
     EVENLY: lambda part: part,
@@ -30,7 +29,7 @@ _SHAPES: dict[str, Callable[[Floats], Floats]] = {
 
 @dataclass(frozen=True)
 class TimeCourse:
-    """One way.
+    """An interval of onset and a shape.
 
     Attributes
     ----------
@@ -56,16 +55,17 @@ class TimeCourse:
 
 
 def time_courses(times: Sequence[float]) -> list[TimeCourse]:
-    """All ways for recorded times [s]; what is always there alone where there is one time or none."""
+    """All courses for recorded times [s]; with one time or none only that of a constant cause."""
     if len(times) < 2:
         return [TimeCourse(0, 0.0, np.inf, AT_ONCE)]
-    found = []
+    courses = []
     for number, begin in enumerate((0.0, *times[:-1])):
         shapes = (AT_ONCE,) if number == len(times) - 1 else tuple(_SHAPES)
-        found += [TimeCourse(number, begin, times[-1], shape) for shape in shapes]
-    return found
+        courses += [TimeCourse(number, begin, times[-1], shape) for shape in shapes]
+    return courses
 
 
 def main_courses(times: Sequence[float]) -> list[TimeCourse]:
-    """Fewer ways that stand for all: all at once in each interval, or evenly from the beginning on."""
-    return [one for one in time_courses(times) if one.shape == AT_ONCE or (one.interval == 0 and one.shape == EVENLY)]
+    """A representative subset of the courses: all at once in each interval, or evenly from the beginning on."""
+    courses = time_courses(times)
+    return [c for c in courses if c.shape == AT_ONCE or (c.interval == 0 and c.shape == EVENLY)]

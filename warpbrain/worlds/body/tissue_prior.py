@@ -1,4 +1,4 @@
-"""What is believed of a case's tissues before its recordings: the generative model's word, or the case's own."""
+"""Prior of a case's tissues: that of the generative model, or about the laws that the case declares."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from warpbrain.estimation.prior_modes import prior_modes, prior_of
 Floats = NDArray[np.float64]
 
 #: Standard deviations where no study is named: of a log modulus, of a share of C2, of an exponent.
-_OWN = {"ln(mu0 / Pa)": 0.5, "C2 / (C1 + C2)": 0.2, "alpha": 3.0}
+_DEVIATIONS = {"ln(mu0 / Pa)": 0.5, "C2 / (C1 + C2)": 0.2, "alpha": 3.0}
 
 
 def tissue_prior(case: Case, parameters: Parameters) -> Gaussian:
@@ -27,14 +27,14 @@ def tissue_prior(case: Case, parameters: Parameters) -> Gaussian:
         modes = prior_modes(prior_of(case), parameters)
     except (InputError, SolveError):
         mean = declared(case, parameters)
-        sd = np.array([_OWN[parameter.coordinate.name] for parameter in parameters])
+        sd = np.array([_DEVIATIONS[parameter.coordinate.name] for parameter in parameters])
         return Gaussian(mean, np.diag(sd**2))
     try:
-        own = declared(case, parameters)
+        theta = declared(case, parameters)
     except InputError:
         return modes[0].gaussian
-    inside = [mode for mode in modes if np.all((own >= mode.low) & (own <= mode.high))]
-    return (inside or list(modes))[0].gaussian
+    matching = [mode for mode in modes if np.all((theta >= mode.low) & (theta <= mode.high))]
+    return (matching or list(modes))[0].gaussian
 
 
 def declared(case: Case, parameters: Parameters) -> Floats:

@@ -1,8 +1,8 @@
-"""What acts and has no name: smooth random fields of body force, eigenstress and traction, as columns over sensors.
+"""Unknown causes: smooth random fields of body force, eigenstress and traction, as columns over sensors.
 
 Each field is a sum of Gaussian patches with independent coefficients, a Gaussian process of that length. An eigenstress
 `s` acts within the body: its nodal forces `-V s grad N` have no net force and no moment. Columns are of 1 m root mean
-square over the displacements that were recorded, cut to the modes that the sensors see.
+square over the recorded displacements, truncated to the modes that the sensors see.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ def force_patches(at: Linearisation, length: float, spacing: float | None = None
 
 
 def _patches(
-    at: Linearisation, where: Floats, shares: Floats, length: float, spacing: float | None
+    at: Linearisation, places: Floats, shares: Floats, length: float, spacing: float | None
 ) -> tuple[Floats, Floats]:
     from scipy.spatial.distance import cdist
 
     points = at.system.model.mesh.points
-    sites = where[spread_points(where, length if spacing is None else spacing, 700)]
+    sites = places[spread_points(places, length if spacing is None else spacing, 700)]
     weights = shares[:, None] * np.exp(-0.5 * (cdist(points, sites) / length) ** 2)
-    # a share that falls on what is held moves nothing
+    # the share on held nodes moves nothing
     weights /= np.maximum(weights.sum(axis=0), 1e-300)
     return sites, at.answers_of_patches(weights)
 
@@ -46,7 +46,8 @@ def _patches(
 def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Floats, ...]:
     """Columns (n, k) of a body force of each length [m]."""
     answers = [force_patches(at, length)[1] for length in lengths]
-    return tuple(in_threads(lambda own: _seen(own.reshape(len(own), -1), at.sensors.is_displacement), answers))
+    rows = at.sensors.is_displacement
+    return tuple(in_threads(lambda answer: _visible_modes(answer.reshape(len(answer), -1), rows), answers))
 
 
 def tractions(at: Linearisation, length: float) -> Floats:
@@ -57,7 +58,7 @@ def tractions(at: Linearisation, length: float) -> Floats:
     if not free.any():
         return np.zeros((len(at.sensors), 0))
     _, answers = _patches(at, model.mesh.points[free], np.where(free, shares, 0.0), length, None)
-    return _seen(answers.reshape(len(answers), -1), at.sensors.is_displacement)
+    return _visible_modes(answers.reshape(len(answers), -1), at.sensors.is_displacement)
 
 
 def eigenstresses(at: Linearisation, length: float) -> Floats:
@@ -67,10 +68,10 @@ def eigenstresses(at: Linearisation, length: float) -> Floats:
     mesh = at.system.model.mesh
     sites = mesh.centres[spread_points(mesh.centres, length, 700)]
     weights = np.exp(-0.5 * (cdist(mesh.centres, sites) / length) ** 2)
-    # where the elements are now: there a symmetric stress has no moment
+    # on deformed elements, where a symmetric stress has no moment
     forces = _unit_stresses((mesh.points + at.u)[at.system.tetrahedra])
     columns = [at.answers_of_elements(forces[component], weights) for component in range(len(_PAIRS))]
-    return _seen(np.concatenate(columns, axis=1), at.sensors.is_displacement)
+    return _visible_modes(np.concatenate(columns, axis=1), at.sensors.is_displacement)
 
 
 def _unit_stresses(corners: Floats) -> Floats:
@@ -79,18 +80,18 @@ def _unit_stresses(corners: Floats) -> Floats:
     volumes = np.abs(np.linalg.det(edges)) / 6.0
     gradients = np.linalg.inv(edges).transpose(0, 2, 1)
     shapes = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1) * volumes[:, None, None]
-    found = np.zeros((len(_PAIRS), *shapes.shape))
+    forces = np.zeros((len(_PAIRS), *shapes.shape))
     for number, (i, j) in enumerate(_PAIRS):
-        # all of the same Frobenius norm, so that no direction is another than others
-        found[number, :, :, i] += np.sqrt(0.5) * shapes[:, :, j]
-        found[number, :, :, j] += np.sqrt(0.5) * shapes[:, :, i]
+        # all of the same Frobenius norm, for isotropy
+        forces[number, :, :, i] += np.sqrt(0.5) * shapes[:, :, j]
+        forces[number, :, :, j] += np.sqrt(0.5) * shapes[:, :, i]
         if i == j:
-            found[number] *= np.sqrt(0.5)
-    return found
+            forces[number] *= np.sqrt(0.5)
+    return forces
 
 
 def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Floats]) -> dict[str, Floats]:
-    """Columns of every field, by what it is of.
+    """Columns of every field by its name.
 
     Parameters
     ----------
@@ -100,20 +101,21 @@ def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Floats]
     forces : sequence of (n, k) arrays
         `body_forces` of these lengths.
     """
-    found = {f"body force, {1e3 * length:.0f} mm": own for length, own in zip(lengths, forces, strict=True)}
+    names = [f"body force, {1e3 * length:.0f} mm" for length in lengths]
+    columns_by_name = dict(zip(names, forces, strict=True))
     for length in lengths:
-        found[f"eigenstress, {1e3 * length:.0f} mm"] = eigenstresses(at, length)
-        found[f"traction, {1e3 * length:.0f} mm"] = tractions(at, length)
-    return {name: columns for name, columns in found.items() if columns.shape[1]}
+        columns_by_name[f"eigenstress, {1e3 * length:.0f} mm"] = eigenstresses(at, length)
+        columns_by_name[f"traction, {1e3 * length:.0f} mm"] = tractions(at, length)
+    return {name: columns for name, columns in columns_by_name.items() if columns.shape[1]}
 
 
-def _seen(columns: Floats, rows: NDArray[np.bool_]) -> Floats:
+def _visible_modes(columns: Floats, rows: NDArray[np.bool_]) -> Floats:
     """The modes (n, k) of columns that displacements, in some of the rows (n,), see."""
-    # modes of displacements: forces that were recorded have another unit, and would be all that counts
+    # modes of displacements alone: recorded forces have another unit, and would dominate
     rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
-    squares, left = np.linalg.eigh(columns[rows] @ columns[rows].T)
-    sizes, left = np.sqrt(np.maximum(squares[::-1], 0.0)), left[:, ::-1]
+    squares, vectors = np.linalg.eigh(columns[rows] @ columns[rows].T)
+    sizes, vectors = np.sqrt(np.maximum(squares[::-1], 0.0)), vectors[:, ::-1]
     total = np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)
     kept = min(int(np.searchsorted(total, 1.0 - belief("unknown.cut"))) + 1, int(belief("unknown.modes")))
-    found = columns @ (columns[rows].T @ (left[:, :kept] / np.maximum(sizes[:kept], 1e-300)))
-    return np.asarray(found / max(float(np.sqrt(np.mean(np.sum(found[rows] ** 2, axis=1)))), 1e-300))
+    modes = columns @ (columns[rows].T @ (vectors[:, :kept] / np.maximum(sizes[:kept], 1e-300)))
+    return np.asarray(modes / max(float(np.sqrt(np.mean(np.sum(modes[rows] ** 2, axis=1)))), 1e-300))

@@ -12,8 +12,9 @@ from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Cause, Kind, Place
 from warpbrain.inference.decide import UNKNOWN
+from warpbrain.inference.hypothesis import Configuration, Posterior
 from warpbrain.inference.noise import scales
-from warpbrain.inference.subsets import Configuration, Posterior, Search, posterior
+from warpbrain.inference.subsets import Search, posterior
 from warpbrain.worlds.specimen.actions import Effect, Variant
 from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
 from warpbrain.worlds.specimen.forward import Component

@@ -16,7 +16,7 @@ import numpy as np
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.decide import UNKNOWN
-from warpbrain.inference.subsets import Hypothesis
+from warpbrain.inference.hypothesis import Hypothesis
 from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.specimen.actions import Effect
 from warpbrain.worlds.specimen.fit import Fit, Fitting

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from warpbrain.worlds.body.fitting import Share
+from warpbrain.worlds.body.mesh_share import MeshShare
 
 
 def test_a_share_does_not_change_with_mechanisms_beside():
-    share = Share(np.array([1.0, -2.0, 0.5]), np.array([0.3, -0.1]), 0.7)
+    share = MeshShare(np.array([1.0, -2.0, 0.5]), np.array([0.3, -0.1]), 0.7)
     z = np.array([1.2, -0.4])
-    beside = share.among(5)
+    beside = share.extended(5)
     for others in (np.zeros(3), np.array([3.0, -1.0, 2.0])):
         np.testing.assert_allclose(beside.at(np.append(z, others)), share.at(z), rtol=1e-14)
     np.testing.assert_allclose(share.at(z), share.answer * (0.7 + 0.3 * 1.2 + 0.1 * 0.4), rtol=1e-14)

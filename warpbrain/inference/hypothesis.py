@@ -1,0 +1,72 @@
+"""Sets of causes as hypotheses, and their posterior probabilities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.inference.causes import Kind
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Member:
+    """A cause of a hypothesis by its number, the number of its place and that of its size."""
+
+    cause: int
+    place: int
+    size: int
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Causes with places and sizes at a scale of the noise, and the log of its joint density with the rows."""
+
+    members: tuple[Member, ...]
+    scale: float
+    log_density: float
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A set of causes.
+
+    Attributes
+    ----------
+    causes : tuple of str
+    kinds : tuple of Kind
+        Of each of them.
+    log_evidence : float
+        Log density of the rows, summed over places, sizes and scales.
+    log_prior : float
+        Sum of the log odds of its causes.
+    best : Configuration
+        The most probable one.
+    """
+
+    causes: tuple[str, ...]
+    kinds: tuple[Kind, ...]
+    log_evidence: float
+    log_prior: float
+    best: Configuration
+
+    def of_kind(self, kind: Kind) -> tuple[str, ...]:
+        """Its causes of a kind."""
+        return tuple(cause for cause, other in zip(self.causes, self.kinds, strict=True) if other is kind)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Sets of causes, the most probable first."""
+
+    hypotheses: tuple[Hypothesis, ...]
+
+    @property
+    def probabilities(self) -> Floats:
+        """Of each hypothesis."""
+        from scipy.special import softmax
+
+        return np.asarray(softmax([hypothesis.log_evidence + hypothesis.log_prior for hypothesis in self.hypotheses]))

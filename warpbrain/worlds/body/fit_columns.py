@@ -1,0 +1,130 @@
+"""The linear model about a state of a fit: which coordinates are what, and their columns there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import SolveError
+from warpbrain.physics.proposal import Proposal
+from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.effects import Effect, Effects, column_slices, parts_of, width_of
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.mesh_error import MeshErrors
+from warpbrain.worlds.body.mesh_share import MeshShare
+from warpbrain.worlds.body.nuisances import Nuisances, field_columns, mesh_by_tissue, tissue_columns
+from warpbrain.worlds.body.sensors import Sensors
+from warpbrain.worlds.body.states import SolvedState
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Order of the coordinates of a fit: nuisances, causes that act linearly, coefficients of each effect.
+
+    Attributes
+    ----------
+    tissue, field, coefficients : slice
+        Tissue, stiffness field, and the coefficients of all effects.
+    effects : tuple of slice
+        Coefficients of each effect.
+    linear : (q + e,) bool array
+        Which of the first act linearly: all but tissue and field.
+    nonlinear : (q + e + k,) bool array
+        Which act through an equilibrium.
+    """
+
+    tissue: slice
+    field: slice
+    coefficients: slice
+    effects: tuple[slice, ...]
+    linear: NDArray[np.bool_]
+    nonlinear: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, nuisances: Nuisances, count: int, effects: Sequence[Effect]) -> Layout:
+        """With `count` coordinates before those of the effects."""
+        tissue, field = nuisances.part("tissue"), nuisances.part("stiffness field")
+        linear = np.ones(count, dtype=bool)
+        linear[tissue] = linear[field] = False
+        nonlinear = np.concatenate([~linear, np.ones(width_of(effects), dtype=bool)])
+        return cls(tissue, field, slice(count, None), column_slices(effects, count), linear, nonlinear)
+
+
+def columns_about(
+    state: SolvedState,
+    z: Floats,
+    columns: Floats,
+    layout: Layout,
+    effects: Sequence[Effect],
+    base: Base,
+    mesh_errors: MeshErrors | None,
+    mesh_share: MeshShare | None,
+) -> tuple[Floats, Linearisation | None]:
+    """Columns of tissue, field and mechanisms about a state; the others as they are.
+
+    Parameters
+    ----------
+    state : SolvedState
+    z : (q,) array
+        Its coordinates.
+    columns : (n, q) array
+        About another state.
+    layout : Layout
+    effects : sequence of Effect
+    base : Base
+    mesh_errors : MeshErrors or None
+    mesh_share : MeshShare or None
+        That is taken off the residuals.
+
+    Returns
+    -------
+    columns : (n, q) array
+        Those that were given if the state cannot be linearised.
+    at : Linearisation or None
+        If the state was linearised.
+    """
+    columns, at = columns.copy(), None
+    # a state that was followed over time has no one tangent
+    if all(effect.columns_at is None for effect in effects):
+        try:
+            at = Linearisation(state.system, state.u, state.reactions, state.sensors)
+        except SolveError:
+            return columns, None
+        relaxed = _relaxation_factor(effects, [z[part] for part in layout.effects], state.sensors)
+        tissue = relaxed * tissue_columns(at, base.states, state.hypothesis.theta, base.prior)
+        columns[:, layout.tissue] = tissue + mesh_by_tissue(state.sensors, mesh_errors)
+        columns[:, layout.field] = relaxed * field_columns(at, base.states)
+    first = layout.coefficients.start
+    for effect, part in zip(effects, layout.effects, strict=True):
+        c = effect.coefficients(z[part])
+        if effect.columns_at is not None:
+            columns[:, part] = effect.columns_at(c)
+        elif at is not None and not effect.proposed.is_there_or_not:
+            made = Effects(at, mesh_errors=mesh_errors)
+            columns[:, part] = made.of([_proposal_about(effect.proposed, c)], effect.proposed.make(c))[0].columns
+        else:
+            continue
+        if mesh_share is not None:
+            columns[:, part] += mesh_share.columns(slice(part.start - first, part.stop - first))
+    return columns, at
+
+
+def _relaxation_factor(effects: Sequence[Effect], coefficients: Sequence[Floats], sensors: Sensors) -> Floats:
+    """How many times its effect in the end (n, 1) tissue has when a number was recorded, where stress still relaxes."""
+    stiffness = np.ones(len(sensors))
+    for effect, z in zip(effects, coefficients, strict=True):
+        if effect.proposed.history is not None:
+            stiffness += np.maximum(parts_of(effect.proposed, effect.coefficients(z), sensors), 0.0)
+    return np.where(sensors.is_displacement, 1.0 / stiffness, stiffness)[:, None]
+
+
+def _proposal_about(proposal: Proposal, c: Floats) -> Proposal:
+    """The proposal whose columns are those about some coefficients (k,)."""
+    if proposal.changes_in_time:
+        return replace(proposal, mean=c)
+    return replace(proposal, follows="smooth", start=c)

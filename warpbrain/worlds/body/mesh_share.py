@@ -1,0 +1,99 @@
+"""The part of the error of the mesh that belongs to mechanisms: in proportion to their sizes.
+
+A finer mesh shows the error of the state that is fitted. What of it is beyond the error that tissue alone is known to
+have is the mechanisms', each of which pulls the elements in its own way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.errors import SolveError
+from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
+from warpbrain.worlds.body.states import SolvedState
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MeshShare:
+    """Part of the error of the mesh at coefficients z of all mechanisms: `answer (constant + gradient z)`.
+
+    Attributes
+    ----------
+    answer : (n,) array
+        At the coefficients for which it was computed.
+    gradient : (k,) array
+    constant : float
+    """
+
+    answer: Floats
+    gradient: Floats
+    constant: float
+
+    def at(self, z: Floats) -> Floats:
+        """Of coefficients (k,): (n,)."""
+        return self.answer * (self.constant + float(self.gradient @ z))
+
+    def extended(self, count: int) -> MeshShare:
+        """The same where further mechanisms have coefficients after these, `count` in all."""
+        return replace(self, gradient=np.append(self.gradient, np.zeros(count - len(self.gradient))))
+
+    def columns(self, part: slice = slice(None)) -> Floats:
+        """Derivatives (n, k) by the coefficients, or by some of them."""
+        return np.outer(self.answer, self.gradient[part])
+
+
+def excess_error(known: MeshErrors, error: Difference, state: SolvedState, prior: Gaussian) -> Floats:
+    """Error of the mesh (n,) in what is recorded, beyond that which the tissue of a state alone is known to have."""
+    return expected_answer(state.sensors, error.less(known.of(state.hypothesis, prior)))
+
+
+def mesh_share_of(
+    effects: Sequence[Effect],
+    coefficients: Sequence[Floats],
+    state: SolvedState,
+    known: MeshErrors,
+    finer: FinerStates,
+    prior: Gaussian,
+) -> MeshShare | None:
+    """The share of mechanisms at a state; None if a finer mesh does not tell.
+
+    A switch has no size: alone it has a constant share, beside others none.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+    coefficients : sequence of (k,) arrays
+        Of each effect, in standard deviations about its mean.
+    state : SolvedState
+        With these mechanisms.
+    known : MeshErrors
+        Of tissue alone.
+    finer : FinerStates
+    prior : Gaussian
+        Of the tissues' parameters.
+    """
+    sized = [not effect.proposed.is_there_or_not for effect in effects]
+    parts = list(zip(sized, effects, coefficients, strict=True))
+    scaled = np.concatenate([has_size * effect.offset(z) for has_size, effect, z in parts])
+    mean = np.concatenate([has_size * effect.offset(np.zeros(len(z))) for has_size, effect, z in parts])
+    square = float(scaled @ scaled)
+    # the finer mesh is solved in the end state alone
+    changing = any(effect.proposed.changes_in_time for effect in effects)
+    if (square < 1e-6 and any(sized)) or changing:
+        return None
+    try:
+        error = finer.error(state.hypothesis, state, ENOUGH)
+    except SolveError:
+        return None
+    gradient = scaled / square if any(sized) else np.zeros(len(scaled))
+    constant = float(gradient @ mean) if any(sized) else 1.0
+    return MeshShare(excess_error(known, error, state, prior), gradient, constant)

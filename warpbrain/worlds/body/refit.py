@@ -1,0 +1,61 @@
+"""What a fit of a set of causes without linearising has come to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.inference.marginal import Marginal
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.mesh_share import MeshShare
+from warpbrain.worlds.body.states import SolvedState
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A set of causes at its best point.
+
+    Attributes
+    ----------
+    effects : tuple of Effect
+        Of its mechanisms beside those of the case.
+    state : SolvedState
+    nuisances : (q,) array
+        Coordinates of the nuisances, and of causes that act linearly.
+    coefficients : tuple of (k,) arrays
+        Of each effect, in standard deviations about its mean.
+    covariances : tuple of (k, k) arrays
+        Of these.
+    residual : (n,) array
+        What is left at the best point, linear nuisances and the expected error of the mesh taken off.
+    linear : (n,) array
+        Residual of the linear model about that point, with all coordinates at zero.
+    columns : (n, q + k) array
+        Of that model.
+    marginal : Marginal
+        Its Laplace evidence, the scale of the noise and gross errors.
+    converged : bool
+    mesh_share : MeshShare or None
+        Part of the error of the mesh that belongs to its mechanisms, if that is known.
+    """
+
+    effects: tuple[Effect, ...]
+    state: SolvedState
+    nuisances: Floats
+    coefficients: tuple[Floats, ...]
+    covariances: tuple[Floats, ...]
+    residual: Floats
+    linear: Floats
+    columns: Floats
+    marginal: Marginal
+    converged: bool
+    mesh_share: MeshShare | None = None
+
+    @property
+    def log_evidence(self) -> float:
+        """Laplace approximation."""
+        return self.marginal.log_evidence

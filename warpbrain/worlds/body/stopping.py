@@ -1,0 +1,99 @@
+"""Which set of causes is worth fitting next: the value of information of a fit for the verdict.
+
+A fit costs many equilibria, and tells by how much the evidence of a set differs from that in the linear model. It is
+worth that where the verdict of least expected loss could be regretted once this is known. Of the set that the verdict
+names a fit is always made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.inference.beliefs import belief
+from warpbrain.inference.calibration import calibration
+from warpbrain.inference.decide import Decision, decide
+from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.worlds.body.weighted_set import WeightedSet
+
+Floats = NDArray[np.float64]
+
+#: Probability below which a set is not fitted.
+_NEGLIGIBLE = 0.005
+
+
+def next_to_fit(
+    sets: Sequence[WeightedSet], probabilities: Floats, expanded: Collection[frozenset[str]]
+) -> WeightedSet | None:
+    """The set that is fitted next, or whose supersets are weighed next if it is fitted; None to stop.
+
+    Parameters
+    ----------
+    sets : sequence of WeightedSet
+        The most probable first.
+    probabilities : (s,) array
+    expanded : collection of frozenset of str
+        Fitted sets whose supersets were weighed about their fit.
+    """
+    decision, _ = _decide(sets)
+    named = [candidate for candidate in sets if frozenset(candidate.mechanisms) == frozenset(decision.causes)]
+    if named and named[0].mechanisms and not _is_settled(named, expanded):
+        chosen = next((candidate for candidate in named if candidate.refit is not None), named[0])
+    else:
+        open_sets = _not_fitted(sets, probabilities)
+        matters = (candidate for candidate in open_sets if _may_be_regretted(candidate, sets, decision))
+        first = next(matters, None)
+        if first is None:
+            return None
+        chosen = first
+    return _subset_first(chosen, sets, expanded)
+
+
+def _decide(
+    sets: Sequence[WeightedSet], changed: WeightedSet | None = None, change: float = 0.0
+) -> tuple[Decision, dict[Decision, float]]:
+    """The best verdict and the expected losses, were the log evidence of a set another by some change."""
+    hypotheses: list[Hypothesis] = [candidate.hypothesis for candidate in sets if candidate is not changed]
+    if changed is not None:
+        hypotheses.append(changed.with_evidence(changed.hypothesis.log_evidence + change).hypothesis)
+    return decide(hypotheses, calibration().probabilities(hypotheses), calibration().losses)
+
+
+def _is_settled(named: Sequence[WeightedSet], expanded: Collection[frozenset[str]]) -> bool:
+    """Whether nothing is left to do about sets of the mechanisms that are named: one is fitted and expanded."""
+    fitted = [candidate for candidate in named if candidate.refit is not None]
+    if not fitted:
+        return all(candidate.failure for candidate in named)
+    return any(candidate.names in expanded or len(candidate.names) > 2 for candidate in fitted)
+
+
+def _not_fitted(sets: Sequence[WeightedSet], probabilities: Floats) -> Iterator[WeightedSet]:
+    for candidate, probability in zip(sets, probabilities.tolist(), strict=True):
+        if probability > _NEGLIGIBLE and candidate.refit is None and not candidate.failure:
+            yield candidate
+
+
+def _may_be_regretted(candidate: WeightedSet, sets: Sequence[WeightedSet], decision: Decision) -> bool:
+    """Whether another verdict would be better by more than a fit is worth, if the fit changed the set's evidence."""
+    for sign in (-1.0, 1.0):
+        best, losses = _decide(sets, candidate, sign * belief("fits.change"))
+        if losses.get(decision, np.inf) - losses[best] > belief("fits.regret"):
+            return True
+    return False
+
+
+def _subset_first(
+    chosen: WeightedSet, sets: Sequence[WeightedSet], expanded: Collection[frozenset[str]]
+) -> WeightedSet:
+    """The set itself, or its most probable subset of one cause less that is to be fitted, or expanded, before it.
+
+    Two causes that are probable in the linear model about the base are often one whose effect is not linear.
+    """
+    count = len(chosen.names) - 1
+    subsets = [candidate for candidate in sets if candidate.names < chosen.names and len(candidate.names) == count]
+    subsets = [candidate for candidate in subsets if candidate.mechanisms and not candidate.failure]
+    if chosen.refit is not None or not subsets or any(candidate.names in expanded for candidate in subsets):
+        return chosen
+    return subsets[0]

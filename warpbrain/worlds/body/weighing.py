@@ -1,0 +1,97 @@
+"""Evidence of sets of causes in the linear model: with gross errors of their own, and places finer than a scan's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.inference import GaussianModel
+from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.inference.marginal import marginal
+from warpbrain.inference.noise import scales
+from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.causes import BodyCauses
+from warpbrain.worlds.body.effects import Effect, width_of
+from warpbrain.worlds.body.placing import best_in_cell
+from warpbrain.worlds.body.weighted_set import WeightedSet
+
+Floats = NDArray[np.float64]
+
+
+def weigh(
+    base: Base,
+    hypothesis: Hypothesis,
+    causes: BodyCauses,
+    screened: GaussianModel,
+    about: WeightedSet | None = None,
+) -> WeightedSet:
+    """A hypothesis of screening in the linear model about the base, or about a fit, with gross errors of its own.
+
+    Screening gives all hypotheses the gross errors of one model. What this one gains by having its own is added to its
+    log evidence.
+
+    Parameters
+    ----------
+    base : Base
+    hypothesis : Hypothesis
+    causes : BodyCauses
+        Those that were screened.
+    screened : GaussianModel
+        Of the rows without them.
+    about : WeightedSet, optional
+        A fitted set, whose causes act beside those of the hypothesis; the base, where no cause acts, unless given.
+    """
+    acting: tuple[Effect, ...]
+    if about is None:
+        start, model_columns, acting = base.residual, base.model.columns, ()
+    else:
+        start, model_columns, acting = about.residual, about.columns, about.effects
+    members = hypothesis.best.members
+    effects = [(member, causes.effect(member)) for member in members]
+    linear = [causes.columns(member) for member, effect in effects if effect is None]
+    added = [effect for _, effect in effects if effect is not None]
+    residual = start - sum((causes.mean(member) for member in members), start=np.zeros(len(start)))
+    blocks = [*linear, *(effect.columns for effect in added)]
+    further = np.column_stack(blocks) if members else np.zeros((len(residual), 0))
+    values, log_prior = scales()
+    log_screened = screened.with_columns(further).log_marginal(residual, values, log_prior)
+    # nuisances, linear causes, effects: those that act already come first
+    split = model_columns.shape[1] - width_of(acting)
+    columns = np.column_stack(
+        [model_columns[:, :split], *linear, model_columns[:, split:], *(effect.columns for effect in added)]
+    )
+    result = marginal(base.model.of_noise(columns), residual, base.points, hypothesis.best.scale)
+    return WeightedSet(
+        replace(hypothesis, log_evidence=hypothesis.log_evidence + result.log_evidence - log_screened),
+        (*acting, *added),
+        np.column_stack([model_columns[:, base.nuisances.columns.shape[1] : split], *linear]),
+        residual,
+        columns,
+        result,
+    )
+
+
+def with_refined_places(base: Base, candidate: WeightedSet, spacing: float) -> WeightedSet:
+    """A set with its mechanisms at the best places within their cells of a scan of a spacing [m]."""
+    effects = list(candidate.effects)
+    for number, (effect, part) in enumerate(zip(candidate.effects, candidate.slices, strict=True)):
+        if effect.proposal is None or effect.proposed.elsewhere is None:
+            continue
+        others = np.delete(candidate.marginal.model.columns, np.r_[part], axis=1)
+        without = GaussianModel(candidate.marginal.model.noise_factor, others, candidate.marginal.scale)
+        assert effect.proposed.centre is not None and effect.proposed.radius is not None
+        usual = effect.proposed.elsewhere(effect.proposed.centre, effect.proposed.radius)
+        size = float(np.max(effect.proposed.sd / usual.sd))
+        residual = candidate.residual + effect.mean
+        best = best_in_cell(base, effect, size, spacing, without, residual)
+        columns = candidate.columns.copy()
+        columns[:, part] = best.effect.columns
+        residual = residual - best.effect.mean
+        refined = marginal(base.model.of_noise(columns), residual, base.points, candidate.marginal.scale)
+        effects[number] = best.effect
+        candidate = replace(
+            candidate, effects=tuple(effects), residual=residual, columns=columns, marginal=refined
+        ).with_evidence(candidate.hypothesis.log_evidence + best.gain)
+    return candidate
