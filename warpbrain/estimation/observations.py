@@ -140,9 +140,9 @@ class Observations:
         return found
 
     @classmethod
-    def to_check(cls, case: Case, time: float | None = None) -> Observations:
+    def to_check(cls, case: Case) -> Observations:
         """The recordings that only score what was estimated without them; as `to_fit`."""
-        return cls._of(case, "check", time)
+        return cls._of(case, "check", None)
 
     @classmethod
     def _of(cls, case: Case, role: str, time: float | None) -> Observations:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.physics.values import Value
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
-from warpbrain.worlds.specimen.result import SpecimenDiagnosis
+
+if TYPE_CHECKING:
+    # either is loaded where it is diagnosed
+    from warpbrain.diagnosis.result import Diagnosis
+    from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 
 def describe_common(
