@@ -2,7 +2,8 @@
 
     python bench/stand_in_diagnoses.py [NAME ...]   # writes results/stand_in_diagnoses.json, and goes on
 
-The tool never opens a truth: this script does, once the verdict is written. A name is right if that kind acted.
+The tool never opens a truth: this script does, once the verdict is written. A name is right if that kind acted. Cases
+declare a neo-Hookean law, truths have another: `sum w alpha` of its terms, 2 of the neo-Hookean law, is its asymmetry.
 """
 
 from __future__ import annotations
@@ -48,11 +49,13 @@ def diagnosed(name: str) -> dict[str, Any]:
     }
 
 
-def truth(name: str) -> list[str]:
-    """Kinds of what acted, the first the one that moves the cavity."""
+def truth(name: str) -> tuple[list[str], float]:
+    """Kinds of what acted, the first the one that moves the cavity; and the exponent of the law at small strains."""
     text = gzip.decompress((ROOT / "concealed" / "truth" / f"{name}.json.gz").read_bytes())
-    kinds = [effect["kind"] for effect in json.loads(text)["effects"]]
-    return [KINDS.get(kind, kind) for kind in kinds]
+    told = json.loads(text)
+    kinds = [effect["kind"] for effect in told["effects"]]
+    share, alpha = told["tissue"]["share"], told["tissue"]["alpha"]
+    return [KINDS.get(kind, kind) for kind in kinds], share * alpha[0] + (1.0 - share) * alpha[1]
 
 
 def main() -> None:
@@ -65,15 +68,17 @@ def main() -> None:
         done.append(diagnosed(name))
         with whole_file(FILE) as temporary:
             temporary.write_text(json.dumps(done, indent=1) + "\n", encoding="utf-8")
-    print("| case | what acted | verdict | named | held out without -> with it, mm | s |")
-    print("|---|---|---|---|---|---|")
+    print("| case | what acted | exponent | verdict | named | likeliest set | held out without -> with it, mm | s |")
+    print("|---|---|---|---|---|---|---|---|")
     for one in done:
-        acted, named = truth(one["case"]), one["named"] or one["group"]
+        (acted, exponent), named = truth(one["case"]), one["named"] or one["group"]
+        likeliest = one["sets"][0]
         explained = one["explained_heldout_mm"]
         held = "" if explained is None else f"{one['refitted_heldout_mm']:.2f} -> {explained:.2f}"
         print(
-            f"| {one['case']} | {' and '.join(acted)} | {one['verdict']} | {' and '.join(named)} | {held} "
-            f"| {one['seconds']:.0f} |"
+            f"| {one['case']} | {' and '.join(acted)} | {exponent:.1f} | {one['verdict']} | {' and '.join(named)} "
+            f"| {', '.join(likeliest['causes'])} ({likeliest['probability']:.2f}) | {held} "
+            f"| {one['processor_seconds']:.0f} |"
         )
 
 
