@@ -18,6 +18,7 @@ from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situat
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.states import SolvedState
 from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, with_free_surfaces
@@ -146,28 +147,18 @@ class Candidates:
 
     Attributes
     ----------
-    kinds : tuple of str
     effects : tuple of Effect
     of_kind : dict of str to int array
         Numbers of the effects of each kind.
     alternatives : frozenset of str
         Kinds that are no physics.
     rejected : dict of str to str
-    source : Effects or None
-        Which made them at a state; None if they were given.
     """
 
-    kinds: tuple[str, ...]
     effects: tuple[Effect, ...]
     of_kind: dict[str, NDArray[np.int64]]
     alternatives: frozenset[str]
     rejected: dict[str, str]
-    source: Effects | None = None
-
-    def changes_in_time(self, kind: str) -> bool:
-        """Whether the effect of a kind changes under constant loads."""
-        proposal = self.effects[self.of_kind[kind][0]].proposal
-        return proposal is not None and proposal.changes_in_time
 
 
 def candidates_at(
@@ -205,7 +196,7 @@ def candidates_at(
     for name, effect in alternatives.items():
         of_kind[name] = np.array([len(all_effects)])
         all_effects.append(effect)
-    return Candidates(tuple(of_kind), tuple(all_effects), of_kind, frozenset(alternatives), rejected, effects)
+    return Candidates(tuple(all_effects), of_kind, frozenset(alternatives), rejected)
 
 
 def _switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | InputError | SolveError]:
@@ -230,6 +221,7 @@ def candidates_about_fit(
     acting: Sequence[Effect],
     candidates: Candidates,
     places: Mapping[str, NDArray[np.int64]],
+    mesh_errors: MeshErrors | None,
 ) -> Candidates:
     """The effects of a dictionary at the state of a fit, in which some mechanisms act.
 
@@ -244,8 +236,8 @@ def candidates_about_fit(
         At the base.
     places : mapping of str to int array
         Of each kind, numbers of the places whose columns are made anew.
+    mesh_errors : MeshErrors or None
     """
-    mesh_errors = None if candidates.source is None else candidates.source.mesh_errors
     effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=mesh_errors)
     acting_mechanisms = [effect.proposed.make(effect.proposed.mean) for effect in acting]
     acting_kinds = {mechanism.kind for mechanism in acting_mechanisms if not mechanism.several}
@@ -260,7 +252,7 @@ def candidates_about_fit(
             of_this_kind[k] = effect
         of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
         all_effects.extend(of_this_kind)
-    return replace(candidates, kinds=tuple(of_kind), effects=tuple(all_effects), of_kind=of_kind, source=effects)
+    return replace(candidates, effects=tuple(all_effects), of_kind=of_kind)
 
 
 def _is_smooth(effect: Effect) -> bool:

@@ -200,7 +200,8 @@ class HypothesisSearch:
         noise_factor = fitted.marginal.noise.noise_factor
         model = GaussianModel(noise_factor, fitted.columns)
         places = likely_places(model, fitted.residual, self.causes.causes, _PLACES_ABOUT_FIT)
-        causes = causes_of(self.base, candidates_about_fit(refit.state, fitted.effects, self.candidates, places))
+        candidates = candidates_about_fit(refit.state, fitted.effects, self.candidates, places, self.base.mesh_errors)
+        causes = causes_of(self.base, candidates)
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in fitted.names))
         unscaled = GaussianModel(noise_factor / fitted.marginal.scale, fitted.columns)
         screened = posterior(unscaled, fitted.residual, causes.causes, _search(most=1))

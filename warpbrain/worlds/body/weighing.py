@@ -13,7 +13,7 @@ from warpbrain.inference.marginal import marginal
 from warpbrain.inference.noise import scales
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses
-from warpbrain.worlds.body.effects import width_of
+from warpbrain.worlds.body.effects import Effect, width_of
 from warpbrain.worlds.body.placing import best_in_cell
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
@@ -43,10 +43,8 @@ def weigh(
     about : WeightedSet, optional
         A fitted set, whose causes act beside those of the hypothesis; the base, where no cause acts, unless given.
     """
-    if about is None:
-        start, model_columns, acting = base.residual, base.model.columns, ()
-    else:
-        start, model_columns, acting = about.residual, about.columns, about.effects
+    start, model_columns = (base.residual, base.model.columns) if about is None else (about.residual, about.columns)
+    acting: tuple[Effect, ...] = () if about is None else about.effects
     members = hypothesis.best.members
     effects = [(member, causes.effect(member)) for member in members]
     linear = [causes.columns(member) for member, effect in effects if effect is None]
