@@ -25,8 +25,8 @@ from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.estimation.estimate import Estimation
-from warpbrain.estimation.gauss_newton import Estimate, GaussNewton, GaussNewtonOptions
-from warpbrain.estimation.laplace import Laplace
+from warpbrain.estimation.gauss_newton import GaussNewton
+from warpbrain.estimation.modes import Estimate
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.posterior import Posterior
@@ -84,10 +84,9 @@ def experiment(tissue: str, repetitions: int, options: EstimationOptions | None 
     whole = time.perf_counter() - begun
     estimates, intervals, errors = [], [], []
     for seed in range(repetitions):
-        found = first.best.estimate if seed == 0 else again(first, observed(case, points, u, seed))
-        laplace = Laplace.of(found)
+        found = first.best if seed == 0 else again(first, observed(case, points, u, seed))
         estimates.append(found.theta)
-        intervals.append(laplace.interval())
+        intervals.append(found.laplace.interval())
         errors.append(error(case, points, u, displacement(found)))
     ends = np.array(intervals)
     covered = (ends[:, :, 0] <= truth) & (truth <= ends[:, :, 1])
@@ -115,10 +114,10 @@ def experiment(tissue: str, repetitions: int, options: EstimationOptions | None 
 
 def again(first: Posterior, case: Case) -> Estimate:
     """Another estimate with the error of the mesh of the first, from its state."""
-    problem = first.best.estimate.problem
+    problem = first.best.problem
     other = Problem(problem.forward, Observations.to_fit(case), problem.mode, problem.likelihood, problem.nuisances)
-    start = first.best.estimate.point
-    return GaussNewton(other, GaussNewtonOptions(3e-3)).solve(start.state, start.nuisances)
+    start = first.best.point
+    return GaussNewton(other, 3e-3).solve(start.state, start.nuisances)
 
 
 def described(
@@ -130,7 +129,7 @@ def described(
         "estimate_Pa": np.exp(posterior.theta).tolist(),
         "interval_95_Pa": np.exp(ends).tolist(),
         "covered": ((ends[:, 0] <= truth) & (truth <= ends[:, 1])).tolist(),
-        "rmse_mm": error(case, points, u, displacement(posterior.best.estimate)),
+        "rmse_mm": error(case, points, u, displacement(posterior.best)),
         "equilibria": dict(posterior.solves),
         "seconds": spent,
     }
@@ -154,7 +153,7 @@ def same_mesh(tissue: str) -> dict[str, Any]:
     return {
         "tissue": tissue,
         "relative_error": (np.exp(found.theta - truth) - 1.0).tolist(),
-        "rmse_mm": error(case, points, moved, displacement(found.best.estimate)),
+        "rmse_mm": error(case, points, moved, displacement(found.best)),
     }
 
 

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from warpbrain.cases.building.anatomy import Anatomy, make_anatomy
+from warpbrain.cases.building.anatomy import template_anatomy
 from warpbrain.cases.building.cleaning import finished
 from warpbrain.cases.building.errors import BuildError
-from warpbrain.cases.building.maps import load_maps
 from warpbrain.cases.building.pipeline import discretise, named_mesh
 from warpbrain.cases.building.recipes import RECIPES
 from warpbrain.cases.building.remeshing import Size, fit_size, remesh
@@ -49,7 +48,7 @@ def truth_mesh(name: str, folder: Path) -> TetMesh:
 def make_truth_mesh(name: str) -> TetMesh:
     """Make the fine mesh of a case: the steps of the shipped ones, on a finer lattice."""
     recipe = RECIPES[name]
-    cut = remesh(discretise(_anatomy(), recipe, multi=True, spacing=RECIPE["lattice"]), RECIPE["first_edge"])
+    cut = remesh(discretise(template_anatomy(), recipe, multi=True, spacing=RECIPE["lattice"]), RECIPE["first_edge"])
     if cut is None:
         raise BuildError(f"case {name}: MMG could not mesh the finer lattice")
     good = partial(finished, easier=EASIER)
@@ -62,8 +61,3 @@ def fingerprint(mesh: TetMesh) -> str:
     for array in (np.round(mesh.points * 1e9).astype("<i8"), mesh.tetrahedra.astype("<i4"), mesh.tissue.astype("<i4")):
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
-
-
-@cache
-def _anatomy() -> Anatomy:
-    return make_anatomy(load_maps())

@@ -36,9 +36,9 @@ from referee.plan import BOTH, SHARES
 from referee.problem import Problem
 from referee.rebuilding import effects_of, setting_of
 from referee.sensing import place_sensors
-from referee.setting import EACH, FIELD, NOISE, OVERALL
+from referee.setting import EACH, FIELD, NOISE, OVERALL, mean_square
 from referee.sight import Sight
-from referee.sizing import first_order
+from referee.sizing import first_order, spanning
 from referee.threads import single as one_thread
 from referee.truth import cap_force_of
 from referee.unknowns import MODES, unknown_forces
@@ -130,14 +130,12 @@ def _known(
 
     named, nameless = library(random, setting, Forces(problem, base), response, whiten)
     effects = effects_of(label)
-    rows = [sight.rows(first_order(effect, problem, base, setting.times)) for effect in effects]
-    true = whiten(np.stack(rows)) if rows else np.zeros((0, len(lower)))
-    # the wide columns of each: its own change, and of a traction those along the axes
+    changes = [first_order(effect, problem, base, setting.times) for effect in effects]
+    true = whiten(np.stack([sight.rows(change) for change in changes])) if changes else np.zeros((0, len(lower)))
     wide = [
-        whiten(np.stack([sight.rows(first_order(part, problem, base, setting.times)) for part in effect.spanning]))
-        if len(effect.spanning) > 1 and len(effects) > 1
-        else true[k : k + 1]
-        for k, effect in enumerate(effects)
+        whiten(np.stack([sight.rows(part) for part in spanning(effect, change, problem, base, setting.times)]))
+        for effect, change in zip(effects, changes, strict=True)
+        if len(effects) > 1
     ]
     given = [
         conditional(own, np.concatenate([true[:0], *wide[:k], *wide[k + 1 :]]), np.eye(true.shape[1]))
@@ -173,13 +171,11 @@ def _residuals(label: Mapping[str, Any], random: Random, known: Known, true: Flo
 
 
 def _noisy(known: Known) -> Floats:
-    square = (NOISE[0] ** 2 + NOISE[0] * NOISE[1] + NOISE[1] ** 2) / 3.0
-    return np.eye(len(known.noise)) + (NOISY**2 / square - 1.0) * known.noise
+    return np.eye(len(known.noise)) + (NOISY**2 / mean_square(NOISE) - 1.0) * known.noise
 
 
 def _uneven(known: Known) -> Floats:
-    square = (FIELD[0] ** 2 + FIELD[0] * FIELD[1] + FIELD[1] ** 2) / 3.0
-    return np.sqrt(UNEVEN**2 / square - 1.0) * known.field
+    return np.sqrt(UNEVEN**2 / mean_square(FIELD) - 1.0) * known.field
 
 
 def posteriors(w: Floats, known: Known, random: Random) -> list[dict[str, Any]]:

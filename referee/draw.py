@@ -31,7 +31,7 @@ from referee.effects import (
 )
 from referee.effects.effect import Place, unit
 from referee.equilibrium import NoTruth
-from referee.setting import DOWN, Setting
+from referee.setting import DOWN, Setting, triple
 
 Floats = NDArray[np.float64]
 Random = np.random.Generator
@@ -70,7 +70,7 @@ def _gravity(random: Random, setting: Setting) -> Effect:
     points = setting.body.points
     return Gravity(
         size=0.03,
-        direction=_place(np.cos(angle) * down + np.sin(angle) * side),
+        direction=triple(np.cos(angle) * down + np.sin(angle) * side),
         declared=DOWN,
         height=float(np.ptp(points @ down)),
     )
@@ -85,14 +85,14 @@ def _traction(random: Random, setting: Setting) -> Effect:
     aslant = unit(-normal + 0.6 * unit(random.normal(size=3)))
     pushes = 1.0 if random.random() < 0.7 else -1.0
     radius = float(random.uniform(0.009, 0.016))
-    return Traction(size=500.0, centre=centre, radius=radius, direction=_place(pushes * aslant))
+    return Traction(size=500.0, centre=centre, radius=radius, direction=triple(pushes * aslant))
 
 
 def _contact(random: Random, setting: Setting) -> Effect:
     body = setting.body
     support = "side" if random.random() < 0.5 else "fixed"
     nodes = np.flatnonzero(body.nodes(support))
-    centre = _place(body.points[random.choice(nodes)])
+    centre = triple(body.points[random.choice(nodes)])
     return Contact(size=0.03, centre=centre, lifts=bool(random.random() < 0.5), support=support)
 
 
@@ -106,7 +106,7 @@ def _inclusion(random: Random, setting: Setting) -> Effect:
     body = setting.body
     cap = body.points[body.nodes("superior")].mean(axis=0)
     near = body.centroids[np.linalg.norm(body.centroids - cap, axis=1) < 0.05]
-    centre = _place(near[random.integers(len(near))])
+    centre = triple(near[random.integers(len(near))])
     return Inclusion(size=0.6, sign=_sign(random), centre=centre, radius=float(random.uniform(0.018, 0.028)))
 
 
@@ -122,7 +122,7 @@ def _viscoelasticity(random: Random, setting: Setting) -> Effect:
 def _tether(random: Random, setting: Setting) -> Effect:
     centre, normal = _surface(random, setting.body)
     anchor = np.asarray(centre) + 0.03 * unit(normal + 0.8 * unit(random.normal(size=3)))
-    return Tether(size=0.1, centre=centre, radius=float(random.uniform(0.008, 0.014)), anchor=_place(anchor))
+    return Tether(size=0.1, centre=centre, radius=float(random.uniform(0.008, 0.014)), anchor=triple(anchor))
 
 
 def _pre_stress(random: Random, setting: Setting) -> Effect:
@@ -132,9 +132,9 @@ def _pre_stress(random: Random, setting: Setting) -> Effect:
     return PreStress(
         size=100.0,
         centre=_inside(random, setting.body),
-        normal=_place(normal),
+        normal=triple(normal),
         thickness=thickness,
-        axis=_place(axis),
+        axis=triple(axis),
     )
 
 
@@ -147,11 +147,11 @@ def _uniform_force(random: Random, setting: Setting) -> Effect:
     direction = unit(random.normal(size=3))
     while abs(direction @ np.array(DOWN)) > np.cos(_ASIDE):
         direction = unit(random.normal(size=3))
-    return UniformForce(size=200.0, direction=_place(direction))
+    return UniformForce(size=200.0, direction=triple(direction))
 
 
 def _swirl(random: Random, setting: Setting) -> Effect:
-    axis = _place(unit(random.normal(size=3)))
+    axis = triple(unit(random.normal(size=3)))
     length = float(random.uniform(0.02, 0.04))
     return Swirl(size=500.0, centre=_inside(random, setting.body), axis=axis, length=length)
 
@@ -164,7 +164,7 @@ def _attraction(random: Random, setting: Setting) -> Effect:
 def _stripes(random: Random, setting: Setting) -> Effect:
     return Stripes(
         size=100.0,
-        direction=_place(unit(random.normal(size=3))),
+        direction=triple(unit(random.normal(size=3))),
         wavelength=float(random.uniform(0.025, 0.05)),
         phase=float(random.uniform(0.0, 2.0 * np.pi)),
     )
@@ -197,7 +197,7 @@ def _trap_registration(random: Random, setting: Setting) -> Setting:
     # an exact rigid motion: the turn is finite
     shift = random.uniform(*RIGID_SHIFT) * unit(random.normal(size=3))
     turn = random.uniform(*RIGID_TURN) * unit(random.normal(size=3))
-    return replace(setting, shift=_place(shift), turn=_place(turn))
+    return replace(setting, shift=triple(shift), turn=triple(turn))
 
 
 _TRAPS: dict[str, Callable[[Random, Setting], Setting]] = {
@@ -221,11 +221,6 @@ def _sign(random: Random) -> int:
     return 1 if random.random() < 0.5 else -1
 
 
-def _place(vector: Floats) -> Place:
-    x, y, z = (float(value) for value in vector)
-    return x, y, z
-
-
 def _free(body: Body, points: Floats) -> NDArray[np.bool_]:
     """Which points are away from what is held."""
     held = body.points[body.nodes("fixed") | body.nodes("side")]
@@ -247,7 +242,7 @@ def _surface(random: Random, body: Body) -> tuple[Place, Floats]:
     nodes, normals = _surface_of(body, _AWAY)
     node = int(random.choice(nodes))
     around = np.linalg.norm(body.points - body.points[node], axis=1) < 0.01
-    return _place(body.points[node]), unit(normals[around].sum(axis=0))
+    return triple(body.points[node]), unit(normals[around].sum(axis=0))
 
 
 def _apart(draw: Callable[[], Place], least: float) -> tuple[Place, Place]:
@@ -264,4 +259,4 @@ def _inside(random: Random, body: Body) -> Place:
     surface = body.points[np.unique(body.outer.nodes[:, :3])]
     depth = cKDTree(surface).query(places)[0]
     deep = places[(depth > 0.006) & _free(body, places)]
-    return _place(deep[0])
+    return triple(deep[0])

@@ -22,6 +22,7 @@ COARSE = "phantom-coarse"
 _SIDE, _SIDE_RADIUS = np.array([1.0, 0.0, 0.5]), 0.032
 
 
+@cache
 def declared_case(name: str) -> Case:
     """The shipped case whose tissues are declared."""
     return find_case(name)

@@ -59,12 +59,12 @@ def too_coarse(mesh: TetMesh) -> TetMesh:
     return replace(made, node_sets={name: surface & members[nearest] for name, members in mesh.node_sets.items()})
 
 
-def make_meshes(folder: Path = MESHES) -> None:
+def make_meshes() -> None:
     """Make all meshes anew."""
-    folder.mkdir(parents=True, exist_ok=True)
+    MESHES.mkdir(parents=True, exist_ok=True)
     for name in NAMES:
-        _write(folder / f"{name}.npz", other_inside(declared_mesh(name)))
-    _write(folder / f"{COARSE}.npz", too_coarse(declared_mesh("phantom")))
+        _write(MESHES / f"{name}.npz", other_inside(declared_mesh(name)))
+    _write(MESHES / f"{COARSE}.npz", too_coarse(declared_mesh("phantom")))
 
 
 def _write(file: Path, mesh: TetMesh) -> None:

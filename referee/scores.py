@@ -6,6 +6,7 @@ Where two act, `d` of each is that where the size of the other is not known.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -99,7 +100,7 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
         "one of two named": share(o.held for o in of["two"]),
     }
     for least in (PLAIN, VISIBLE):
-        for words, given in (("d", _given), ("the tool's d", _seen_given)):
+        for words, given in (("d", attrgetter("given")), ("the tool's d", attrgetter("seen_given"))):
             name = f"both of two named, each {'of ' if words != 'd' else ''}{words} >= {least:g}"
             found[name] = share(_both(o) for o in of["two"] if (d := given(o)) and min(d) >= least)
     missing = [o for o in of["left out"] if o.d >= PLAIN]
@@ -114,14 +115,6 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
 def _both(outcome: Outcome) -> bool:
     """Whether it names both of two effects."""
     return set(outcome.label["names"]) <= outcome.said.said
-
-
-def _given(outcome: Outcome) -> tuple[float, ...]:
-    return outcome.given
-
-
-def _seen_given(outcome: Outcome) -> tuple[float, ...]:
-    return outcome.seen_given
 
 
 def calibration(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:

@@ -35,6 +35,12 @@ SHIFT, TURN = 0.7e-3, float(np.deg2rad(0.7))
 DEMIRAY, OGDEN = (0.3, 2.0), ((0.4, 0.7), (2.0, 5.0), (-3.0, -1.0))
 
 
+def mean_square(ends: tuple[float, float]) -> float:
+    """Of what is even between ends."""
+    low, high = ends
+    return (low**2 + low * high + high**2) / 3.0
+
+
 def _middling(ends: tuple[float, float]) -> tuple[float, float]:
     """Two values with the mean and the variance of what is even between ends."""
     middle, sd = 0.5 * (ends[0] + ends[1]), (ends[1] - ends[0]) / np.sqrt(12.0)
@@ -217,7 +223,7 @@ def draw_setting(random: Random, geometry: str, timed: bool) -> Setting:
     tilt = random.normal(size=2) * 0.25
     pressed = np.array([*tilt, -1.0])
     amount = random.uniform(1.6, 3.0) if force else random.uniform(0.004, 0.007)
-    load = _triple(amount * pressed)
+    load = triple(amount * pressed)
     declared = [tissue.known_law.shear_modulus for _, tissue in sorted(declared_case(geometry).tissues.items())]
     mu = np.array(declared) * np.exp(OVERALL * random.normal() + EACH * random.normal(size=len(declared)))
     return Setting(
@@ -247,10 +253,11 @@ def draw_setting(random: Random, geometry: str, timed: bool) -> Setting:
 
 
 def _within(random: Random, size: float) -> tuple[float, float, float]:
-    return _triple(size / np.sqrt(3.0) * random.normal(size=3))
+    return triple(size / np.sqrt(3.0) * random.normal(size=3))
 
 
-def _triple(vector: Floats) -> tuple[float, float, float]:
+def triple(vector: Floats) -> tuple[float, float, float]:
+    """A vector as plain numbers."""
     x, y, z = (float(value) for value in vector)
     return x, y, z
 

@@ -7,11 +7,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.sparse import csr_matrix
 
 from referee.body import Body
 from referee.sensing import FORCE_ERROR, Sensors
-from referee.setting import NOISE, SHARED, SHARED_LENGTH, Setting
+from referee.setting import NOISE, SHARED, SHARED_LENGTH, Setting, mean_square
 
 Floats = NDArray[np.float64]
 
@@ -125,7 +126,7 @@ class Sight:
         """Covariance (rows, rows) of noise as it is drawn, gross errors counted as points that are lost."""
         setting = self.setting
         # mean square of its scale, which nobody declares
-        square = (NOISE[0] ** 2 + NOISE[0] * NOISE[1] + NOISE[1] ** 2) / 3.0 * setting.sigma**2
+        square = mean_square(NOISE) * setting.sigma**2
         points = _noise(self.points, square, square / (1.0 - setting.gross))
         points = np.kron(np.eye(self.often), np.kron(points, np.eye(3)))
         aligned = self._normals @ self._normals.T
@@ -133,12 +134,7 @@ class Sight:
         blocks = [points, wall]
         if self._force is not None:
             blocks.append(self._force**2 * square / setting.sigma**2 * np.eye(3))
-        size = sum(map(len, blocks))
-        out, at = np.zeros((size, size)), 0
-        for block in blocks:
-            out[at : at + len(block), at : at + len(block)] = block
-            at += len(block)
-        return out
+        return block_diag(*blocks)
 
 
 def _noise(points: Floats, square: float, alone: float) -> Floats:

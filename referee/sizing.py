@@ -142,6 +142,12 @@ def first_order(effect: Effect, problem: Problem, base: Balance, times: tuple[fl
     return Change(course[:, None, None] * change.move, course[-1] * change.force)
 
 
+def spanning(effect: Effect, change: Change, problem: Problem, base: Balance, times: tuple[float, ...]) -> list[Change]:
+    """Changes by all that an effect is a sum of, whatever its size and direction: of most its own change alone."""
+    parts = effect.spanning
+    return [change] if len(parts) == 1 else [first_order(part, problem, base, times) for part in parts]
+
+
 def _reaction(problem: Problem, base: Balance) -> Floats:
     """Forces (n, 3) [N] without effects, which balance where nothing is held."""
     F = problem.gradient(base.u)

@@ -17,7 +17,7 @@ from referee.problem import Problem
 from referee.sensing import Sensors, place_sensors
 from referee.setting import Setting
 from referee.sight import Change, Sight
-from referee.sizing import Sized, Wish, first_order, sized
+from referee.sizing import Sized, Wish, sized, spanning
 from referee.unknowns import unknowns_of
 
 Floats = NDArray[np.float64]
@@ -121,11 +121,7 @@ def conditionals(
     """How much each effect stands out where the size of the others, and of a traction the direction, is not known."""
     if len(found) < 2:
         return tuple(one.d for one in found)
-    columns = [
-        [one.change] if len(spanning) == 1 else [first_order(part, problem, base, times) for part in spanning]
-        for one in found
-        for spanning in [one.effect.spanning]
-    ]
+    columns = [spanning(one.effect, one.change, problem, base, times) for one in found]
     return tuple(
         seen.given(one.change, [column for k, more in enumerate(columns) if k != j for column in more])
         for j, one in enumerate(found)

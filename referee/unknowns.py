@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from referee.equilibrium import Balance
 from referee.law import Law, respond
 from referee.problem import Problem
-from referee.setting import BOTH_LAWS, EACH, FIELD, LENGTHS, OVERALL, POISSON
+from referee.setting import BOTH_LAWS, EACH, FIELD, LENGTHS, OVERALL, POISSON, mean_square
 from referee.sight import Change
 
 Floats = NDArray[np.float64]
@@ -99,7 +99,7 @@ def stiffness_modes(places: Floats, weight: Floats, count: int = MODES) -> Float
         Forces that each carries [N].
     count : int
     """
-    variance = (FIELD[0] ** 2 + FIELD[0] * FIELD[1] + FIELD[1] ** 2) / 3.0
+    variance = mean_square(FIELD)
     lengths = [0.5 * (low + high) for low, high in LENGTHS]
     left = variance * weight**2
     columns = np.zeros((len(weight), min(_PIVOTS, len(weight))))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from rigid_motions import moved as moved_rigidly
 from scipy.spatial.transform import Rotation
 from shapes import box
 
@@ -21,7 +22,6 @@ from warpbrain.estimation.estimate import estimate
 from warpbrain.estimation.forward import Forward, State
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.registration import Registration
-from warpbrain.estimation.registration import moved as moved_rigidly
 from warpbrain.gp.prior import Prior
 from warpbrain.inference.noise import noise_factor, outliers, scales
 from warpbrain.mesh import TetMesh, nodes_of

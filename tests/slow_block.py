@@ -27,7 +27,7 @@ CAUSES: dict[str, Mechanism] = {
     "viscoelasticity of two times": Viscoelasticity(moduli=(0.5, 0.5), times=(20.0, 200.0)),
 }
 #: Edge [m], noise [m] and points of the recording.
-_SIDE, _NOISE, _POINTS = 0.06, 2e-5, 40
+_SIDE, _NOISE, _POINTS = 0.06, 2e-5, 30
 
 _CASE = """\
 [case]

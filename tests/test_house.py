@@ -16,7 +16,7 @@ FLOORS = [
     *("worlds", "diagnosis", "report", "terminal", "bench", "cli"),
 ]
 #: Modules that any floor may use, and that use none.
-LEAVES = ["errors", "atomic", "frame", "problems", "threads", "values"]
+LEAVES = ["arrays", "errors", "atomic", "frame", "problems", "seconds", "threads", "values"]
 #: Where a kind of mechanism, or a class of one, may stand outside `physics/mechanisms`, and why.
 NAMED = {
     "__init__.py": "names that users import",

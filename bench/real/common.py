@@ -23,6 +23,7 @@ from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, spe
 from warpbrain.report.diagnosis.specimen_curves import write_curves
 from warpbrain.report.files import write_summary
 from warpbrain.terminal.quiet import start_warp_quietly
+from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
@@ -98,7 +99,7 @@ def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosi
         read_case(folder),
         options,
         "cpu",
-        lambda text: print(f"{time.perf_counter() - start:7.1f} s  {text}", flush=True),
+        Listener(lambda text: print(f"{time.perf_counter() - start:7.1f} s  {text}", flush=True)),
     ).run()
     said = describe_specimen_diagnosis(found, options, "cpu")
     beside = out / f"{case.name}-diagnosis{'' if ends else '-homogeneous'}"

@@ -7,36 +7,28 @@ from typing import ClassVar
 
 import numpy as np
 
+from referee.body import Body
 from referee.effects.effect import Effect, Floats, Place, hill, unit
-from referee.effects.forces import adding
+from referee.effects.forces import BodyForce, adding
 from referee.problem import Problem
 
 
-def nodal(problem: Problem, density: Floats) -> Floats:
-    """Nodal forces (n, 3) [N] of a body force (m, q, 3) [N/m3]."""
-    body = problem.body
-    return problem.gathered(np.einsum("aq,eqi->eai", body.shapes, density * body.region[1][..., None]))
-
-
 @dataclass(frozen=True, kw_only=True)
-class UniformForce(Effect):
+class UniformForce(BodyForce):
     """A body force of `size` [N/m3] in one direction, far from that of gravity."""
 
     kind: ClassVar[str] = "uniform-force"
     unit: ClassVar[str] = "N/m3"
     limits: ClassVar[tuple[float, float]] = (10.0, 9000.0)
-    forces: ClassVar[bool] = True
 
     direction: Place
 
-    def act(self, problem: Problem) -> Problem:
-        density = np.broadcast_to(self.size * unit(np.asarray(self.direction)), problem.body.region[2].shape)
-        force = nodal(problem, density)
-        return adding(problem, lambda u: force)
+    def density(self, body: Body) -> Floats:
+        return np.broadcast_to(self.size * unit(np.asarray(self.direction)), body.region[2].shape)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Swirl(Effect):
+class Swirl(BodyForce):
     """A body force that runs around an axis, ``size exp(-r^2/(2 L^2)) (axis x r) / L`` [N/m3].
 
     Parameters
@@ -49,21 +41,19 @@ class Swirl(Effect):
     kind: ClassVar[str] = "swirl"
     unit: ClassVar[str] = "N/m3"
     limits: ClassVar[tuple[float, float]] = (20.0, 40000.0)
-    forces: ClassVar[bool] = True
 
     centre: Place
     axis: Place
     length: float
 
-    def act(self, problem: Problem) -> Problem:
-        r = (problem.body.region[2] - np.asarray(self.centre)) / self.length
+    def density(self, body: Body) -> Floats:
+        r = (body.region[2] - np.asarray(self.centre)) / self.length
         decay = self.size * np.exp(-0.5 * (r**2).sum(axis=-1))
-        force = nodal(problem, decay[..., None] * np.cross(unit(np.asarray(self.axis)), r))
-        return adding(problem, lambda u: force)
+        return decay[..., None] * np.cross(unit(np.asarray(self.axis)), r)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Attraction(Effect):
+class Attraction(BodyForce):
     """Two places in the depth draw each other with `size` [N].
 
     Parameters
@@ -76,19 +66,17 @@ class Attraction(Effect):
     kind: ClassVar[str] = "attraction"
     unit: ClassVar[str] = "N"
     limits: ClassVar[tuple[float, float]] = (0.005, 4.0)
-    forces: ClassVar[bool] = True
 
     centre: Place
     other: Place
     radius: float
 
-    def act(self, problem: Problem) -> Problem:
-        _, volumes, places = problem.body.region
+    def density(self, body: Body) -> Floats:
+        _, volumes, places = body.region
         along = unit(np.subtract(self.other, self.centre))
         hills = [hill(places, place, self.radius) for place in (self.centre, self.other)]
         here, there = (weight / (weight * volumes).sum() for weight in hills)
-        force = nodal(problem, self.size * (here - there)[..., None] * along)
-        return adding(problem, lambda u: force)
+        return self.size * (here - there)[..., None] * along
 
 
 @dataclass(frozen=True, kw_only=True)

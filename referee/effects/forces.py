@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import abc
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
 
+from referee.body import Body
 from referee.effects.effect import Effect, Floats, Place, hill, unit
 from referee.problem import Load, Problem
 
@@ -20,7 +22,25 @@ def adding(problem: Problem, load: Load) -> Problem:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gravity(Effect):
+class BodyForce(Effect):
+    """A force on the volume that does not depend on the displacement."""
+
+    forces: ClassVar[bool] = True
+
+    @abc.abstractmethod
+    def density(self, body: Body) -> Floats:
+        """Force by volume (m, q, 3) [N/m3] at the integration points of a body."""
+
+    def act(self, problem: Problem) -> Problem:
+        body = problem.body
+        _, volumes, _ = body.region
+        local = np.einsum("aq,eqi->eai", body.shapes, self.density(body) * volumes[..., None])
+        force = problem.gathered(local)
+        return adding(problem, lambda u: force)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gravity(BodyForce):
     """Fluid has drained to `size` [m] below the highest point.
 
     Parameters
@@ -36,7 +56,6 @@ class Gravity(Effect):
     kind: ClassVar[str] = "gravity"
     unit: ClassVar[str] = "m"
     limits: ClassVar[tuple[float, float]] = (0.002, 0.12)
-    forces: ClassVar[bool] = True
     power: ClassVar[float] = 2.0
     parameter: ClassVar[str] = "csf_level"
 
@@ -44,16 +63,12 @@ class Gravity(Effect):
     declared: Place
     height: float
 
-    def act(self, problem: Problem) -> Problem:
+    def density(self, body: Body) -> Floats:
         down = unit(np.asarray(self.direction))
-        _, volumes, places = problem.body.region
-        depth = (places - problem.body.points.mean(axis=0)) @ down
-        depth = depth - ((problem.body.points - problem.body.points.mean(axis=0)) @ down).min()
+        middle = body.points.mean(axis=0)
+        depth = (body.region[2] - middle) @ down - ((body.points - middle) @ down).min()
         dry = 1.0 / (1.0 + np.exp(np.clip((depth - self.size) / 0.0005, -50.0, 50.0)))
-        share = np.einsum("aq,eq->ea", problem.body.shapes, BUOYANCY * dry * volumes)
-        nodal = np.bincount(problem.body.cells.ravel(), share.ravel(), minlength=len(problem.body.points))
-        force = nodal[:, None] * down
-        return adding(problem, lambda u: force)
+        return BUOYANCY * dry[..., None] * down
 
     @property
     def amount(self) -> float:

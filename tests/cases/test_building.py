@@ -125,9 +125,10 @@ def test_every_clinical_case_can_be_built():
     assert NAMES == ("phantom", "0529", "0614", "0660", "0685", "0535", "0555", "0603", "0684")
 
 
-# one case of either side: the others take minutes each and differ by their seed alone
+# the others take minutes each and differ by side and seed alone; one of the other side is made again, to the bit and
+# finer, by tests/concealed/test_stand_ins.py
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["phantom", "0529", "0684"])
+@pytest.mark.parametrize("name", ["phantom", "0529"])
 def test_building_again_gives_the_shipped_meshes(name, tmp_path):
     for package in ("mmgpy", "nilearn", "nibabel"):
         pytest.importorskip(package)

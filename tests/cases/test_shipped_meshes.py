@@ -9,6 +9,7 @@ import pytest
 
 from warpbrain.cases.building.example_sets import RADIUS, with_example_sets
 from warpbrain.mesh import (
+    Quality,
     TetMesh,
     boundary_faces,
     closed_surfaces,
@@ -71,6 +72,19 @@ def mesh(meshes, name) -> TetMesh:
     return meshes[name]
 
 
+@pytest.fixture(scope="module")
+def qualities() -> dict[str, Quality]:
+    """What was measured before, by name."""
+    return {}
+
+
+@pytest.fixture
+def quality(qualities, mesh, name) -> Quality:
+    if name not in qualities:
+        qualities[name] = measure(mesh)
+    return qualities[name]
+
+
 def test_volume_and_size(mesh, name):
     volume, least, most, _ = MESHES[name]
     assert mesh.volume == pytest.approx(volume, rel=1e-6)
@@ -83,16 +97,14 @@ def test_fine_meshes_are_finer_by_the_published_ratio(meshes, kind, ratio):
     assert ratio <= fine / coarse <= 1.03 * ratio
 
 
-def test_quality(mesh):
-    quality = measure(mesh)
+def test_quality(quality):
     assert quality.inverted == 0
     assert quality.components == 1
     assert quality.min_dihedral >= 15
     assert quality.first_percentile_dihedral >= 20
 
 
-def test_tissues_have_no_speckles(mesh, name):
-    quality = measure(mesh)
+def test_tissues_have_no_speckles(quality, name):
     assert set(quality.tissue_components) == ({1, 2} if MESHES[name][3] else {1})
     # a piece of one tissue is at least a cubic centimetre and more than twenty tetrahedra
     assert quality.smallest_tissue_component_volume >= 1e-6
@@ -242,10 +254,9 @@ def test_what_a_resection_leaves(meshes, clinical):
     assert nodes_of(outer, len(left.points))[left.node_sets["resection"]].all()
 
 
-def test_record_tells_the_truth(mesh, name):
+def test_record_tells_the_truth(mesh, quality, name):
     case, file = name.split("/")
     record = json.loads((DATA / case / "meshes.json").read_text())["meshes"][file]
-    quality = measure(mesh)
     assert record["nodes"] == quality.nodes
     assert record["tetrahedra"] == quality.tetrahedra
     assert record["min_dihedral"] == pytest.approx(quality.min_dihedral, rel=1e-4)

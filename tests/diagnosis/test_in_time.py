@@ -24,7 +24,11 @@ from warpbrain.worlds.body.tissue_prior import declared
 _OPTIONS = DiagnosisOptions(candidates=("drainage", "viscoelasticity", "swelling"), mesh_error=False, draws=100)
 
 
-@pytest.fixture(scope="module", params=list(CAUSES))
+# stress that relaxes with one time does nothing that it does not do with two
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=[pytest.mark.slow] if name == "viscoelasticity" else []) for name in CAUSES],
+)
 def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Diagnosis]:
     case = write_slow(tmp_path_factory.mktemp("slow") / "case", CAUSES[request.param])
     return request.param, Diagnosing(case, _OPTIONS, "cpu").run()
@@ -47,7 +51,7 @@ def test_what_relaxes_is_found_with_its_times(diagnosed: tuple[str, Diagnosis]) 
     assert found.explained is not None
     [acting] = found.explained.mechanisms
     assert isinstance(acting, Viscoelasticity)
-    # they tell what has not relaxed at the recorded times, and next to nothing of what did before: 0.12 off
+    # they tell what has not relaxed at the recorded times, and next to nothing of what did before: 0.05 off
     assert [_left(acting, time) for time in TIMES] == pytest.approx([_left(expected, time) for time in TIMES], abs=0.15)
     values = {value.name: value for value in found.ranking[0].values}
     together = values["moduli"]
@@ -66,7 +70,7 @@ def test_the_permeability_is_found_with_its_spread(diagnosed: tuple[str, Diagnos
         pytest.skip("nothing flows")
     [value] = [value for value in found.ranking[0].values if value.name == "permeability"]
     assert 0.0 < value.sd < 0.1 * PERMEABILITY
-    # steps in time are as coarse as the fit's own: 7.3 % off, with a spread of 4.8 %
+    # steps in time are as coarse as the fit's own: 4.7 % off, with a spread of 5.5 %
     assert abs(value.value - PERMEABILITY) < 0.12 * PERMEABILITY
 
 
@@ -103,7 +107,7 @@ def test_what_relaxes_moves_less_as_its_times_say(relaxing: tuple[Base, Candidat
         for mechanisms in ((), (proposal.make(np.array(c)),))
     )
     expected = acting.sensors.computed - without.sensors.computed
-    # creep is a little slower than relaxation: at most 2.2 % off
+    # creep is a little slower than relaxation: at most 2.3 % off
     assert np.linalg.norm(effect.mean - expected) < 0.04 * np.linalg.norm(expected)
 
 

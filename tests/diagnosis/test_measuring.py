@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from warpbrain.diagnosis.measuring import next_measurements
-from warpbrain.diagnosis.result import Diagnosis, Measurement
+from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.physics.mechanisms.gravity import Gravity
+from warpbrain.physics.values import Measurement
 
 
 def _told(diagnosis: Diagnosis, first: str, second: str) -> tuple[Measurement, ...]:

@@ -72,9 +72,9 @@ def test_the_gradient_is_that_of_the_objective(problem: Problem, known: bool) ->
 
 def test_nuisances_are_at_their_best_and_integrated_out(problem: Problem) -> None:
     state = problem.forward.solve(THETA)
-    point = problem.at(state, problem.nuisances.mean)
+    point = problem.at(state, problem.nuisances.prior.mean)
     noise = problem.with_likely_noise(point, problem.linearise(point)).known_noise
-    misfit, best = problem.without_nuisances(state, problem.nuisances.mean, noise)
+    misfit, best = problem.without_nuisances(state, problem.nuisances.prior.mean, noise)
     gradient = problem.linearise(best).gradient[2:]
     size = np.sqrt(np.diag(problem.linearise(best).hessian)[2:])
     assert np.abs(gradient / size).max() < 1e-4
@@ -127,7 +127,7 @@ def test_points_are_located_anew_where_they_or_the_mesh_are_others() -> None:
     larger = replace(case, mesh=TetMesh(1.1 * mesh.points, mesh.tetrahedra, mesh.tissue, mesh.node_sets))
     u = case.mesh.points**2
     for there, recording in ((case, seen), (case, moved), (larger, seen)):
-        [one] = Observations.to_fit(replace(there, recordings=(recording,))).each
+        [one] = Observations.to_fit(replace(there, recordings=(recording,))).recordings
         expected = locate(there.mesh.points, there.mesh.tetrahedra, recording.points).interpolate(u)
         values = one.at(u, np.zeros_like(u), np.zeros(3), np.zeros(6)).values
         np.testing.assert_allclose(values, recording.displacement - expected, atol=1e-15)

@@ -7,10 +7,10 @@ import pytest
 from scipy.stats import genpareto
 
 from warpbrain.estimation.chain import effective_size, run_chain
+from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.importance import importance_sampling
 from warpbrain.estimation.pareto import generalised_pareto, pareto_smoothed
 from warpbrain.estimation.proposal import Proposal
-from warpbrain.estimation.target import Evaluated
 
 MEAN, DEVIATION = np.array([1.0, -2.0]), np.array([0.5, 0.1])
 
@@ -36,8 +36,8 @@ class Known:
 
     unstable = failed = 0
 
-    def at(self, theta: np.ndarray) -> Evaluated:
-        return Evaluated(-0.5 * float(np.sum(((theta - MEAN) / DEVIATION) ** 2)), None, np.empty(0))
+    def log_density(self, theta: np.ndarray) -> float:
+        return -0.5 * float(np.sum(((theta - MEAN) / DEVIATION) ** 2))
 
     def linearised(self, theta: np.ndarray) -> float:
         return -0.5 * float(np.sum(((theta - MEAN - 0.3 * DEVIATION) / (1.2 * DEVIATION)) ** 2))
@@ -47,9 +47,8 @@ class Known:
 def proposal() -> Proposal:
     def mode(mean: np.ndarray, times: float) -> SimpleNamespace:
         prior = SimpleNamespace(low=np.full(2, -np.inf), high=np.full(2, np.inf), share=0.5)
-        estimate = SimpleNamespace(theta=mean, problem=SimpleNamespace(mode=prior))
-        laplace = SimpleNamespace(covariance=np.diag((times * DEVIATION) ** 2))
-        return SimpleNamespace(estimate=estimate, laplace=laplace, log_evidence=0.0)
+        laplace = SimpleNamespace(posterior=Gaussian(mean, np.diag((times * DEVIATION) ** 2)))
+        return SimpleNamespace(theta=mean, problem=SimpleNamespace(mode=prior), laplace=laplace, log_evidence=0.0)
 
     return Proposal((mode(MEAN + 0.2 * DEVIATION, 0.9), mode(MEAN - 0.5 * DEVIATION, 1.3)))
 

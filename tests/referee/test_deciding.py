@@ -1,14 +1,12 @@
 """Verdicts of least expected loss by the tool's table."""
 
-import itertools
 import json
 
 import pytest
 
 from referee.calibrate import FILE
-from referee.decision import Decision, decide, loss
+from referee.decision import decide
 from referee.diagnoses import NOT_PHYSICS, UNKNOWN
-from warpbrain.inference import decide as tool
 
 
 @pytest.mark.parametrize(
@@ -28,18 +26,3 @@ def test_verdicts(sets, verdict, causes):
     losses = json.loads(FILE.read_text())["losses"]
     found = decide({frozenset(names): p for names, p in sets.items()}, losses)
     assert (found.verdict, found.causes) == (verdict, causes)
-
-
-def test_the_analyst_pays_what_the_tool_pays():
-    losses = json.loads(FILE.read_text())["losses"]
-    names, wrong = ("gravity", "pressure", "swelling"), "registration"
-    sets = [subset for size in range(3) for subset in itertools.combinations(names, size)]
-    given = [(verdict, ()) for verdict in ("nothing missing", "cannot say", "unknown")]
-    given += [(verdict, named) for verdict in ("named", "named + rest") for named in sets if named]
-    given += [("group", names[:2]), ("group", ("gravity", UNKNOWN)), ("not physics", (wrong,))]
-    for mechanisms, unknown, no_physics in itertools.product(sets, (False, True), (False, True)):
-        true = frozenset((*mechanisms, *[UNKNOWN] * unknown, *[NOT_PHYSICS] * no_physics))
-        same = tool.Truth(frozenset(mechanisms), unknown, frozenset([wrong] * no_physics))
-        for verdict, causes in given:
-            ours = loss(Decision(verdict, causes), true, losses)
-            assert ours == tool.loss(tool.Decision(verdict, causes), same, losses), (verdict, causes, same)

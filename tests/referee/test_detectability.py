@@ -1,6 +1,7 @@
 """What is not known of a case: against full equilibria, the field as it is drawn, and what it can hide."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -22,9 +23,15 @@ from referee.unknowns import stiffness_modes, unknowns_of
 @pytest.fixture(params=[3, 4], ids=["moved", "force"])
 def known(request, small):
     """A setting, its problem, what its body does, what is not known of it and what is seen."""
-    random = np.random.default_rng(request.param)
+    return known_of(request.param)
+
+
+@cache
+def known_of(seed):
+    """Of the small body, which the tests of this file alone ask for."""
+    random = np.random.default_rng(seed)
     setting = draw_setting(random, "phantom", False)
-    while (setting.total is None) != (request.param == 3) or not setting.surface or setting.times:
+    while (setting.total is None) != (seed == 3) or not setting.surface or setting.times:
         setting = draw_setting(random, "phantom", False)
     setting = replace(setting, points=40, checks=10)
     problem = setting.problem()

@@ -70,6 +70,12 @@ def picture(tmp_path, capfd):
     return lambda case: draw(tmp_path / "a.png", case, capfd)
 
 
+@pytest.fixture(scope="module")
+def kept() -> dict[object, NDArray[np.float64]]:
+    """Pictures that several tests look at, by what they are of."""
+    return {}
+
+
 def places(image: NDArray[np.float64], colour: str) -> NDArray[np.int64]:
     """Rows and columns of the pixels of a colour."""
     rgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
@@ -165,9 +171,11 @@ def test_a_set_of_another_name_is_what_was_resected(picture):
         (2, 1, 0, "above"),  # sagittal: the same
     ],
 )
-def test_the_right_way_round(picture, axis, row, column, side):
+def test_the_right_way_round(picture, kept, axis, row, column, side):
     """Tissue 2, on the positive side of the axis, is where a radiologist looks for it."""
-    seen = panel(picture(case_of(body(axis))), row, column)
+    if axis not in kept:
+        kept[axis] = picture(case_of(body(axis)))
+    seen = panel(kept[axis], row, column)
     first, second = (np.median(places(seen, colour), axis=0) for colour in (FIRST, SECOND))
     assert second[1 if side == "left" else 0] < first[1 if side == "left" else 0] - 20
 
@@ -185,11 +193,13 @@ def test_the_right_way_round(picture, axis, row, column, side):
         ((0, 0, 0.02), 1, 1, (-1, 0)),
     ],
 )
-def test_arrows_point_where_the_tissue_went(picture, displacement, row, column, along):
+def test_arrows_point_where_the_tissue_went(picture, kept, displacement, row, column, along):
     """An arrow begins in the middle: most of its pixels are on the side where it points."""
     mesh = body()
     middle = mesh.points.mean(axis=0)
-    seen, still = (panel(picture(case_of(mesh, tracked(middle, u))), row, column) for u in (displacement, np.zeros(3)))
+    for u in {displacement, (0, 0, 0)} - set(kept):
+        kept[u] = picture(case_of(mesh, tracked(middle, u)))
+    seen, still = (panel(kept[u], row, column) for u in (displacement, (0, 0, 0)))
     arrow, point = (places(image, BLACK) for image in (seen, still))
     # letters and scale bar are grey; what is black in both is the panel's title
     arrow = np.array(sorted(set(map(tuple, arrow)) - set(map(tuple, point))))

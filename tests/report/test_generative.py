@@ -1,6 +1,7 @@
 """Pictures of the generative model: a panel for every group, axes with units, whatever a user adds."""
 
 import warnings
+from dataclasses import replace
 
 import matplotlib.image
 import matplotlib.pyplot as plt
@@ -44,7 +45,8 @@ def saved(figure, path):
 
 
 def test_every_group_has_its_panels(models):
-    model, other = models
+    # the averages over hierarchies are those of the next test; one hierarchy has the same panels
+    model, other = (replace(one, sample=()) if isinstance(one, Hierarchical) else one for one in models)
     for figure, each in zip(pictures(model, other), (1, 1, 2), strict=True):
         assert len(figure.axes) == each * len(GROUPS)
         titles = [axes.get_title() for axes in figure.axes if axes.get_title()]

@@ -127,7 +127,7 @@ def _of_a_specimen() -> _Way:
     from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 
     return _Way(
-        lambda case, asked, device, listener: DiagnosingSpecimen(case, asked.of_specimen, device, listener.stage),
+        lambda case, asked, device, listener: DiagnosingSpecimen(case, asked.of_specimen, device, listener),
         lambda found, asked, device: describe_specimen_diagnosis(found, asked.of_specimen, device),
         lambda found, _said: specimen_diagnosis_lines(found),
         {"curves.csv": write_curves},

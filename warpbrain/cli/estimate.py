@@ -128,7 +128,7 @@ def _estimate(
     options: argparse.Namespace, asked: EstimationOptions, case: Case, out: Path, say: Callable[..., None]
 ) -> None:
     from warpbrain.estimation.estimate import Estimation, Listener
-    from warpbrain.estimation.gauss_newton import GaussNewtonStep
+    from warpbrain.estimation.modes import GaussNewtonStep
     from warpbrain.gp.trained import find_model
     from warpbrain.report import estimate_picture
     from warpbrain.report.estimate import describe_estimate
@@ -173,7 +173,7 @@ def _averaged(posterior: Posterior, device: str | None, on_stage: Callable[[str]
     from warpbrain.worlds.body.screened import screened
     from warpbrain.worlds.listener import Listener
 
-    prior, mesh_error = posterior.best.estimate.problem.mode.gaussian, posterior.options.discretisation is not None
+    prior, mesh_error = posterior.best.problem.mode.gaussian, posterior.options.discretisation is not None
     try:
         return averaged_tissue(screened(posterior.case, device, Listener(on_stage), prior, mesh_error=mesh_error))
     except (InputError, SolveError, LinAlgError) as error:

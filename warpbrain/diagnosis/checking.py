@@ -30,7 +30,7 @@ def check_errors(case: Case, base: Base, fits: Sequence[Refit]) -> tuple[float, 
     same for recordings that are fitted and for others.
     """
     checks = Observations.to_check(case)
-    if all(observation.kind == "force" for observation in checks.each):
+    if all(observation.kind == "force" for observation in checks.recordings):
         return None
     centre, declared = base.states.centre, base.declared
     sensors = sensors_at([(math.inf, checks, declared.u, declared.reactions)], centre)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +15,7 @@ from warpbrain.diagnosis.measuring import next_measurements
 from warpbrain.diagnosis.onset import Onset, onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.ranking import Ranking, about_base
-from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Measurement, Ranked
+from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Ranked
 from warpbrain.diagnosis.sentences import assumptions_of
 from warpbrain.diagnosis.telling_apart import imitations, smallest
 from warpbrain.diagnosis.traits import Traits, traits_of
@@ -34,6 +31,8 @@ from warpbrain.inference.decide import (
     Decision,
     decide,
 )
+from warpbrain.physics.values import Measurement
+from warpbrain.seconds import Seconds
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.observable import require_observable
@@ -93,7 +92,7 @@ class Diagnosing:
         self.options = options or DiagnosisOptions()
         self.listener = listener or Listener()
         require_observable(case)
-        self.seconds: dict[str, float] = {}
+        self.seconds = Seconds()
 
     def run(self) -> Diagnosis:
         """Run every stage.
@@ -116,34 +115,34 @@ class Diagnosing:
             mesh_error=options.mesh_error,
             without_nuisances=options.without_nuisances,
             mechanisms=options.candidates,
-            timed=self._timed,
+            timed=self.seconds.of,
         )
         spacing = search.spacing
         confirming = Confirming(search, options.draws, random)
         nothing = search.nothing
-        with self._timed("significance"):
+        with self.seconds.of("significance"):
             p_value = confirming.p_of_nothing(nothing)
-        with self._timed("fits"):
+        with self.seconds.of("fits"):
             search.fit(alone=p_value > options.alpha)
         nothing = search.nothing
         by_posterior = self._decided(search, p_value)
         self.listener.stage("checks")
-        with self._timed("checks"):
+        with self.seconds.of("checks"):
             checked = self._checked(search, confirming, by_posterior)
             best, named = checked.best, checked.named
             held_out = confirming.held_out(nothing, best) if named else None
             ranking = Ranking(search, confirming)
             ranked = ranking.all()
-        with self._timed("where"):
+        with self.seconds.of("where"):
             model, residual = nothing.marginal.model, nothing.residual
             draws = model.draws(options.draws, random)
             where = score_map(search.base.at, model, residual, draws, _PATCH * spacing, spacing, options.alpha)
             unknown = self._traits(checked.decision, search, best, where)
-        with self._timed("what would be seen"):
+        with self.seconds.of("what would be seen"):
             confusion = imitations(search.causes, model)
             seen = smallest(search.causes, model, confusion)
         self.listener.stage("what to measure next")
-        with self._timed("next measurement"):
+        with self.seconds.of("next measurement"):
             measurements = _next(search, ranked)
         weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
         predictions = {REFITTED: confirming.predict(nothing, confirming.held_out_for(best))}
@@ -244,12 +243,6 @@ class Diagnosing:
             check_errors(self.case, base, refits),
         )
 
-    @contextmanager
-    def _timed(self, stage: str) -> Iterator[None]:
-        begun = time.perf_counter()
-        yield
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
-
 
 def diagnose(
     case: Case,
@@ -284,7 +277,7 @@ def diagnose(
     if case.specimen is None:
         return Diagnosing(case, options, device, listener).run()
     specimen_options = (options or DiagnosisOptions()).of_specimen
-    return DiagnosingSpecimen(case, specimen_options, device, (listener or Listener()).stage).run()
+    return DiagnosingSpecimen(case, specimen_options, device, listener).run()
 
 
 def _not_fitted(search: HypothesisSearch, causes: tuple[str, ...]) -> _Checked:

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.diagnosis.result import Measurement
 from warpbrain.inference import GaussianModel
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.values import Measurement
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.sensors import spread_points

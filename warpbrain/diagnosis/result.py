@@ -17,7 +17,7 @@ from warpbrain.inference import Kind
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.decide import Decision
 from warpbrain.inference.predict import Prediction
-from warpbrain.physics.values import Smallest, Value
+from warpbrain.physics.values import Measurement, Smallest, Value
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.weighted_set import WeightedSet
@@ -64,21 +64,6 @@ class Ranked:
     radius: float | None
     region: str
     rejected_because: str = ""
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """Something that could be measured next.
-
-    Attributes
-    ----------
-    what : str
-    expected_nats : float
-        By which it would tell the two most probable causes apart, expected log Bayes factor.
-    """
-
-    what: str
-    expected_nats: float
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """Posterior of an unknown force: its resultant, its place, and whether it acts on the surface.
 
-The force is that of independent Gaussian patches all over the body. With linear functionals `E c` of coefficients
-`c ~ N(0, s^2 I)`, `A` the response of the sensors to these and `S` the covariance of noise and nuisances
+The force is that of independent Gaussian patches all over the body. With `E c` linear functionals of their
+coefficients `c ~ N(0, s^2 I)`, `A` the response of the sensors to these and `S` the covariance of noise and nuisances
 
     mean = s^2 E A^T (S + s^2 A A^T)^-1 r,     covariance = s^2 E E^T - s^4 E A^T (S + s^2 A A^T)^-1 A E^T.
 

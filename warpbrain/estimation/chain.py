@@ -12,13 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
 from warpbrain.estimation.proposal import Proposal
-from warpbrain.estimation.target import Evaluated, Target
-
-Floats = NDArray[np.float64]
+from warpbrain.estimation.target import Target
 
 #: Steps a solve at most, that a chain may end which finds nothing.
 _STEPS_A_SOLVE = 50
@@ -75,8 +73,8 @@ def run_chain(
     SolveError
         If the start has no equilibrium.
     """
-    here, cheap = target.at(start), target.linearised(start)
-    if not np.isfinite(here.log_density):
+    here, cheap = target.log_density(start), target.linearised(start)
+    if not np.isfinite(here):
         raise SolveError(f"a chain cannot start from theta = {start.tolist()}: there is no equilibrium")
     theta, path = start, [start]
     done, accepted = 1, 0
@@ -84,12 +82,12 @@ def run_chain(
         trial, balance = _propose(target, proposal, theta, rng)
         cheap_there = target.linearised(trial)
         if np.log(rng.uniform()) < cheap_there - cheap + balance:
-            there: Evaluated = target.at(trial)
+            there = target.log_density(trial)
             done += 1
             if on_solve is not None:
                 on_solve(done)
             # the share that the first stage has decided already is taken off
-            if np.log(rng.uniform()) < (there.log_density - here.log_density) - (cheap_there - cheap):
+            if np.log(rng.uniform()) < (there - here) - (cheap_there - cheap):
                 theta, here, cheap = trial, there, cheap_there
                 accepted += 1
         path.append(theta)
@@ -104,8 +102,7 @@ def _propose(target: Target, proposal: Proposal, theta: Floats, rng: np.random.G
         back, there = proposal.log_density(np.array([theta, trial]))
         return trial, float(back - there)
     # one size of step wherever it starts, or there would be no way back
-    mode = proposal.modes[0]
-    factor = np.linalg.cholesky(mode.laplace.covariance)
+    factor = proposal.modes[0].laplace.posterior.factor
     return theta + 1.7 / np.sqrt(len(theta)) * factor @ rng.normal(size=len(theta)), 0.0
 
 

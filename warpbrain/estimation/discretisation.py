@@ -28,19 +28,17 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import ROUGH, Forward, State
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.inference.beliefs import belief
-from warpbrain.physics.force import NodalForce
-from warpbrain.simulation.finer import FinerCase, restricted
+from warpbrain.recordings.agreement import root_mean_square
+from warpbrain.simulation.finer import FinerCase, GivenForces, restricted
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.sensitivity import Sensitivities
-
-Floats = NDArray[np.float64]
 
 #: Of the range of `b` in which the error of the stiffness is finite: beyond, `a` goes on along its tangent.
 _WHOLE = 0.8
@@ -85,9 +83,9 @@ class Discretisation:
         return np.concatenate([[self.mean], np.zeros(len(NAMES) - 1)])
 
     @property
-    def precisions(self) -> Floats:
+    def deviations(self) -> Floats:
         """Of `b` and the coefficients of `B`, shape (37,)."""
-        return np.concatenate([[self.deviation**-2], np.full(len(NAMES) - 1, self.shape**-2)])
+        return np.concatenate([[self.deviation], np.full(len(NAMES) - 1, self.shape)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +107,7 @@ class Difference:
     @property
     def size(self) -> float:
         """Root mean square over the nodes [m]."""
-        return float(np.sqrt(np.mean(np.sum(self.u**2, axis=1))))
+        return root_mean_square(self.u)
 
     def less(self, other: Difference) -> Difference:
         """By how much it is more than another."""
@@ -230,12 +228,13 @@ class FinerMesh:
     """
 
     def __init__(self, case: Case, theta: Floats, device: str | None = None) -> None:
-        finer = FinerCase(case)
+        known = Parameters.of(case).applied(case, theta)
+        finer = FinerCase(known)
         self._prolong = finer.prolongation
         away = case.remaining[0].points - case.remaining[0].points.mean(axis=0)
-        self._positions = away / np.sqrt(np.mean(np.sum(away**2, axis=1)))
-        added = finer.spread(_shared_forces(Parameters.of(case).applied(case, theta)))
-        self._forward = Forward(finer.case, theta, device, added)
+        self._positions = away / root_mean_square(away)
+        shared = [load for load in finer.model(model_of(known)[0]).loads if isinstance(load, GivenForces)]
+        self._forward = Forward(finer.case, theta, device, shared)
         #: The last error on the finer mesh, with which the next state there is predicted.
         self._last: Floats | float = 0.0
 
@@ -260,7 +259,7 @@ class FinerMesh:
         """
         start = self._prolong @ state.u
         try:
-            finer = _solve(self._forward, state.theta, start + self._last)
+            finer = self._forward.solve_from(state.theta, (start + self._last, None), ROUGH)
             by_theta = self._forward.differentiate(finer)
         except SolveError as error:
             raise SolveError(
@@ -280,21 +279,3 @@ class FinerMesh:
         both = [restricted(self._prolong, du, dR) for du, dR in pairs]
         du, dR = (np.array([one[k] for one in both]) for k in range(2))
         return *restricted(self._prolong, finer.u, finer.reactions), du, dR
-
-
-def _solve(forward: Forward, theta: Floats, start: Floats) -> State:
-    """From a start that may turn elements inside out, or be of another branch; from rest, if it is."""
-    try:
-        return forward.solve(theta, start, ROUGH)
-    except SolveError:
-        return forward.solve(theta, None, ROUGH)
-
-
-def _shared_forces(case: Case) -> Floats:
-    """Nodal forces [N] of the boundaries that share a force among their nodes, long after every ramp."""
-    model, _ = model_of(case)
-    shared = [load for load in model.loads if isinstance(load, NodalForce)]
-    total = np.zeros(model.mesh.points.shape)
-    for load in shared:
-        total += load.factor(math.inf) * load.nodal_forces(model.mesh)
-    return total

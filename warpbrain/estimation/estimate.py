@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
 from warpbrain.estimation.chain import Chain, run_chain
 from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, FinerMesh
 from warpbrain.estimation.forward import Forward
-from warpbrain.estimation.gauss_newton import GaussNewton, GaussNewtonOptions, GaussNewtonStep, require_explained
+from warpbrain.estimation.gauss_newton import GaussNewton, require_explained
 from warpbrain.estimation.importance import Importance, importance_sampling
-from warpbrain.estimation.modes import Mode
+from warpbrain.estimation.modes import Estimate, GaussNewtonStep
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
@@ -29,9 +26,9 @@ from warpbrain.estimation.proposal import Proposal
 from warpbrain.estimation.target import Target
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
+from warpbrain.recordings.agreement import root_mean_square
+from warpbrain.seconds import Seconds
 from warpbrain.simulation.locking import on_linear_elements
-
-Floats = NDArray[np.float64]
 
 #: The error of the mesh is computed again until the estimate moves by no more than this, in standard deviations.
 _SETTLED = 0.2
@@ -118,38 +115,38 @@ class Estimation:
         self.case = case
         self.options = options or EstimationOptions()
         self.listener = listener or Listener()
-        self.seconds: dict[str, float] = {}
+        self.seconds = Seconds()
         self._device = device
         self._remarks = on_linear_elements(case.poisson, "an estimate")
         # what is wrong with recordings is known before anything is computed
         self.observations = Observations.to_fit(case)
         self._remarks += self.observations.remarks
         self.parameters = Parameters.of(case)
-        with self._timed("prior"):
+        with self.seconds.of("prior"):
             self.prior = prior if isinstance(prior, Prior) else prior_of(case, prior, seed=self.options.seed)
             self.prior_modes = prior_modes(self.prior, self.parameters)
-        with self._timed("pre-processing"):
+        with self.seconds.of("pre-processing"):
             self.forward = Forward(case, self.prior_modes[0].gaussian.mean, device)
 
     def run(self) -> Posterior:
         """All stages."""
-        with self._timed("estimate"):
+        with self.seconds.of("estimate"):
             modes = self.fit(Nuisances(registration=self.options.registration))
         solves = {"estimate": self.forward.solves}
         errors: list[DiscretisationError] = []
         if self.options.discretisation is not None:
-            with self._timed("error of the mesh"):
-                modes = self._without_error_of_mesh(modes, self.options.discretisation, errors, solves)
-        require_explained(modes[0].estimate)
+            with self.seconds.of("error of the mesh"):
+                modes = self._corrected_for_mesh(modes, self.options.discretisation, errors, solves)
+        require_explained(modes[0])
         before = self.forward.solves
-        with self._timed("check of the posterior"):
+        with self.seconds.of("check of the posterior"):
             target, proposal = Target(self.prior, modes), Proposal.of(modes)
             importance = self._check(target, proposal)
         solves["check of the posterior"] = self.forward.solves - before
         doubts, chain = importance.doubts(modes[0].laplace), None
         if doubts:
             before = self.forward.solves
-            with self._timed("chain"):
+            with self.seconds.of("chain"):
                 chain = self._sample(target, proposal, importance)
             solves["chain"] = self.forward.solves - before
         return Posterior(
@@ -166,13 +163,13 @@ class Estimation:
             self.seconds,
         )
 
-    def fit(self, nuisances: Nuisances, starts: tuple[Mode, ...] = ()) -> tuple[Mode, ...]:
+    def fit(self, nuisances: Nuisances, starts: tuple[Estimate, ...] = ()) -> tuple[Estimate, ...]:
         """The estimate in every mode of the prior, the most probable first.
 
         Parameters
         ----------
         nuisances : Nuisances
-        starts : tuple of Mode, optional
+        starts : tuple of Estimate, optional
             Estimates with other nuisances, from which to go on.
 
         Raises
@@ -181,7 +178,7 @@ class Estimation:
             If there is none in any mode.
         """
         found, failures = [], []
-        begun = {id(mode.estimate.problem.mode): mode for mode in starts}
+        begun = {id(mode.problem.mode): mode for mode in starts}
         for prior_mode in self.prior_modes:
             if starts and id(prior_mode) not in begun:
                 continue
@@ -196,7 +193,7 @@ class Estimation:
             raise failures[0]
         return tuple(sorted(found, key=lambda mode: -mode.log_evidence))
 
-    def _fit_one(self, prior_mode: PriorMode, nuisances: Nuisances, start: Mode | None) -> Mode:
+    def _fit_one(self, prior_mode: PriorMode, nuisances: Nuisances, start: Estimate | None) -> Estimate:
         many = len(self.prior_modes) > 1
         text = "Gauss-Newton" + (f", {_where(self.parameters, prior_mode)}" if many else "")
         self.listener.stage(text if start is None else f"{text}, with the error of the mesh")
@@ -204,43 +201,41 @@ class Estimation:
         # what is only the start of something better need not be exact
         final = self.options.discretisation is None or nuisances.error is not None
         tolerance = self.options.tolerance if final else max(self.options.tolerance, _BEFORE)
-        search = GaussNewton(problem, GaussNewtonOptions(tolerance), self.listener.step)
+        search = GaussNewton(problem, tolerance, self.listener.step)
         if start is None:
             found = search.solve()
         else:
-            known = start.estimate.point.nuisances
-            values = nuisances.mean.copy()
+            known = start.point.nuisances
+            values = nuisances.prior.mean.copy()
             values[len(values) - len(known) :] = known
-            found = search.solve(start.estimate.point.state, values)
+            found = search.solve(start.point.state, values)
         if not found.converged:
             self._remarks.append(f"{text}: not converged")
-        return Mode.of(found)
+        return found
 
-    def _without_error_of_mesh(
+    def _corrected_for_mesh(
         self,
-        modes: tuple[Mode, ...],
+        modes: tuple[Estimate, ...],
         believed: Discretisation,
         errors: list[DiscretisationError],
         solves: dict[str, int],
-    ) -> tuple[Mode, ...]:
+    ) -> tuple[Estimate, ...]:
         before = self.forward.solves
         finer: FinerMesh | None = None
         for _ in range(_MOST_ERRORS):
             self.listener.stage("error of the mesh: one equilibrium on elements of half the size")
             best = modes[0]
             if finer is None:
-                finer = FinerMesh(self.case, best.estimate.theta, self._device)
-            derivatives = best.estimate.linearised.du, best.estimate.linearised.dR
-            errors.append(finer.error(best.estimate.point.state, derivatives))
+                finer = FinerMesh(self.case, best.theta, self._device)
+            derivatives = best.linearised.du, best.linearised.dR
+            errors.append(finer.error(best.point.state, derivatives))
             nuisances = Nuisances(believed, errors[-1], self.options.registration)
             modes = self.fit(nuisances, modes)
-            moved = modes[0].estimate.theta - errors[-1].theta
-            if np.sqrt(moved @ np.linalg.solve(modes[0].laplace.covariance, moved)) <= _SETTLED:
+            if np.sqrt(2.0 * modes[0].laplace.posterior.negative_log(errors[-1].theta)) <= _SETTLED:
                 break
         else:
             self._remarks.append("the error of the mesh was still changing when it was last computed")
-        whole = float(np.sqrt(np.mean(np.sum(modes[0].estimate.point.state.u ** 2, axis=1))))
-        part = errors[-1].change.size / whole
+        part = errors[-1].change.size / root_mean_square(modes[0].point.state.u)
         if part > _TOO_COARSE:
             self._remarks.append(
                 f"the mesh is coarse: on elements of half the size displacements change by {100.0 * part:.0f} %; what "
@@ -260,22 +255,16 @@ class Estimation:
         solves = self.options.chain
         self.listener.stage(f"Laplace's approximation fails: a chain of {solves} equilibria instead")
         best = int(np.argmax(importance.log_densities))
-        start = target.modes[0].estimate.theta
+        start = target.modes[0].theta
         if np.isfinite(importance.log_densities[best]):
             start = importance.theta[best]
         rng = np.random.default_rng([self.options.seed, 1])
         return run_chain(target, proposal, start, solves, rng, lambda n: self.listener.progress(n / solves))
 
-    @contextmanager
-    def _timed(self, stage: str) -> Iterator[None]:
-        begun = time.perf_counter()
-        yield
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
-
 
 def _where(parameters: Parameters, mode: PriorMode) -> str:
     """Which mode, in words: the signs of its exponents."""
-    ends = zip(parameters.each, mode.low, strict=True)
+    ends = zip(parameters, mode.low, strict=True)
     words = [
         f"{parameter.name} {'>' if low > 0.0 else '<'} 0" for parameter, low in ends if parameter.coordinate.signed
     ]

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
+from warpbrain.errors import SolveError
 from warpbrain.estimation.parameters import Parameters
+from warpbrain.physics.load import Load
 from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.of_case import plain_model_of
 from warpbrain.simulation.sensitivity import Sensitivities, SensitivitySolver
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: Out-of-balance force of an equilibrium, relative: where differences of residuals must mean something, and where what
 #: is left of it need only be far below any noise.
@@ -57,8 +56,8 @@ class Forward:
     theta : (p,) array
         Parameters to begin with; any that are stable.
     device : str, optional
-    added : (n, 3) array, optional
-        Nodal forces [N] beside the loads of the case.
+    loads : sequence of Load
+        Beside those of the case.
     elements : str
         See `Model`.
 
@@ -73,19 +72,17 @@ class Forward:
         case: Case,
         theta: Floats,
         device: str | None = None,
-        added: Floats | None = None,
+        loads: Sequence[Load] = (),
         elements: str = "tet4",
     ) -> None:
         self.parameters = Parameters.of(case)
         self._mechanisms = case.mechanisms
         plain, _ = plain_model_of(self.parameters.applied(case, theta))
-        self._plain = replace(plain, elements=elements)
+        self._plain = replace(plain, loads=[*plain.loads, *loads], elements=elements)
         self.system = System(self._model(theta), device)
         self._last: State | None = None
         self.solves = 0
         self._external = self.system.model.external_forces()
-        if added is not None:
-            self._external = self._external + added
         self._solvers = {
             tolerance: EquilibriumSolver(self.system, EquilibriumOptions(tolerance=tolerance))
             for tolerance in (EXACT, ROUGH)
@@ -113,6 +110,15 @@ class Forward:
         reactions = self.system.model.reactions(found.internal, self._external)
         self._last = State(theta.copy(), found.u, reactions, len(found.history), found.unstable_iterations > 0)
         return self._last
+
+    def solve_from(self, theta: Floats, starts: Sequence[Floats | None], tolerance: float = EXACT) -> State:
+        """The same from the first of some starts that leads to it; a bold one may turn elements inside out."""
+        for start in starts[:-1]:
+            try:
+                return self.solve(theta, start, tolerance)
+            except SolveError:
+                pass
+        return self.solve(theta, starts[-1], tolerance)
 
     def differentiate(self, state: State) -> Sensitivities:
         """Derivatives of a state by its parameters; `SolveError` if it is unstable."""

@@ -14,17 +14,15 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import State
 from warpbrain.estimation.likelihood import Noise
+from warpbrain.estimation.modes import Estimate, GaussNewtonStep
 from warpbrain.estimation.problem import Linearised, Point, Problem
-
-Floats = NDArray[np.float64]
 
 #: How often a first state is tried at moduli larger by a factor of e.
 _STIFFER = 4
@@ -32,76 +30,8 @@ _STIFFER = 4
 _FEWEST_EXPLAINED = 0.1
 #: Tolerance while noise is not known yet, and how often it is found again.
 _ROUGHLY, _ROUNDS = 0.1, 8
-
-
-@dataclass(frozen=True)
-class GaussNewtonOptions:
-    """How to look for the estimate.
-
-    Attributes
-    ----------
-    tolerance : float
-        Converged when the next step is shorter than this in standard deviations of the posterior.
-    least_step : float
-        Or when no parameter would change by more than this.
-    max_iterations : int
-        With each noise.
-    """
-
-    tolerance: float = 1e-3
-    least_step: float = 1e-7
-    max_iterations: int = 30
-
-
-@dataclass(frozen=True)
-class GaussNewtonStep:
-    """One line of the history.
-
-    Attributes
-    ----------
-    iteration : int
-        From 1.
-    objective : float
-        `-ln` of likelihood times prior, before the step.
-    decrement : float
-        Length of the whole step in standard deviations of the posterior.
-    step : float
-        Share of it that was taken.
-    newton_iterations : int
-        Of all equilibria that were tried.
-    """
-
-    iteration: int
-    objective: float
-    decrement: float
-    step: float
-    newton_iterations: int
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """The most probable parameters.
-
-    Attributes
-    ----------
-    problem : Problem
-    point : Point
-    linearised : Linearised
-        There.
-    converged : bool
-    history : tuple of GaussNewtonStep
-    """
-
-    problem: Problem
-    point: Point
-    linearised: Linearised
-    converged: bool
-    history: tuple[GaussNewtonStep, ...]
-
-    @property
-    def theta(self) -> Floats:
-        """Estimate of the parameters, shape (p,)."""
-        return self.point.state.theta
+#: Iterations at most with each noise, and the change of every parameter below which there is no other.
+_ITERATIONS, _LEAST_STEP = 30, 1e-7
 
 
 class GaussNewton:
@@ -110,7 +40,8 @@ class GaussNewton:
     Parameters
     ----------
     problem : Problem
-    options : GaussNewtonOptions, optional
+    tolerance : float
+        Converged when the next step is shorter than this in standard deviations of the posterior.
     on_step : callable, optional
         Called with each `GaussNewtonStep`.
     """
@@ -118,11 +49,11 @@ class GaussNewton:
     def __init__(
         self,
         problem: Problem,
-        options: GaussNewtonOptions | None = None,
+        tolerance: float = 1e-3,
         on_step: Callable[[GaussNewtonStep], None] | None = None,
     ) -> None:
         self.problem = problem
-        self.options = options or GaussNewtonOptions()
+        self.tolerance = tolerance
         self._on_step = on_step
         self._history: list[GaussNewtonStep] = []
 
@@ -144,7 +75,7 @@ class GaussNewton:
             If there is no equilibrium to start from.
         """
         problem = self.problem
-        values = problem.nuisances.mean if nuisances is None else nuisances
+        values = problem.nuisances.prior.mean if nuisances is None else nuisances
         self._history = []
         if start is None:
             point, linearised = self._first(values)
@@ -157,7 +88,7 @@ class GaussNewton:
             point = problem.with_likely_noise(point, linearised)
             linearised = problem.linearise(point, (linearised.du, linearised.dR))
             settled = isinstance(last, Noise) and point.known_noise.is_near(last)
-            tolerance = self.options.tolerance if number else max(_ROUGHLY, self.options.tolerance)
+            tolerance = self.tolerance if number else max(_ROUGHLY, self.tolerance)
             point, linearised, converged = self._descend(point, linearised, tolerance)
             if settled:
                 break
@@ -180,14 +111,13 @@ class GaussNewton:
 
     def _descend(self, point: Point, linearised: Linearised, tolerance: float) -> tuple[Point, Linearised, bool]:
         """Downhill with one noise to where a step is no longer worth it."""
-        options = self.options
         hessian = linearised.hessian
         for iteration in itertools.count():
             step = self._step(point, linearised, hessian)
             decrement = float(np.sqrt(step @ hessian @ step))
-            if decrement <= tolerance or np.abs(step).max() <= options.least_step:
+            if decrement <= tolerance or np.abs(step).max() <= _LEAST_STEP:
                 return point, linearised, True
-            if iteration == options.max_iterations:
+            if iteration == _ITERATIONS:
                 return point, linearised, False
             reached, share, newton = self._search(point, linearised, step)
             record = GaussNewtonStep(len(self._history) + 1, point.objective, decrement, share, newton)
@@ -231,9 +161,9 @@ class GaussNewton:
             predicted = point.state.u + np.tensordot(theta - point.state.theta, linearised.du, axes=1)
             try:
                 problem.parameters.require_possible(theta)
-                state = self._solve_near(theta, predicted, point.state.u)
+                state = problem.forward.solve_from(theta, (predicted, point.state.u))
                 newton += state.newton_iterations
-                trial = problem.at(state, point.nuisances + share * step[p:], point.given_noise)
+                trial = problem.at(state, point.nuisances + share * step[p:], point.noise)
                 if trial.objective < point.objective + 1e-4 * share * slope:
                     return (trial, problem.linearise(trial)), share, newton
             except (InputError, SolveError):
@@ -241,13 +171,6 @@ class GaussNewton:
                 pass
             share *= 0.5
         return None, 0.0, newton
-
-    def _solve_near(self, theta: Floats, predicted: Floats, last: Floats) -> State:
-        try:
-            return self.problem.forward.solve(theta, predicted)
-        except SolveError:
-            # a bold prediction may turn elements inside out
-            return self.problem.forward.solve(theta, last)
 
 
 def _secant(hessian: Floats, step: Floats, change: Floats) -> Floats:
@@ -270,7 +193,7 @@ def require_explained(estimate: Estimate) -> None:
     gross = estimate.point.known_noise.gross
     explained = int(np.count_nonzero(~gross))
     if explained < _FEWEST_EXPLAINED * len(gross):
-        names = ", ".join(f"'{one.name}'" for one in estimate.problem.observations.each if one.unit == "m")
+        names = ", ".join(f"'{one.name}'" for one in estimate.problem.observations.recordings if one.unit == "m")
         raise SolveError(
             f"no estimate: {len(gross) - explained} of {len(gross)} rows recorded in {names} are gross errors, "
             "farther from what any parameters found make of them than their sigma allows; is the unit, the axes or "

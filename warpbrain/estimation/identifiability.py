@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.estimation.gauss_newton import Estimate
-from warpbrain.estimation.laplace import Laplace
+from warpbrain.arrays import Floats
+from warpbrain.estimation.modes import Estimate
 from warpbrain.estimation.parameters import Parameter
+from warpbrain.physics.words import enumerated
 
-Floats = NDArray[np.float64]
 #: Parameters with their weights in a direction.
 Parts = Sequence[tuple[Parameter, float]]
 
@@ -65,11 +64,11 @@ class Identifiability:
         else:
             said = []
             if self.informed:
-                said.append(f"The recordings inform {_enumerated(self.informed)}.")
+                said.append(f"The recordings inform {enumerated(self.informed)}.")
             if self.weakly_informed:
-                said.append(f"They inform a little {_enumerated(self.weakly_informed)}.")
+                said.append(f"They inform a little {enumerated(self.weakly_informed)}.")
             if self.hidden:
-                said.append(f"They do not see {_enumerated(self.hidden)}: there the estimate is the prior.")
+                said.append(f"They do not see {enumerated(self.hidden)}: there the estimate is the prior.")
         if self.scale_is_hidden:
             said.append(
                 "Absolute stiffness cannot be told from displacements that displacements cause: a recorded force, or a "
@@ -78,9 +77,10 @@ class Identifiability:
         return tuple(said)
 
 
-def identifiability(estimate: Estimate, posterior: Laplace) -> Identifiability:
+def identifiability(estimate: Estimate) -> Identifiability:
     """What the data of an estimate inform."""
-    each, gains = posterior.parameters.each, posterior.gains
+    posterior = estimate.laplace
+    parameters, gains = tuple(posterior.parameters), posterior.gains
     told, between = gains >= TOLD, (gains < TOLD) & (gains >= HIDDEN)
     # one prior standard deviation of a parameter is the unit in which changes of different kinds compare
     unit = posterior.prior.standard_deviations
@@ -88,10 +88,14 @@ def identifiability(estimate: Estimate, posterior: Laplace) -> Identifiability:
     scale = posterior.parameters.is_modulus.astype(np.float64)
     moved = np.linalg.norm(np.tensordot(scale, estimate.linearised.du, axes=1))
     known = float(scale @ posterior.information @ scale) / float(scale @ posterior.prior.precision @ scale)
+    informed, weakly_informed = (
+        tuple(combination(_parts(parameters, row, 1.0 / unit)) for row in _reduced(posterior.combinations[rows] * unit))
+        for rows in (told, between)
+    )
     return Identifiability(
-        tuple(combination(_parts(each, row, 1.0 / unit)) for row in _reduced(posterior.told[told] * unit)),
-        tuple(combination(_parts(each, row, 1.0 / unit)) for row in _reduced(posterior.told[between] * unit)),
-        tuple(change(_parts(each, row, unit)) for row in _reduced(posterior.undone[gains < HIDDEN] / unit)),
+        informed,
+        weakly_informed,
+        tuple(change(_parts(parameters, row, unit)) for row in _reduced(posterior.directions[gains < HIDDEN] / unit)),
         known < HIDDEN and bool(moved <= _UNMOVED * np.linalg.norm(estimate.point.state.u)),
     )
 
@@ -107,19 +111,19 @@ def _reduced(rows: Floats) -> Floats:
     return rows
 
 
-def _parts(each: Sequence[Parameter], row: Floats, unit: Floats) -> Parts:
+def _parts(parameters: Sequence[Parameter], row: Floats, unit: Floats) -> Parts:
     """Parameters that count, in order; in their own units, the largest 1."""
     counted = np.flatnonzero(np.abs(row) >= _NEGLIGIBLE * np.abs(row).max()).tolist()
     weights = row * unit
     weights = weights / weights[counted][np.abs(weights[counted]).argmax()]
-    return [(each[k], float(weights[k])) for k in counted]
+    return [(parameters[k], float(weights[k])) for k in counted]
 
 
 def combination(parts: Parts) -> str:
     """A combination of parameters in words."""
     if len(parts) == 1:
         return f"the {_noun(parts[0][0])}"
-    tissues = _enumerated([parameter.tissue for parameter, _ in parts])
+    tissues = enumerated([parameter.tissue for parameter, _ in parts])
     if _are_opposite(parts):
         return f"the ratio of the shear moduli of {tissues}"
     if _are_alike(parts):
@@ -131,7 +135,7 @@ def change(parts: Parts) -> str:
     """A change of parameters, in words."""
     if len(parts) == 1:
         return f"a change of the {_noun(parts[0][0])}"
-    tissues = _enumerated([parameter.tissue for parameter, _ in parts])
+    tissues = enumerated([parameter.tissue for parameter, _ in parts])
     if _are_alike(parts):
         return f"a change of the shear moduli of {tissues} by one factor"
     if _are_opposite(parts):
@@ -158,7 +162,3 @@ def _noun(parameter: Parameter) -> str:
         parameter.coordinate.name, f"ratio {parameter.coordinate.name}"
     )
     return f"{what} of {parameter.tissue}"
-
-
-def _enumerated(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

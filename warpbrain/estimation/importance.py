@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.laplace import Laplace
 from warpbrain.estimation.pareto import RELIABLE, Smoothed, pareto_smoothed
 from warpbrain.estimation.proposal import Proposal
 from warpbrain.estimation.target import Target
-
-Floats = NDArray[np.float64]
 
 #: Laplace holds if weighted draws put the mean no farther away than this, in standard deviations, and the standard
 #: deviations in this ratio or its inverse.
@@ -81,7 +79,7 @@ def importance_sampling(
     unstable, failed = target.unstable, target.failed
     logs = np.empty(count)
     for number, point in enumerate(theta):
-        logs[number] = target.at(point).log_density
+        logs[number] = target.log_density(point)
         if on_draw is not None:
             on_draw(number + 1)
     smoothed = pareto_smoothed(logs - proposal.log_density(theta))

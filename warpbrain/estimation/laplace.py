@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.estimation.gauss_newton import Estimate
+from warpbrain.arrays import Floats
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.parameters import Parameters
-
-Floats = NDArray[np.float64]
+from warpbrain.estimation.problem import Linearised, Problem
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,19 +39,17 @@ class Laplace:
     information: Floats
 
     @classmethod
-    def of(cls, estimate: Estimate) -> Laplace:
-        """The posterior at an estimate."""
-        problem = estimate.problem
+    def of(cls, problem: Problem, theta: Floats, linearised: Linearised) -> Laplace:
+        """The posterior at the most probable parameters (p,) of a problem, linearised there."""
         p = len(problem.parameters)
-        joint = estimate.linearised.information
-        information = joint[:p, :p]
+        information, joint = linearised.information[:p, :p], linearised.hessian
         if len(problem.nuisances):
             # metres, radians and plain numbers: one size for all
-            size = np.sqrt(np.diag(joint[p:, p:] + problem.nuisances.precision))
-            nuisances = (joint[p:, p:] + problem.nuisances.precision) / np.outer(size, size)
+            size = np.sqrt(np.diag(joint[p:, p:]))
+            nuisances = joint[p:, p:] / np.outer(size, size)
             mixed = joint[p:, :p] / size[:, None]
             information = information - mixed.T @ np.linalg.solve(nuisances, mixed)
-        return cls(problem.parameters, estimate.theta, problem.mode.gaussian, information)
+        return cls(problem.parameters, theta, problem.mode.gaussian, information)
 
     @cached_property
     def covariance(self) -> Floats:
@@ -63,15 +59,15 @@ class Laplace:
         basis = self.prior.factor @ vectors
         return np.asarray(basis / (1.0 + values) @ basis.T)
 
+    @cached_property
+    def posterior(self) -> Gaussian:
+        """As a distribution."""
+        return Gaussian(self.theta, self.covariance)
+
     @property
     def standard_deviations(self) -> Floats:
         """Of each parameter, shape (p,)."""
-        return np.sqrt(np.diag(self.covariance))
-
-    @property
-    def correlation(self) -> Floats:
-        """Shape (p, p)."""
-        return self.covariance / np.outer(self.standard_deviations, self.standard_deviations)
+        return self.posterior.standard_deviations
 
     def interval(self, probability: float = 0.95) -> Floats:
         """Central interval of each parameter, shape (p, 2), no farther than its range goes."""
@@ -93,12 +89,12 @@ class Laplace:
         return self._eigen[0]
 
     @property
-    def told(self) -> Floats:
+    def combinations(self) -> Floats:
         """What the data told of each direction: combinations (p, p) of the parameters, one a row, largest entry 1."""
         return _normalised(np.linalg.inv(self.prior.factor).T @ self._eigen[1])
 
     @property
-    def undone(self) -> Floats:
+    def directions(self) -> Floats:
         """The change of all parameters along each direction, one a row (p, p), largest entry 1.
 
         Where the gain is small the data cannot tell the estimate from the estimate changed like this.

@@ -18,16 +18,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.estimation.observations import Observations, Residuals
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import Outliers, with_gross_errors
 from warpbrain.inference.noise import log_scale_density, noise_covariance, outliers, scales
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.int64]
 
 #: An undeclared noise is no smaller [m] or [N]: below this it is rounding of the computation.
 LEAST_SIGMA = 1e-9
@@ -64,7 +60,7 @@ class Rows:
     def of(cls, observations: Observations, parts: tuple[Residuals, ...]) -> Rows:
         """Those of residuals at a state: surfaces are looked at along their normals there."""
         positions, sigma, points, first = [], [], [], 0
-        for one in observations.each:
+        for one in observations.recordings:
             count = len(one.rows)
             where = one.positions if len(one.positions) else np.full((count, 3), np.nan)
             positions.append(np.repeat(where, one.size, axis=0))
@@ -79,7 +75,7 @@ class Rows:
             np.concatenate([part.directions.reshape(-1, 3) for part in parts]),
             np.concatenate(sigma),
             np.repeat(np.arange(len(parts)), sizes),
-            np.array([one.sigma is not None for one in observations.each]),
+            np.array([one.sigma is not None for one in observations.recordings]),
             tuple(points),
         )
 
@@ -89,7 +85,7 @@ class Rows:
 
 
 @dataclass(frozen=True, eq=False)
-class Rough:
+class EmpiricalNoise:
     """Independent noise as large as the residuals of each recording are, for the way to the estimate."""
 
     rows: Rows
@@ -126,7 +122,7 @@ class Noise:
         Factor on all of it.
     inflation : (g,) array
         How many times larger the noise of each point is: 1 of a sound one, more of a gross error.
-    believed : Outliers or None
+    outliers : Outliers or None
         What was believed of them; None: there are none.
     """
 
@@ -134,7 +130,7 @@ class Noise:
     sigma: Floats
     scale: float
     inflation: Floats
-    believed: Outliers | None
+    outliers: Outliers | None
 
     @property
     def gross(self) -> Bools:
@@ -157,9 +153,9 @@ class Noise:
     def log_prior(self) -> float:
         """Of its scale and of its gross errors."""
         found = float(log_scale_density(np.array(self.scale)))
-        if self.believed is not None:
-            kinds = np.searchsorted(self.believed.inflations, self.inflation)
-            found += float(self.believed.log_probabilities[kinds].sum())
+        if self.outliers is not None:
+            kinds = np.searchsorted(self.outliers.inflations, self.inflation)
+            found += float(self.outliers.log_probabilities[kinds].sum())
         return found
 
     def negative_log(self, residual: Floats) -> float:
@@ -187,13 +183,17 @@ class Noise:
             Rows that are gross errors.
         """
         own = self.rows.recordings == number
-        deviation = self.scale * np.sqrt(np.diag(self.rows.covariance(self.sigma)))
         gross = [wrong for rows, wrong in zip(self.rows.points, self.gross.tolist(), strict=True) if own[rows[0]]]
         return (
             self.scale * self.sigma[own].reshape(shape)[:, 0],
-            deviation[own].reshape(shape),
+            self._deviation[own].reshape(shape),
             np.array(gross or np.zeros(shape[0]), dtype=bool),
         )
+
+    @cached_property
+    def _deviation(self) -> Floats:
+        """Of each number (n,), with what neighbours share and without gross errors."""
+        return self.scale * np.sqrt(np.diag(self.rows.covariance(self.sigma)))
 
     def is_near(self, other: Noise) -> bool:
         """Whether another one has the same gross errors and nearly the same size."""

@@ -10,16 +10,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.discretisation import NAMES as DISCRETISATION_NAMES
 from warpbrain.estimation.discretisation import Discretisation, DiscretisationError
 from warpbrain.estimation.forward import State
+from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.observations import Residuals
 from warpbrain.estimation.registration import NAMES as REGISTRATION_NAMES
 from warpbrain.estimation.registration import Registration
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,28 +47,16 @@ class Nuisances:
         return len(self.names)
 
     @cached_property
-    def mean(self) -> Floats:
-        """Before anything was observed, shape (q,)."""
-        values = np.zeros(len(self))
+    def prior(self) -> Gaussian:
+        """Before anything was observed."""
+        means, deviations = [], []
         if self.error is not None and self.discretisation is not None:
-            values[: len(DISCRETISATION_NAMES)] = self.discretisation.means
-        return values
-
-    @cached_property
-    def precision(self) -> Floats:
-        """Inverse covariance before anything was observed, shape (q, q)."""
-        matrix = np.zeros((len(self), len(self)))
-        if self.error is not None and self.discretisation is not None:
-            count = len(DISCRETISATION_NAMES)
-            matrix[:count, :count] = np.diag(self.discretisation.precisions)
+            means.append(self.discretisation.means)
+            deviations.append(self.discretisation.deviations)
         if self.registration is not None:
-            matrix[-6:, -6:] = self.registration.precision
-        return matrix
-
-    def negative_log(self, values: Floats) -> float:
-        """Negative log density of the values (q,), less its constant."""
-        away = values - self.mean
-        return 0.5 * float(away @ self.precision @ away)
+            means.append(np.zeros(6))
+            deviations.append(self.registration.deviations)
+        return Gaussian(np.concatenate([[], *means]), np.diag(np.concatenate([[], *deviations]) ** 2))
 
     def observed(self, state: State, values: Floats) -> tuple[Floats, Floats]:
         """Displacement and reactions (n, 3) without the error of the mesh."""

@@ -13,8 +13,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
@@ -26,9 +26,6 @@ from warpbrain.recordings.comparison import faces_of_set
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
 from warpbrain.recordings.times import rows_at
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 #: Noise can be estimated from no fewer residuals than this.
 _FEWEST = 10
@@ -89,7 +86,7 @@ class Observation:
     name: str
     kind: str
     unit: str
-    rows: Rows
+    rows: Ints
     sigma: Floats | None
     weights: Floats
     size: int
@@ -103,12 +100,12 @@ class Observations:
 
     Attributes
     ----------
-    each : tuple of Observation
+    recordings : tuple of Observation
     remarks : tuple of str
         Recordings that say nothing of tissue, and why.
     """
 
-    each: tuple[Observation, ...]
+    recordings: tuple[Observation, ...]
     remarks: tuple[str, ...]
 
     @classmethod
@@ -131,9 +128,9 @@ class Observations:
             checks = f"; its {len(case.recordings)} have role = 'check'" if case.recordings else ""
             raise InputError(f"{case.path}: no [[recording]] to estimate from{checks}")
         found = cls._of(case, "fit", time)
-        if not found.each:
+        if not found.recordings:
             raise InputError(f"{case.path}: nothing to estimate from: {'; '.join(found.remarks)}")
-        for observation in found.each:
+        for observation in found.recordings:
             count = observation.size * len(observation.rows)
             if observation.sigma is None and count < _FEWEST:
                 raise InputError(
@@ -143,9 +140,9 @@ class Observations:
         return found
 
     @classmethod
-    def to_check(cls, case: Case, time: float | None = None) -> Observations:
+    def to_check(cls, case: Case) -> Observations:
         """The recordings that only score what was estimated without them; as `to_fit`."""
-        return cls._of(case, "check", time)
+        return cls._of(case, "check", None)
 
     @classmethod
     def _of(cls, case: Case, role: str, time: float | None) -> Observations:
@@ -164,7 +161,7 @@ class Observations:
     @property
     def centre(self) -> Floats:
         """Mean of all positions that were recorded [m], zero if there are none."""
-        positions = np.concatenate([observation.positions for observation in self.each])
+        positions = np.concatenate([observation.positions for observation in self.recordings])
         return positions.mean(axis=0) if len(positions) else np.zeros(3)
 
     def at(
@@ -185,7 +182,7 @@ class Observations:
         """
         about = self.centre if centre is None else centre
         by = np.zeros(6) if motion is None else motion
-        return tuple(observation.at(u, reactions, about, by) for observation in self.each)
+        return tuple(observation.at(u, reactions, about, by) for observation in self.recordings)
 
 
 def _observation(case: Case, recording: Recording, time: float | None) -> Observation:
@@ -301,7 +298,7 @@ def _force(case: Case, recording: ForceRecording, time: float | None) -> Observa
     return Observation(recording.name, recording.kind, "N", rows, sigma, ones, size, np.empty((0, 3)), at)
 
 
-def _sigma(recording: Recording, rows: Rows, weights: Floats) -> Floats | None:
+def _sigma(recording: Recording, rows: Ints, weights: Floats) -> Floats | None:
     """Standard deviation of each row, None if it is to be estimated."""
     sigmas = getattr(recording, "sigmas", None)
     if sigmas is None and recording.sigma is None:

@@ -28,7 +28,7 @@ class EstimationOptions:
     seed : int
         Of those draws.
     tolerance : float
-        Of Gauss-Newton, see `GaussNewtonOptions`.
+        Of Gauss-Newton, see `GaussNewton`.
     """
 
     likelihood: Likelihood = field(default_factory=Likelihood)

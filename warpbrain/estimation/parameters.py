@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.gp.coordinates import Coordinate, coordinates, from_coordinates, to_coordinates
 from warpbrain.physics.laws import Law, NeoHookean
 from warpbrain.physics.laws.stability import require_stable
 from warpbrain.physics.mechanism import Substituting
+from warpbrain.physics.words import enumerated
 from warpbrain.simulation.model import Material
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: How far one step of an estimation may go, by what a coordinate is: a factor of e in a modulus, so that the next
 #: equilibrium is within reach of the last.
@@ -97,18 +96,18 @@ class Parameters:
                     )
         return cls(
             tuple(tuple(labels) for labels in members.values()),
-            tuple(_listed([case.tissues[label].name for label in labels]) for labels in members.values()),
+            tuple(enumerated([case.tissues[label].name for label in labels]) for labels in members.values()),
             tuple(tissue.prior for tissue in first),
             tuple(tissue.model for tissue in first),
             tuple(tissue.formulation for tissue in first),
             _poisson(case),
         )
 
-    @property
-    def each(self) -> tuple[Parameter, ...]:
+    def __iter__(self) -> Iterator[Parameter]:
         """Every number of `theta`, in order."""
-        pairs = zip(self.tissues, self.laws_of, strict=True)
-        return tuple(Parameter(tissue, coordinate) for tissue, law in pairs for coordinate in coordinates(law))
+        for tissue, law in zip(self.tissues, self.laws_of, strict=True):
+            for coordinate in coordinates(law):
+                yield Parameter(tissue, coordinate)
 
     def __len__(self) -> int:
         return sum(len(coordinates(law)) for law in self.laws_of)
@@ -116,27 +115,27 @@ class Parameters:
     @property
     def names(self) -> tuple[str, ...]:
         """With tissue and unit."""
-        return tuple(parameter.name for parameter in self.each)
+        return tuple(parameter.name for parameter in self)
 
     @property
     def low(self) -> Floats:
         """Where each ends, shape (p,)."""
-        return np.array([parameter.coordinate.low for parameter in self.each])
+        return np.array([parameter.coordinate.low for parameter in self])
 
     @property
     def high(self) -> Floats:
         """Where each ends, shape (p,)."""
-        return np.array([parameter.coordinate.high for parameter in self.each])
+        return np.array([parameter.coordinate.high for parameter in self])
 
     @property
     def reach(self) -> Floats:
         """How far one step of an estimation may go, shape (p,)."""
-        return np.array([_REACH[parameter.coordinate.name] for parameter in self.each])
+        return np.array([_REACH[parameter.coordinate.name] for parameter in self])
 
     @property
     def is_modulus(self) -> Bools:
         """Which are logarithms of shear moduli, shape (p,)."""
-        return np.array([parameter.is_modulus for parameter in self.each])
+        return np.array([parameter.is_modulus for parameter in self])
 
     def theta_of(self, laws: Sequence[Law]) -> Floats:
         """The vector (p,) of the law of each tissue.
@@ -205,7 +204,3 @@ def _poisson(case: Case) -> float:
                     "estimate: leave it out, or write its law into the tissues"
                 )
     return poisson
-
-
-def _listed(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from warpbrain.arrays import Floats
 
 #: Beyond this k weighted means do not converge.
 RELIABLE = 0.7

@@ -7,21 +7,19 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.estimation.chain import Chain
 from warpbrain.estimation.discretisation import DiscretisationError
 from warpbrain.estimation.identifiability import Identifiability, identifiability
 from warpbrain.estimation.importance import Importance
-from warpbrain.estimation.modes import Mode, probabilities
+from warpbrain.estimation.modes import Estimate, probabilities
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
-from warpbrain.estimation.prediction import Prediction, Together, predictions
+from warpbrain.estimation.prediction import OverallErrors, Prediction, predictions
 from warpbrain.gp.prior import Prior
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +64,7 @@ class Posterior:
     case : Case
     options : EstimationOptions
     prior : Prior
-    modes : tuple of Mode
+    modes : tuple of Estimate
         The most probable first.
     remarks : tuple of str
         What a user should know of how it was found.
@@ -87,7 +85,7 @@ class Posterior:
     case: Case
     options: EstimationOptions
     prior: Prior
-    modes: tuple[Mode, ...]
+    modes: tuple[Estimate, ...]
     remarks: tuple[str, ...]
     mesh_errors: tuple[DiscretisationError, ...]
     importance: Importance
@@ -97,14 +95,14 @@ class Posterior:
     seconds: Mapping[str, float]
 
     @property
-    def best(self) -> Mode:
+    def best(self) -> Estimate:
         """The most probable mode."""
         return self.modes[0]
 
     @property
     def parameters(self) -> Parameters:
         """What `theta` means."""
-        return self.best.estimate.problem.parameters
+        return self.best.problem.parameters
 
     @property
     def method(self) -> str:
@@ -114,7 +112,7 @@ class Posterior:
     @property
     def theta(self) -> Floats:
         """The most probable parameters, shape (p,)."""
-        return self.best.estimate.theta
+        return self.best.theta
 
     @property
     def mode_probabilities(self) -> Floats:
@@ -165,16 +163,13 @@ class Posterior:
                 float(np.sqrt(self.prior.covariance[k, k])),
                 (float(prior[k, 0]), float(prior[k, 1])),
             )
-            for k, parameter in enumerate(self.parameters.each)
+            for k, parameter in enumerate(self.parameters)
         )
 
     @cached_property
     def joint_covariance(self) -> Floats:
         """Of parameters and nuisances by Laplace, shape (p + q, p + q)."""
-        p = len(self.parameters)
-        problem, information = self.best.estimate.problem, self.best.estimate.linearised.information.copy()
-        information[:p, :p] += problem.mode.gaussian.precision
-        information[p:, p:] += problem.nuisances.precision
+        information = self.best.linearised.hessian
         # metres, radians and plain numbers: one size for all
         size = np.sqrt(np.diag(information))
         return np.asarray(np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size))
@@ -183,19 +178,19 @@ class Posterior:
     def nuisances(self) -> tuple[tuple[str, float, float], ...]:
         """Name, estimate and standard deviation of each."""
         p = len(self.parameters)
-        names = self.best.estimate.problem.nuisances.names
-        values, deviations = self.best.estimate.point.nuisances, np.sqrt(np.diag(self.joint_covariance))[p:]
+        names = self.best.problem.nuisances.names
+        values, deviations = self.best.point.nuisances, np.sqrt(np.diag(self.joint_covariance))[p:]
         return tuple(zip(names, values.tolist(), deviations.tolist(), strict=True))
 
     @cached_property
     def identifiability(self) -> Identifiability:
         """What the recordings tell at all."""
-        return identifiability(self.best.estimate, self.best.laplace)
+        return identifiability(self.best)
 
     @cached_property
     def predictions(self) -> tuple[Prediction, ...]:
         """Recordings that were fitted, then those that check; these are looked at here for the first time."""
-        fitted = self.best.estimate.problem.observations
+        fitted = self.best.problem.observations
         both = (("fit", fitted), ("check", Observations.to_check(self.case)))
         return tuple(
             one
@@ -204,6 +199,6 @@ class Posterior:
         )
 
     @property
-    def together(self) -> tuple[Together, ...]:
+    def overall_errors(self) -> tuple[OverallErrors, ...]:
         """Errors over all rows of points and surfaces, of those that were fitted and of those that check."""
-        return Together.of(self.predictions)
+        return OverallErrors.of(self.predictions)

@@ -6,22 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.case import Case
 from warpbrain.estimation.likelihood import Noise, Rows
-from warpbrain.estimation.modes import Mode
+from warpbrain.estimation.modes import Estimate
 from warpbrain.estimation.observations import Observation, Observations, Residuals
 from warpbrain.estimation.realigned import realigned
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import with_gross_errors
-from warpbrain.mesh import TetMesh
 from warpbrain.recordings.agreement import by_unit
 from warpbrain.recordings.comparison import Comparison
+from warpbrain.simulation.mesh_error import Found
 from warpbrain.simulation.observation import observe
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: Probabilities of the intervals whose coverage is told.
 INTERVALS = (0.5, 0.95)
@@ -55,7 +52,7 @@ class Prediction:
     kind: str
     role: str
     unit: str
-    rows: NDArray[np.int64]
+    rows: Ints
     before: Floats
     after: Floats
     sigma: Floats | None
@@ -77,7 +74,7 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Together:
+class OverallErrors:
     """All points and surfaces of one role: root mean square of the 3-D distance over every row [m].
 
     Attributes
@@ -95,7 +92,7 @@ class Together:
     of_run: float
 
     @classmethod
-    def of(cls, each: Sequence[Prediction]) -> tuple[Together, ...]:
+    def of(cls, each: Sequence[Prediction]) -> tuple[OverallErrors, ...]:
         """Of each role that has any."""
         found = []
         for role in dict.fromkeys(one.role for one in each):
@@ -108,29 +105,22 @@ class Together:
         return tuple(found)
 
 
-@dataclass(frozen=True, eq=False)
-class _Moved:
-    """What recordings are compared with, see `warpbrain.simulation.observation.State`."""
-
-    mesh: TetMesh
-    u: Floats
-    reactions: Floats
-
-
-def predictions(case: Case, mode: Mode, role: str, observations: Observations, joint: Floats) -> tuple[Prediction, ...]:
+def predictions(
+    case: Case, estimate: Estimate, role: str, observations: Observations, joint: Floats
+) -> tuple[Prediction, ...]:
     """Recordings of one role beside an estimate.
 
     Parameters
     ----------
     case : Case
-    mode : Mode
+    estimate : Estimate
     role : {"fit", "check"}
     observations : Observations
         Of that role.
     joint : (p + q, p + q) array
         Covariance of parameters and nuisances.
     """
-    problem, point, derivatives = mode.estimate.problem, mode.estimate.point, mode.estimate.linearised
+    problem, point, derivatives = estimate.problem, estimate.point, estimate.linearised
     centre, motion = problem.observations.centre, problem.nuisances.motion(point.nuisances)
     rest = np.zeros_like(point.state.u)
     seen = problem.nuisances.observed(point.state, point.nuisances)
@@ -138,7 +128,7 @@ def predictions(case: Case, mode: Mode, role: str, observations: Observations, j
     run = compared(case, point.state.u, point.state.reactions)
     fitted = compared(realigned(case, motion, centre), *seen)
     found = []
-    for number, (observation, first, part) in enumerate(zip(observations.each, before, parts, strict=True)):
+    for number, (observation, first, part) in enumerate(zip(observations.recordings, before, parts, strict=True)):
         jacobian = problem.nuisances.jacobian(
             part, point.state.theta, point.nuisances, (derivatives.du, derivatives.dR)
         )
@@ -171,18 +161,18 @@ def predictions(case: Case, mode: Mode, role: str, observations: Observations, j
 def _unseen(observation: Observation, part: Residuals, jacobian: Floats, joint: Floats, fitted: Noise) -> Noise:
     """The noise of a recording that was not fitted, its gross errors beside what the estimate knows of it."""
     rows = Rows.of(Observations((observation,), ()), (part,))
-    noise = Noise(rows, rows.sigma, fitted.scale, np.ones(len(rows.points)), fitted.believed)
-    if observation.sigma is None or fitted.believed is None:
+    noise = Noise(rows, rows.sigma, fitted.scale, np.ones(len(rows.points)), fitted.outliers)
+    if observation.sigma is None or fitted.outliers is None:
         return noise
     columns = jacobian.reshape(-1, jacobian.shape[2]) @ np.linalg.cholesky(joint)
     model = GaussianModel(noise.factor, columns, noise.scale)
-    found = with_gross_errors(model, part.values.ravel(), rows.points, fitted.believed)
+    found = with_gross_errors(model, part.values.ravel(), rows.points, fitted.outliers)
     return replace(noise, inflation=found.inflation)
 
 
 def compared(case: Case, u: Floats, reactions: Floats) -> Mapping[str, Comparison]:
     """Recordings by name beside displacement and reactions (N, 3), as `warpbrain run` compares them."""
-    return {one.name: one for one in observe(case, _Moved(case.remaining[0], u, reactions)).comparisons}
+    return {one.name: one for one in observe(case, Found(case.remaining[0], u, reactions)).comparisons}
 
 
 def coverage(residuals: Floats, deviation: Floats, gross: Bools) -> tuple[float, ...] | None:

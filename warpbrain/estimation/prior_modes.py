@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups
 from warpbrain.errors import InputError
@@ -19,8 +19,6 @@ from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
-
-Floats = NDArray[np.float64]
 
 #: Draws on which the prior rests.
 DRAWS = 500
@@ -88,7 +86,7 @@ def prior_modes(prior: Prior, parameters: Parameters) -> tuple[PriorMode, ...]:
     if prior.theta.shape[1] != len(parameters):
         names = ", ".join(parameters.names)
         raise InputError(f"prior: of {prior.theta.shape[1]} parameters; the case has {len(parameters)}: {names}")
-    signed = np.array([parameter.coordinate.signed for parameter in parameters.each])
+    signed = np.array([parameter.coordinate.signed for parameter in parameters])
     signs = np.sign(prior.theta[:, signed])
     kinds, cluster, counts = np.unique(signs, axis=0, return_inverse=True, return_counts=True)
     kept = np.flatnonzero(counts >= max(_LEAST_SHARE * len(signs), 5 * len(parameters)))

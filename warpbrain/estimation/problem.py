@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.forward import Forward, State
-from warpbrain.estimation.likelihood import Likelihood, Noise, Rough, Rows
+from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.likelihood import EmpiricalNoise, Likelihood, Noise, Rows
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations, Residuals
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.prior_modes import PriorMode
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Point:
         With a rigid motion of what was recorded taken off.
     residual : (n,) array
         All of them, one after the other.
-    noise : Noise or Rough
+    noise : Noise or EmpiricalNoise
     misfit : float
         `-ln` of the likelihood and of the nuisances' density.
     objective : float
@@ -40,14 +40,9 @@ class Point:
     nuisances: Floats
     parts: tuple[Residuals, ...]
     residual: Floats
-    noise: Noise | Rough
+    noise: Noise | EmpiricalNoise
     misfit: float
     objective: float
-
-    @property
-    def given_noise(self) -> Noise | None:
-        """The noise, if it is known."""
-        return self.noise if isinstance(self.noise, Noise) else None
 
     @property
     def known_noise(self) -> Noise:
@@ -110,13 +105,21 @@ class Problem:
         """What `theta` means."""
         return self.forward.parameters
 
-    def at(self, state: State, nuisances: Floats, noise: Noise | None = None) -> Point:
+    @cached_property
+    def prior(self) -> Gaussian:
+        """Of parameters and nuisances together."""
+        from scipy.linalg import block_diag
+
+        both = self.mode.gaussian, self.nuisances.prior
+        return Gaussian(np.concatenate([one.mean for one in both]), block_diag(*(one.covariance for one in both)))
+
+    def at(self, state: State, nuisances: Floats, noise: Noise | EmpiricalNoise | None = None) -> Point:
         """The objective at a state; noise that is as large as the residuals are, unless it is known."""
         motion = self.nuisances.motion(nuisances)
         parts = self.observations.at(*self.nuisances.observed(state, nuisances), motion=motion)
         residual = np.concatenate([part.values.ravel() for part in parts])
-        known = Rough(Rows.of(self.observations, parts)) if noise is None else noise
-        misfit = known.negative_log(residual) + self.nuisances.negative_log(nuisances)
+        known = EmpiricalNoise(Rows.of(self.observations, parts)) if noise is None else noise
+        misfit = known.negative_log(residual) + self.nuisances.prior.negative_log(nuisances)
         objective = misfit + self.mode.gaussian.negative_log(state.theta)
         return Point(state, nuisances, parts, residual, known, misfit, objective)
 
@@ -139,20 +142,13 @@ class Problem:
             derivatives = found.u, found.reactions
         jacobian = self._jacobian(point, derivatives)
         gradient, information = _weighted(point, jacobian)
-        p, hessian, prior = len(self.parameters), information.copy(), self.mode.gaussian
-        gradient[:p] += prior.precision @ (point.state.theta - prior.mean)
-        hessian[:p, :p] += prior.precision
-        gradient[p:] += self.nuisances.precision @ (point.nuisances - self.nuisances.mean)
-        hessian[p:, p:] += self.nuisances.precision
-        return Linearised(jacobian, gradient, information, hessian, *derivatives)
+        gradient += self.prior.gradient(point.coordinates)
+        return Linearised(jacobian, gradient, information, information + self.prior.precision, *derivatives)
 
     def with_likely_noise(self, point: Point, linearised: Linearised) -> Point:
         """The point with the most probable noise, everything that is estimated integrated out about it."""
-        p, prior = len(self.parameters), self.mode.gaussian
-        deviations = 1.0 / np.sqrt(np.diag(self.nuisances.precision))
-        columns = np.column_stack([linearised.jacobian[:, :p] @ prior.factor, linearised.jacobian[:, p:] * deviations])
-        middle = np.concatenate([prior.mean, self.nuisances.mean])
-        expected = point.residual + linearised.jacobian @ (middle - point.coordinates)
+        columns = linearised.jacobian @ self.prior.factor
+        expected = point.residual + linearised.jacobian @ (self.prior.mean - point.coordinates)
         rows = Rows.of(self.observations, point.parts)
         return self.at(point.state, point.nuisances, self.likelihood.noise(rows, point.residual, expected, columns))
 
@@ -180,8 +176,8 @@ class Problem:
 
     def _by_nuisances(self, point: Point) -> tuple[Floats, Floats]:
         gradient, hessian = _weighted(point, self._jacobian(point, None))
-        gradient += self.nuisances.precision @ (point.nuisances - self.nuisances.mean)
-        return gradient, hessian + self.nuisances.precision
+        gradient += self.nuisances.prior.gradient(point.nuisances)
+        return gradient, hessian + self.nuisances.prior.precision
 
     def _jacobian(self, point: Point, derivatives: tuple[Floats, Floats] | None) -> Floats:
         """Derivatives (n, k) of the residuals, as `Nuisances.jacobian`."""

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.estimation.modes import Mode, probabilities
-
-Floats = NDArray[np.float64]
+from warpbrain.arrays import Bools, Floats
+from warpbrain.estimation.modes import Estimate, probabilities
 
 #: Degrees of freedom of the Student t around each estimate.
 _NU = 7.0
@@ -27,13 +25,13 @@ class Proposal:
 
     Attributes
     ----------
-    modes : tuple of Mode
+    modes : tuple of Estimate
     """
 
-    modes: tuple[Mode, ...]
+    modes: tuple[Estimate, ...]
 
     @classmethod
-    def of(cls, modes: Sequence[Mode]) -> Proposal:
+    def of(cls, modes: Sequence[Estimate]) -> Proposal:
         """Around those that are probable at all."""
         kept = probabilities(modes) >= _NEGLIGIBLE
         return cls(tuple(mode for mode, keep in zip(modes, kept, strict=True) if keep))
@@ -62,9 +60,8 @@ class Proposal:
 
         terms = []
         for mode, share, mass in zip(self.modes, self.shares, self._masses, strict=True):
-            factor = np.linalg.cholesky(mode.laplace.covariance)
-            away = np.linalg.solve(factor, (theta - mode.estimate.theta).T)
-            squares = np.sum(away**2, axis=0)
+            factor = mode.laplace.posterior.factor
+            squares = np.sum(np.linalg.solve(factor, (theta - mode.theta).T) ** 2, axis=0)
             logs = -0.5 * (_NU + theta.shape[1]) * np.log1p(squares / _NU) - float(np.log(np.diag(factor)).sum())
             logs += float(np.log(share / mass))
             terms.append(np.where(self._inside(mode, theta), logs, -np.inf))
@@ -77,12 +74,12 @@ class Proposal:
         return np.array([max(self._inside(m, self._t(rng, m, _DRAWS)).mean(), 1.0 / _DRAWS) for m in self.modes])
 
     @staticmethod
-    def _t(rng: np.random.Generator, mode: Mode, count: int) -> Floats:
-        factor = np.linalg.cholesky(mode.laplace.covariance)
+    def _t(rng: np.random.Generator, mode: Estimate, count: int) -> Floats:
+        factor = mode.laplace.posterior.factor
         scale = np.sqrt(rng.chisquare(_NU, size=(count, 1)) / _NU)
-        return np.asarray(mode.estimate.theta + rng.normal(size=(count, len(factor))) / scale @ factor.T)
+        return np.asarray(mode.theta + rng.normal(size=(count, len(factor))) / scale @ factor.T)
 
     @staticmethod
-    def _inside(mode: Mode, theta: Floats) -> NDArray[np.bool_]:
-        prior = mode.estimate.problem.mode
+    def _inside(mode: Estimate, theta: Floats) -> Bools:
+        prior = mode.problem.mode
         return np.asarray(((theta >= prior.low) & (theta <= prior.high)).all(axis=1))

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.estimation.registration import moved_back
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
-
-Floats = NDArray[np.float64]
 
 
 def realigned(case: Case, motion: Floats, centre: Floats) -> Case:

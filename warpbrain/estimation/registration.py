@@ -15,12 +15,10 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.inference.beliefs import belief
-
-Floats = NDArray[np.float64]
 
 #: Names of the six numbers.
 NAMES = (*(f"shift {axis} [m]" for axis in "xyz"), *(f"turn about {axis} [rad]" for axis in "xyz"))
@@ -47,20 +45,13 @@ class Registration:
                 raise InputError(f"registration: {name} = {value}: expected a positive number")
 
     @property
-    def precision(self) -> Floats:
-        """Inverse covariance of the six numbers, shape (6, 6)."""
-        return np.diag(np.repeat([self.shift**-2, self.turn**-2], 3))
-
-
-def moved(positions: Floats, motion: Floats, centre: Floats) -> Floats:
-    """Positions (n, 3) after a rigid motion: shift [m] and turn [rad] (6,) about a centre (3,)."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_rotvec(motion[3:]).apply(positions - centre) + centre + motion[:3])
+    def deviations(self) -> Floats:
+        """Standard deviations of the six numbers, shape (6,)."""
+        return np.repeat([self.shift, self.turn], 3)
 
 
 def moved_back(positions: Floats, motion: Floats, centre: Floats) -> Floats:
-    """Positions (n, 3) that `moved` takes to these."""
+    """Positions (n, 3) without a rigid motion: shift [m] and turn [rad] (6,) about a centre (3,)."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_rotvec(motion[3:]).inv().apply(positions - centre - motion[:3]) + centre)

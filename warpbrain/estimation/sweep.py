@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups
 from warpbrain.errors import InputError, SolveError
@@ -23,7 +23,6 @@ from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import law_of_curve
 from warpbrain.recordings.agreement import by_unit
 
-Floats = NDArray[np.float64]
 #: Steps of each tissue.
 Steps = tuple[float, ...]
 
@@ -112,7 +111,7 @@ def sweep(
         If there is nothing to compare with, or a tissue has no group, or one that the model has seen no study of.
     """
     observations = Observations.to_fit(case)
-    unit = "m" if any(observation.unit == "m" for observation in observations.each) else "N"
+    unit = "m" if any(observation.unit == "m" for observation in observations.recordings) else "N"
     parameters = Parameters.of(case)
     require_groups(case, [label for labels in parameters.labels for label in labels], model)
     curves = [
@@ -131,14 +130,11 @@ def sweep(
         try:
             parameters.require_possible(theta)
             forward = forward or Forward(case, theta, device)
-            try:
-                state = forward.solve(theta, near)
-            except SolveError:
-                state = forward.solve(theta)
+            state = forward.solve_from(theta, (near, None))
             if not state.passed_unstable:
                 near = state.u
             beside = compared(case, state.u, state.reactions)
-            error = by_unit((one.unit, beside[one.name].residuals_after) for one in observations.each)[unit]
+            error = by_unit((one.unit, beside[one.name].residuals_after) for one in observations.recordings)[unit]
         except (InputError, SolveError) as failure:
             reason = str(failure)
         found[k] = SweepPoint(k, tuple(theta.tolist()), error, reason)

@@ -5,36 +5,15 @@ likelihood of an equilibrium that was solved, with the nuisances integrated out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import ROUGH, State
-from warpbrain.estimation.modes import Mode
+from warpbrain.estimation.modes import Estimate
 from warpbrain.estimation.problem import Point
 from warpbrain.gp.prior import Prior
-
-Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Evaluated:
-    """The posterior at a point.
-
-    Attributes
-    ----------
-    log_density : float
-        Minus infinity where it is zero: an unstable law, or no equilibrium.
-    state : State or None
-    nuisances : (q,) array
-        The best ones there.
-    """
-
-    log_density: float
-    state: State | None
-    nuisances: Floats
 
 
 class Target:
@@ -43,7 +22,7 @@ class Target:
     Parameters
     ----------
     prior : Prior
-    modes : sequence of Mode
+    modes : sequence of Estimate
         States are predicted from the nearest, where solving starts.
 
     Attributes
@@ -52,54 +31,41 @@ class Target:
         Points whose laws were not stable, and points without an equilibrium.
     """
 
-    def __init__(self, prior: Prior, modes: Sequence[Mode]) -> None:
+    def __init__(self, prior: Prior, modes: Sequence[Estimate]) -> None:
         self.prior = prior
         self.modes = tuple(modes)
-        self.problem = modes[0].estimate.problem
+        self.problem = modes[0].problem
         self.unstable = self.failed = 0
 
-    def nearest(self, theta: Floats) -> Mode:
+    def nearest(self, theta: Floats) -> Estimate:
         """The mode that a point is nearest to, in its own standard deviations."""
 
-        def squares(mode: Mode) -> float:
-            away = theta - mode.estimate.theta
-            return float(away @ np.linalg.solve(mode.laplace.covariance, away))
-
-        return min(self.modes, key=squares)
+        return min(self.modes, key=lambda mode: mode.laplace.posterior.negative_log(theta))
 
     def linearised(self, theta: Floats) -> float:
         """The log density where the state is what derivatives at the nearest estimate make of it."""
         if not self._possible(theta):
             return -np.inf
         mode = self.nearest(theta)
-        return self._log_density(mode.predicted(theta), mode.estimate.point)[0]
+        return self._log_density(mode.predicted(theta), mode.point)
 
-    def at(self, theta: Floats) -> Evaluated:
-        """The log density; an equilibrium is solved for it."""
-        mode = self.nearest(theta)
-        nothing = Evaluated(-np.inf, None, mode.estimate.point.nuisances)
+    def log_density(self, theta: Floats) -> float:
+        """Up to a constant, by an equilibrium; minus infinity where laws are unstable or there is no equilibrium."""
         if not self._possible(theta):
             self.unstable += 1
-            return nothing
+            return -np.inf
+        mode = self.nearest(theta)
+        starts = mode.predicted(theta).u, mode.point.state.u
         try:
-            state = self._solve(theta, mode)
+            state = self.problem.forward.solve_from(theta, starts, ROUGH)
         except SolveError:
             self.failed += 1
-            return nothing
-        log_density, nuisances = self._log_density(state, mode.estimate.point)
-        return Evaluated(log_density, state, nuisances)
+            return -np.inf
+        return self._log_density(state, mode.point)
 
-    def _solve(self, theta: Floats, mode: Mode) -> State:
-        forward = self.problem.forward
-        try:
-            return forward.solve(theta, mode.predicted(theta).u, ROUGH)
-        except SolveError:
-            # far from the estimate the prediction may turn elements inside out
-            return forward.solve(theta, mode.estimate.point.state.u, ROUGH)
-
-    def _log_density(self, state: State, start: Point) -> tuple[float, Floats]:
-        misfit, point = self.problem.without_nuisances(state, start.nuisances, start.known_noise)
-        return float(self.prior.log_density(state.theta)) - misfit, point.nuisances
+    def _log_density(self, state: State, start: Point) -> float:
+        misfit, _ = self.problem.without_nuisances(state, start.nuisances, start.known_noise)
+        return float(self.prior.log_density(state.theta)) - misfit
 
     def _possible(self, theta: Floats) -> bool:
         try:

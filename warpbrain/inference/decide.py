@@ -133,19 +133,20 @@ def _not_physics(decision: Decision, truth: Truth, losses: Mapping[str, float]) 
 
 
 def _group(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> float:
-    inside = truth.mechanisms.intersection(decision.causes) or (truth.unknown and UNKNOWN in decision.causes)
+    inside = len(truth.mechanisms.intersection(decision.causes)) + (truth.unknown and UNKNOWN in decision.causes)
     if not inside:
         return losses["false group"]
-    outside = len(truth.mechanisms.difference(decision.causes))
-    return losses["member of a group"] * len(decision.causes) + losses["name left out"] * outside
+    # it says that one of its members acts: a second one is left out as much as any other
+    left_out = len(truth.mechanisms.difference(decision.causes)) + inside - 1
+    return losses["member of a group"] * len(decision.causes) + losses["name left out"] * left_out
 
 
 def _named(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> float:
     false = len(set(decision.causes) - truth.mechanisms)
     left_out = len(truth.mechanisms.difference(decision.causes))
-    cost = losses["false name"] * false
+    cost = losses["false name"] * false + losses["name left out"] * left_out
+    # a rest that is spoken of stands for what is left out, without its name
+    rest = left_out > 0 or truth.unknown
     if decision.verdict == NAMED_AND_REST:
-        # the rest stands for causes that are left out
-        cost += losses["name left out"] * left_out
-        return cost + losses["rest where nothing is"] * (left_out == 0 and not truth.unknown)
-    return cost + losses["name left out"] * left_out + losses["rest left out"] * truth.unknown
+        return cost + losses["rest where nothing is"] * (not rest)
+    return cost + losses["rest left out"] * rest

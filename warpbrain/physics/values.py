@@ -1,4 +1,4 @@
-"""Parameters of a mechanism, or of what acts in a specimen, as a user knows them: with unit and standard deviation."""
+"""What a diagnosis says in numbers: parameters with unit and standard deviation, what is seen, what to measure next."""
 
 from __future__ import annotations
 
@@ -42,3 +42,18 @@ class Smallest:
     unit: str
     name: str
     named: float = float("inf")
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Something that could be measured next.
+
+    Attributes
+    ----------
+    what : str
+    expected_nats : float
+        By which it would tell the two most probable causes apart, expected log Bayes factor.
+    """
+
+    what: str
+    expected_nats: float

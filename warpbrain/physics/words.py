@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +28,11 @@ HARDLY = "which these data hardly tell"
 
 #: What was found of the parameters of a mechanism, by name.
 Values = Mapping[str, Value]
+
+
+def enumerated(words: Sequence[str]) -> str:
+    """Words, at least one, with commas between them and "and" before the last."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def number(value: float, digits: int = 2) -> str:

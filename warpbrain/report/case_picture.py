@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.mesh import TetMesh, boundary_faces, face_vectors
 from warpbrain.mesh.surface import paired_faces
@@ -27,9 +28,7 @@ from warpbrain.report.slices import Cut, cut, outline
 from warpbrain.report.summary import SET_TITLES
 from warpbrain.report.views import View
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
 
 #: Colour and shape of each node set, the largest set first; told apart by the colour-blind and without any colour.
 _SET_STYLES = (

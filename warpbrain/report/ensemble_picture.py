@@ -6,16 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.ensemble.results import Fields
 from warpbrain.mesh import TetMesh, boundary_faces
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.slices import cut
 from warpbrain.report.views import View
-
-Floats = NDArray[np.float64]
 
 
 def write_spread_picture(path: Path, fields: Fields, title: str, subtitle: str) -> None:

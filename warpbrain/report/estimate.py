@@ -11,14 +11,13 @@ import numpy as np
 from warpbrain.estimation.laplace import Laplace
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
-from warpbrain.estimation.prediction import INTERVALS, Prediction, Together
+from warpbrain.estimation.prediction import INTERVALS, OverallErrors, Prediction
+from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
-#: Units as people read them: of a recording, the factor and the name.
-SHOWN = {"m": (MILLIMETRES, "mm"), "N": (1.0, "N")}
 #: More than this part of a recording being gross errors is said.
 _UNEXPLAINED = 0.3
 
@@ -27,7 +26,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
     """Everything that is known of an estimate, with units in keys or beside the values; docs/estimation.md."""
     prior, parameters, case, options = posterior.prior, posterior.parameters, posterior.case, posterior.options
     said = posterior.identifiability
-    gauss_newton = posterior.best.estimate
+    gauss_newton = posterior.best
     return {
         "case": {"name": case.name, "title": case.title, "origin": case.origin, "assumptions": list(case.assumptions)},
         "inputs_sha256": fingerprints(case),
@@ -58,14 +57,14 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
         "chain": _describe_chain(posterior),
         "modes": [
             {
-                "theta": mode.estimate.theta,
+                "theta": mode.theta,
                 "probability": probability,
-                "share_of_prior": mode.estimate.problem.mode.share,
+                "share_of_prior": mode.problem.mode.share,
             }
             for mode, probability in zip(posterior.modes, posterior.mode_probabilities, strict=True)
         ],
         "predictions": [_describe_prediction(prediction) for prediction in posterior.predictions],
-        "all_recordings": [_describe_together(together) for together in posterior.together],
+        "all_recordings": [_describe_overall(overall) for overall in posterior.overall_errors],
         "likelihood": _describe_likelihood(posterior),
         "discretisation": describe_discretisation(posterior),
         "registration": describe_registration(posterior),
@@ -139,7 +138,7 @@ def _shown(parameter: Parameter) -> Callable[[float], float]:
 
 def _describe_nothing_else(averaged: AveragedTissue) -> dict[str, Any]:
     deviations = np.sqrt(np.diag(averaged.covariance)).tolist()
-    each = zip(averaged.parameters.each, averaged.mean.tolist(), deviations, averaged.interval(0.95), strict=True)
+    each = zip(averaged.parameters, averaged.mean.tolist(), deviations, averaged.interval(0.95), strict=True)
     return {
         "probability": averaged.nothing,
         "causes": [
@@ -161,7 +160,7 @@ def _describe_nothing_else(averaged: AveragedTissue) -> dict[str, Any]:
 def _directions(laplace: Laplace) -> list[dict[str, Any]]:
     return [
         {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": told, "undone": undone}
-        for gain, told, undone in zip(laplace.gains.tolist(), laplace.told, laplace.undone, strict=True)
+        for gain, told, undone in zip(laplace.gains.tolist(), laplace.combinations, laplace.directions, strict=True)
     ]
 
 
@@ -206,19 +205,19 @@ def noise_of(prediction: Prediction) -> float | None:
     return SHOWN[prediction.unit][0] * math.sqrt(size * float(np.mean(prediction.sigma**2)))
 
 
-def _describe_together(together: Together) -> dict[str, Any]:
+def _describe_overall(overall: OverallErrors) -> dict[str, Any]:
     return {
-        "role": together.role,
-        "count": together.count,
-        "root_mean_square_before_mm": MILLIMETRES * together.before,
-        "root_mean_square_after_mm": MILLIMETRES * together.after,
-        "root_mean_square_of_run_mm": MILLIMETRES * together.of_run,
+        "role": overall.role,
+        "count": overall.count,
+        "root_mean_square_before_mm": MILLIMETRES * overall.before,
+        "root_mean_square_after_mm": MILLIMETRES * overall.after,
+        "root_mean_square_of_run_mm": MILLIMETRES * overall.of_run,
     }
 
 
 def _describe_likelihood(posterior: Posterior) -> dict[str, Any]:
-    noise = posterior.best.estimate.point.known_noise
-    believed = noise.believed
+    noise = posterior.best.point.known_noise
+    believed = noise.outliers
     return {
         "density": "normal, shared by neighbours" + ("" if believed is None else ", with gross errors"),
         "degrees_of_freedom": None,

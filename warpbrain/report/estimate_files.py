@@ -11,7 +11,7 @@ from warpbrain.atomic import whole_file
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.prediction import Prediction
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
-from warpbrain.report.estimate import SHOWN
+from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 
 _HEADER = (

@@ -7,17 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.estimation.prediction import Prediction
 from warpbrain.mesh import boundary_faces
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report import views
-from warpbrain.report.estimate import SHOWN
+from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
-
-Floats = NDArray[np.float64]
 
 #: Of Okabe and Ito, who can be told apart by everybody and in grey print.
 PRIOR, POSTERIOR, GROSS = "#E69F00", "#0072B2", "#D55E00"

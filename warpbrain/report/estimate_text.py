@@ -10,7 +10,8 @@ from warpbrain.estimation.parameters import Parameter
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.prediction import Prediction
 from warpbrain.inference.probability import percent
-from warpbrain.report.estimate import SHOWN, describe_discretisation, describe_registration, noise_of, remarks_of
+from warpbrain.report.comparison import SHOWN
+from warpbrain.report.estimate import describe_discretisation, describe_registration, noise_of, remarks_of
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
@@ -34,7 +35,7 @@ def estimate_lines(posterior: Posterior, averaged: AveragedTissue | None = None)
     lines += _check_lines(posterior)
     lines += ["", "RMSE at recordings      count   before    after    noise   in 50 %   in 95 %   gross errors"]
     lines += [_prediction_line(one) for one in posterior.predictions]
-    for one in posterior.together:
+    for one in posterior.overall_errors:
         name = "all that was fitted" if one.role == "fit" else "all to check"
         before, after, of_run = (MILLIMETRES * value for value in (one.before, one.after, one.of_run))
         lines.append(
@@ -71,7 +72,7 @@ def averaged_lines(averaged: AveragedTissue) -> list[str]:
     if averaged.nothing < averaged.probabilities.max():
         lines += [f"  what may act: {', '.join(likely)}", "  tissue averaged over what may act, to first order:"]
         deviations = np.sqrt(np.diag(averaged.covariance)).tolist()
-        each = zip(averaged.parameters.each, averaged.mean, deviations, averaged.interval(0.95), strict=True)
+        each = zip(averaged.parameters, averaged.mean, deviations, averaged.interval(0.95), strict=True)
         for parameter, mean, deviation, (low, high) in each:
             row = _row(parameter, mean, deviation, (low, high))
             lines.append(f"{row} {'':<29}  {'Pa' if parameter.is_modulus else ''}")
@@ -110,7 +111,7 @@ def _check_lines(posterior: Posterior) -> list[str]:
             f"  chain of {chain.solves} equilibria, {100 * chain.accepted:.0f} % accepted, worth "
             f"{chain.effective.min():.0f} independent draws"
         )
-    lines.append(f"  noise: {posterior.best.estimate.point.known_noise.scale:.2f} times as large as declared")
+    lines.append(f"  noise: {posterior.best.point.known_noise.scale:.2f} times as large as declared")
     mesh, registration = describe_discretisation(posterior), describe_registration(posterior)
     if mesh is not None:
         lines.append(

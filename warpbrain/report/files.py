@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.atomic import whole_file
 from warpbrain.simulation.result import Result
 
@@ -16,7 +16,7 @@ from warpbrain.simulation.result import Result
 MILLIMETRES = 1000.0
 
 
-def write_result(path: Path, result: Result, mesh_error: NDArray[np.float64] | None = None) -> None:
+def write_result(path: Path, result: Result, mesh_error: Floats | None = None) -> None:
     """Write a result as compressed VTU, coordinates and displacement in mm.
 
     Point arrays: ``displacement`` [mm], ``reaction`` [N], the node sets, ``fluid_pressure`` [Pa] of drainage and, if it

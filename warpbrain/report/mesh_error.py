@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.simulation.mesh_error import MeshError
@@ -53,7 +53,7 @@ def _how(error: MeshError, elements: str) -> str:
     return f"compared with {' and '.join(ways)}"
 
 
-def _sizes(vectors: NDArray[np.float64], factor: float) -> dict[str, float]:
+def _sizes(vectors: Floats, factor: float) -> dict[str, float]:
     lengths = factor * np.linalg.norm(vectors, axis=1)
     return {
         "median": float(np.median(lengths)),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh, boundary_faces
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
@@ -15,7 +16,6 @@ from warpbrain.report.slices import cut
 from warpbrain.report.views import View
 from warpbrain.simulation.result import Result
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 

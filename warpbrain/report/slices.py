@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from warpbrain.arrays import Floats, Ints
 
 _EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 
@@ -29,7 +29,7 @@ class Cut:
     """
 
     polygons: list[Floats]
-    elements: NDArray[np.int64]
+    elements: Ints
     values: Floats
     corners: list[Floats]
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.report import views
 from warpbrain.report.specimen_text import Tested
 from warpbrain.simulation.specimen import SHOWN, interpolated
@@ -74,7 +74,7 @@ def _draw(axes: Any, test: Tested) -> None:
     axes.set_title(heading, fontsize=10, parse_math=False)
 
 
-def _readable(response: NDArray[np.float64], unit: str) -> tuple[float, str]:
+def _readable(response: Floats, unit: str) -> tuple[float, str]:
     """Factor and unit in which a response has few zeros: thousandths, thousands, or as it is."""
     largest = float(np.abs(response).max())
     if unit == "Pa":

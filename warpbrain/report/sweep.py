@@ -10,7 +10,7 @@ from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.sweep import Steps, Sweep, SweepPoint
-from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.comparison import SHOWN
 
 #: Name of the file.
 TABLE = "sweep.csv"
@@ -61,7 +61,7 @@ def read_sweep(path: Path, header: list[str], tissues: int) -> dict[Steps, Sweep
 def sweep_lines(sweep: Sweep) -> list[str]:
     """What is printed of a finished sweep."""
     best = sweep.best
-    factor, unit = (MILLIMETRES, "mm") if sweep.unit == "m" else (1.0, "N")
+    factor, unit = SHOWN[sweep.unit]
     failed = sum(point.error is None for point in sweep.points)
     laws = zip(sweep.parameters.tissues, best.k, sweep.parameters.laws(best.theta), strict=True)
     lines = [f"least error of {len(sweep.points)} equilibria: RMSE {factor * (best.error or 0.0):.3f} {unit}"]

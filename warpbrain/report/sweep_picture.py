@@ -7,13 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.sweep import Sweep
 from warpbrain.report import views
-from warpbrain.report.files import MILLIMETRES
-
-Floats = NDArray[np.float64]
+from warpbrain.report.comparison import SHOWN
 
 _SWEEP, _BEST, _ESTIMATE = "#0072B2", "#D55E00", "#000000"
 
@@ -47,10 +45,6 @@ def write_sweep_picture(path: Path, sweep: Sweep, title: str, estimate: Mapping[
     plt.close(figure)
 
 
-def _shown(sweep: Sweep) -> tuple[float, str]:
-    return (MILLIMETRES, "mm") if sweep.unit == "m" else (1.0, "N")
-
-
 def _moduli(sweep: Sweep) -> Floats:
     """Shear moduli [Pa] of every point, shape (n, tissues)."""
     return np.array([[law.shear_modulus for law in sweep.parameters.laws(point.theta)] for point in sweep.points])
@@ -65,7 +59,7 @@ def _estimated(estimate: Mapping[str, Any] | None, tissue: str) -> tuple[float, 
 
 
 def _draw_curve(axes: Any, sweep: Sweep, estimate: Mapping[str, Any] | None) -> None:
-    factor, unit = _shown(sweep)
+    factor, unit = SHOWN[sweep.unit]
     moduli = _moduli(sweep)[:, 0]
     errors = np.array([np.nan if point.error is None else factor * point.error for point in sweep.points])
     order = np.argsort(moduli)
@@ -82,7 +76,7 @@ def _draw_curve(axes: Any, sweep: Sweep, estimate: Mapping[str, Any] | None) -> 
 
 
 def _draw_surface(figure: Any, axes: Any, sweep: Sweep, estimate: Mapping[str, Any] | None) -> None:
-    factor, unit = _shown(sweep)
+    factor, unit = SHOWN[sweep.unit]
     # of more than two tissues: the plane through the best point
     inside = [point for point in sweep.points if point.k[2:] == sweep.best.k[2:]]
     plane = Sweep(sweep.parameters, sweep.unit, tuple(sorted(inside, key=lambda point: point.k)))

@@ -17,14 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.atomic import whole_file
 from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.slices import Cut, outline
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
 
 TISSUE_COLOURS = ("#b9aea6", "#efe8df", "#d3b8a8", "#c9d3c0", "#c5c3d8", "#d9cfa8")
 RESECTED = "#d9483b"

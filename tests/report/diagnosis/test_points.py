@@ -17,13 +17,13 @@ def test_errors_at_what_was_fitted(saved, state):
     rows = saved.rows
     # distances of tracked points, three rows each; none is left out
     errors = (rows["observed"] - rows[state])[rows.lengths]
-    assert np.sqrt(3.0 * np.mean(errors**2)) == pytest.approx(1000.0 * saved.said["fit"]["rmse_m"][state], rel=1e-4)
+    assert np.sqrt(3.0 * np.mean(errors**2)) == pytest.approx(1000.0 * saved.summary["fit"]["rmse_m"][state], rel=1e-4)
 
 
 @pytest.mark.parametrize("state", ["refitted", "explained"])
 def test_errors_at_what_was_held_out(saved, state):
     errors = saved.rows[f"heldout_error_{state}"]
-    expected = 1000.0 * saved.said["fit"]["heldout_rmse_m"][state]
+    expected = 1000.0 * saved.summary["fit"]["heldout_rmse_m"][state]
     assert np.sqrt(3.0 * np.nanmean(errors**2)) == pytest.approx(expected, rel=1e-4)
 
 
@@ -42,6 +42,6 @@ def test_vectors_are_what_is_left_of_points(saved, small_diagnosis):
 
 def test_map_says_where_the_data_are_blind(diagnosed, saved):
     fields = meshio.read(diagnosed / "map.vtu").point_data
-    above = 1000.0 * saved.said["map"]["blind_above_n"]
+    above = 1000.0 * saved.summary["map"]["blind_above_n"]
     np.testing.assert_array_equal(fields["blind"] == 1, fields["detectable_force"] > above)
-    np.testing.assert_array_equal(fields["significant"] == 1, fields["score"] > saved.said["map"]["threshold"])
+    np.testing.assert_array_equal(fields["significant"] == 1, fields["score"] > saved.summary["map"]["threshold"])

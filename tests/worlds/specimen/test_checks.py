@@ -9,13 +9,13 @@ from testing_machine import case_of
 
 from warpbrain.inference.confirm import Confirmation, after_checks
 from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decision
-from warpbrain.worlds.specimen.checking import Checked, what_grows
+from warpbrain.worlds.specimen.checking import CheckResults, grown_errors
 from warpbrain.worlds.specimen.checks import Folds, folds_of, held_out
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
 from warpbrain.worlds.specimen.effects import effects_of
 from warpbrain.worlds.specimen.effects.law_shape import stiffening
 from warpbrain.worlds.specimen.fit import Fitting
-from warpbrain.worlds.specimen.forward import Assumed, Forward
+from warpbrain.worlds.specimen.forward import Component, Forward
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.linear import linearise
 from warpbrain.worlds.specimen.noise import noise_factor
@@ -35,10 +35,10 @@ def cycles(*durations, seed=2, roles=None):
 
 def base_of(case):
     everything = protocol_of(case.specimen, case.recordings)
-    few = everything.few
-    forward = Forward(case, few, GluedEnds(case, everything), False)
-    fit = Fitting(noise_factor(few), few.mask(few.to_fit)).fit(
-        forward, (), np.zeros((len(few), 0)), np.zeros(forward.size(())), 1.0
+    thinned = everything.thinned
+    forward = Forward(case, thinned, GluedEnds(case, everything), False)
+    fit = Fitting(noise_factor(thinned), thinned.mask(thinned.to_fit)).fit(
+        forward, (), np.zeros((len(thinned), 0)), np.zeros(len(forward.nuisances)), 1.0
     )
     return everything, fit
 
@@ -46,7 +46,7 @@ def base_of(case):
 def test_held_out_rows_are_the_conditional_of_the_model():
     _, fit = base_of(cycles(400.0, 40.0))
     held = fit.forward.protocol.mask([1])
-    again = fit.given(~held)
+    again = fit.refitted_to(~held)
     # an independent conditional: by the inverse of the joint covariance
     U = again.columns
     S = fit.scale**2 * fit.noise @ fit.noise.T + U @ U.T
@@ -68,7 +68,7 @@ def test_errors_are_of_all_recorded_rows():
     case = cycles(400.0, 40.0, 100.0, roles=("fit", "fit", "check"))
     found = DiagnosingSpecimen(case, SpecimenOptions(candidates=("viscoelasticity",), draws=100), "cpu").run()
     assert len(found.protocol) == 3 * 161
-    assert len(found.protocol.few) < len(found.protocol)
+    assert len(found.protocol.thinned) < len(found.protocol)
     for name in ("refitted", "explained"):
         rows = found.protocol.rows[2]
         error = found.protocol.observed[rows] - found.stresses[name][rows]
@@ -92,16 +92,16 @@ def test_what_stiffens_is_what_tissue_remembers_too():
     effect, linear = stiffening(case, everything), linearise(base_of(case)[1], ())
     assert linear.causes[0].name == "unknown"
     viscous_effect = next(one for one in effects_of(case, everything)[0] if one.name == "viscoelasticity")
-    way = viscous_effect.ways[3]
+    variant = viscous_effect.variants[3]
     both = (
-        Assumed(viscous_effect, way, way.trials[0], 1.0),
-        Assumed(effect, effect.ways[0], effect.ways[0].trials[0], 1.0),
+        Component(viscous_effect, variant, variant.trials[0], 1.0),
+        Component(effect, effect.variants[0], effect.variants[0].trials[0], 1.0),
     )
-    z = np.zeros(forward.size(both))
+    z = np.zeros(len(forward.nuisances) + sum(map(len, both)))
     z[-len(both[1]) - len(both[0])] = 1.0
     plain = forward.stress(both, z)
     z[-1] = 1.0
-    k = effect.ways[0].sd[0]
+    k = effect.variants[0].sd[0]
     strain = everything.tests[0].strain
     np.testing.assert_allclose(
         forward.stress(both, z), plain * np.exp(k * (strain**2 + 2.0 / strain - 3.0)), rtol=1e-12
@@ -111,10 +111,10 @@ def test_what_stiffens_is_what_tissue_remembers_too():
 def test_a_check_that_fails_is_said():
     good, bad = (Confirmation(name, 9.0, 5.0, (0.5, 0.4, 0.6), p) for name, p in (("a", 0.01), ("b", 0.4)))
     scores = {"refitted": Score(9.0, 9.0, {"hold": 1.0}), "explained": Score(2.0, 3.0, {"hold": 2.0})}
-    checked = Checked(0.5, scores, {}, None, (good, bad))
+    checked = CheckResults(0.5, scores, {}, None, (good, bad))
 
-    def said(names: tuple[str, ...], checked: Checked) -> tuple[Decision, tuple[str, ...]]:
-        return after_checks(Decision(NAMED, names), (good, bad), checked.p_left, 0.05, *what_grows(checked))
+    def said(names: tuple[str, ...], checked: CheckResults) -> tuple[Decision, tuple[str, ...]]:
+        return after_checks(Decision(NAMED, names), (good, bad), checked.p_left, 0.05, *grown_errors(checked))
 
     decision, doubts = said(("a", "b"), checked)
     assert decision == Decision(NAMED_AND_REST, ("a",))
@@ -127,7 +127,7 @@ def test_a_check_that_fails_is_said():
 
 
 def test_folds_of_one_test_are_its_quarters():
-    few = base_of(cycles(40.0))[0].few
-    folds = folds_of(few)
+    thinned = base_of(cycles(40.0))[0].thinned
+    folds = folds_of(thinned)
     assert not folds.by_test and len(folds.held) == 4
-    assert np.sum(folds.held, axis=0).tolist() == [1] * len(few)
+    assert np.sum(folds.held, axis=0).tolist() == [1] * len(thinned)

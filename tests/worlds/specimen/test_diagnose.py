@@ -18,8 +18,8 @@ KINDS = ("asymmetry", "viscoelasticity", "softening", "stiffening", "second inva
 
 
 def static(law, rng: np.random.Generator) -> list[TestRecording]:
-    ways = {"tension": np.linspace(1.0, 1.12, 25), "compression": np.linspace(1.0, 0.88, 25)}
-    return [rod_test(name, l, noisy(law(l), rng)) for name, l in ways.items()]
+    variants = {"tension": np.linspace(1.0, 1.12, 25), "compression": np.linspace(1.0, 0.88, 25)}
+    return [rod_test(name, l, noisy(law(l), rng)) for name, l in variants.items()]
 
 
 def diagnosed(recordings: list[TestRecording], kinds=KINDS, **options) -> SpecimenDiagnosis:

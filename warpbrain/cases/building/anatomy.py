@@ -8,11 +8,12 @@ stay as gentle relief, deep sulci close, the longitudinal fissure stays open as 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.cases.building.maps import TemplateMaps
+from warpbrain.cases.building.maps import TemplateMaps, load_maps
 
 Field = NDArray[np.float32]
 
@@ -73,8 +74,10 @@ class Anatomy:
         return np.asarray(map_coordinates(field, (points - self.origin).T, order=1, mode="nearest", output=np.float64))
 
 
-def make_anatomy(maps: TemplateMaps) -> Anatomy:
-    """Fields of the template brain."""
+@cache
+def template_anatomy() -> Anatomy:
+    """Fields of the template brain: the same for all cases, and half a minute of smoothing."""
+    maps = load_maps()
     fluid = _lateral_ventricles(maps)
     brain = _brain(maps, fluid)
     ventricle = _ventricle(fluid)

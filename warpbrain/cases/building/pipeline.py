@@ -14,14 +14,13 @@ from typing import Any
 import numpy as np
 
 from warpbrain.atomic import whole_file
-from warpbrain.cases.building.anatomy import Anatomy, make_anatomy
+from warpbrain.cases.building.anatomy import Anatomy, template_anatomy
 from warpbrain.cases.building.cleaning import finished, first_pass, opened_out, small_pieces
 from warpbrain.cases.building.cutting import compact, cut
 from warpbrain.cases.building.errors import BuildError, require_extra
 from warpbrain.cases.building.example_sets import with_example_sets
 from warpbrain.cases.building.individual import individual_warp
 from warpbrain.cases.building.lattice import bcc_lattice
-from warpbrain.cases.building.maps import load_maps
 from warpbrain.cases.building.recipes import INDIVIDUAL_AMPLITUDE, RECIPES, CaseRecipe
 from warpbrain.cases.building.remeshing import Cells, fit_size
 from warpbrain.cases.building.resection import anterior_temporal_lobe
@@ -60,7 +59,7 @@ def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], 
     folder = Path(out_dir) / name
     folder.mkdir(parents=True, exist_ok=True)
     progress("reading template maps, smoothing")
-    anatomy = make_anatomy(load_maps())
+    anatomy = template_anatomy()
     record: dict[str, Any] = {"versions": versions(), "meshes": {}}
     tetrahedra: dict[str, int] = {}
     start: dict[bool, Cells] = {}

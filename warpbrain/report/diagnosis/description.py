@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Combination, Diagnosis, Ranked
@@ -14,36 +15,23 @@ from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence
 from warpbrain.diagnosis.traits import Traits
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import smallest_in_words
-from warpbrain.physics.values import Value
-from warpbrain.report.fingerprints import fingerprints
-from warpbrain.report.summary import machine
+from warpbrain.report.diagnosis.common import describe_common, describe_values
 from warpbrain.worlds.body.sensors import Sensors
-
-Floats = NDArray[np.float64]
 
 
 def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:
     """Everything that is known of a diagnosis, lengths in metres and other units beside the values."""
     best = found.named[0] if found.named else None
-    return {
-        "verdict": found.verdict,
-        "sentence": found.sentence,
-        "p_value": found.p_value,
-        "mechanism": best.kind if best else None,
-        "probability": best.probability if best else found.ranking[0].probability,
+    particular = {
         "hypotheses": [_combination(one) for one in found.combinations],
         "by_posterior": {"verdict": found.by_posterior.verdict, "causes": list(found.by_posterior.causes)},
-        "doubts": list(found.doubts),
         "p_left": found.p_left,
-        "parameters": _values(best.values) if best else {},
         "where": _where(found, best),
         "mechanisms": [_named(one, found.case.gravity_axis) for one in found.named],
         "unknown": _unknown(found.unknown),
         "when": _when(found.when),
         "ranking": [_ranked(ranked, found.case.gravity_axis) for ranked in found.ranking]
         + [_rejected(kind, why) for kind, why in found.rejected.items()],
-        "group": list(found.group),
-        "next_measurement": [{"what": m.what, "expected_nats": m.expected_nats} for m in found.next_measurement],
         "smallest_detectable": {
             kind: {
                 "size": one.size,
@@ -64,23 +52,11 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
             "places": len(found.map.sites),
             "significant": found.map.significant,
         },
-        "assumptions": list(found.assumptions),
-        "remarks": list(found.remarks),
-        "case": {"name": found.case.name, "title": found.case.title, "origin": found.case.origin},
-        "inputs_sha256": fingerprints(found.case),
-        "options": {
-            "candidates": "all" if options.candidates is None else list(options.candidates),
-            "alpha": options.alpha,
-            "seed": options.seed,
-            "draws": options.draws,
-            "mesh_error": options.mesh_error,
-            "without_nuisances": options.without_nuisances,
-        },
-        "seconds": found.seconds,
         "equilibria": found.base.states.solves,
-        "device": device,
-        "versions": machine(),
     }
+    asked = {name: value for name, value in asdict(options).items() if name != "ends"}
+    names = [one.kind for one in found.named]
+    return describe_common(found, found.sentence, names, asked, device, particular)
 
 
 def _combination(one: Combination) -> dict[str, Any]:
@@ -95,16 +71,12 @@ def _combination(one: Combination) -> dict[str, Any]:
     }
 
 
-def _values(values: tuple[Value, ...]) -> dict[str, Any]:
-    return {one.name: {"value": one.value, "sd": one.sd, "unit": one.unit} for one in values}
-
-
 def _named(one: Ranked, gravity_axis: tuple[float, float, float] | None) -> dict[str, Any]:
     return {
         "mechanism": one.kind,
         "says": effect_sentence(one, gravity_axis),
         "probability": one.probability,
-        "parameters": _values(one.values),
+        "parameters": describe_values(one.values),
         "where": None if one.centre is None else {"centre_m": one.centre, "radius_m": one.radius},
         "region": one.region,
     }
@@ -126,19 +98,12 @@ def _unknown(traits: Traits | None) -> dict[str, Any] | None:
 
 
 def _where(found: Diagnosis, best: Ranked | None) -> dict[str, Any] | None:
-    if best is not None and best.centre is not None:
-        return {
-            "centre_m": best.centre,
-            "radius_m": best.radius,
-            "region": best.region,
-            "local_p": found.map.local_p,
-            "global_p": found.map.global_p,
-        }
-    if not found.map.significant:
+    place = best if best is not None and best.centre is not None else found.map if found.map.significant else None
+    if place is None:
         return None
     return {
-        "centre_m": found.map.centre,
-        "radius_m": found.map.radius,
+        "centre_m": place.centre,
+        "radius_m": place.radius,
         "region": best.region if best is not None else "",
         "local_p": found.map.local_p,
         "global_p": found.map.global_p,
@@ -165,7 +130,7 @@ def _ranked(ranked: Ranked, gravity_axis: tuple[float, float, float] | None) -> 
         "probability": ranked.probability,
         "heldout_rmse_change": ranked.heldout_rmse_change,
         "detectability": ranked.detectability,
-        "estimate": _values(ranked.values),
+        "estimate": describe_values(ranked.values),
         "where": None if ranked.centre is None else {"centre_m": ranked.centre, "radius_m": ranked.radius},
         "region": ranked.region,
         "rejected_because": ranked.rejected_because,
@@ -189,7 +154,7 @@ def _rejected(kind: str, why: str) -> dict[str, Any]:
 
 
 def noise_distance(noise: Floats, sensors: Sensors) -> float | None:
-    """Root mean square [m] of the distance that noise (n,) [m] alone leaves at a recorded point, as errors are said."""
+    """Root mean square [m] of the distance in space that noise (n,) [m] alone leaves at a recorded point."""
     rows = sensors.is_displacement
     if not rows.any():
         return None

@@ -66,22 +66,24 @@ def write_page(folder: Path) -> None:
 
 def page_of(saved: Saved) -> str:
     """The page."""
-    said = saved.said
-    ground, letters = _BADGES[said["verdict"]]
+    summary = saved.summary
+    ground, letters = _BADGES[summary["verdict"]]
     sections = [
-        _verdict(said),
+        _verdict(summary),
         _before_and_after(saved),
         _view(saved),
-        _section("Candidates", candidates_figure(said), _CANDIDATES, candidates_table(said), stages_table(said)),
+        _section(
+            "Candidates", candidates_figure(summary), _CANDIDATES, candidates_table(summary), stages_table(summary)
+        ),
         _where(saved),
-        _apart(said),
-        _section("What to measure next", _next(said)),
+        _apart(summary),
+        _section("What to measure next", _next(summary)),
         _section(
             "What these data would have shown",
             "<p>The smallest effect that nine of ten times would raise an alarm, at a middling place.</p>",
-            smallest_table(said),
+            smallest_table(summary),
         )
-        if said["smallest_detectable"]
+        if summary["smallest_detectable"]
         else "",
         _assumptions(saved),
     ]
@@ -91,7 +93,7 @@ def page_of(saved: Saved) -> str:
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <link rel="icon" href="data:,">
-<title>{text(said["verdict"])}: {text(said["case"]["title"])}</title>
+<title>{text(summary["verdict"])}: {text(summary["case"]["title"])}</title>
 <style>{asset("page.css")}
 :root {{ --badge: {ground}; --badge-text: {letters}; }}</style>
 </head>
@@ -108,49 +110,49 @@ def _section(title: str, *parts: str) -> str:
     return f"<section><h2>{text(title)}</h2>{''.join(parts)}</section>\n"
 
 
-def _verdict(said: dict[str, Any]) -> str:
-    facts = [("p, nothing missing", f"{said['p_value']:.2g}")]
-    if said["mechanism"]:
+def _verdict(summary: dict[str, Any]) -> str:
+    facts = [("p, nothing missing", f"{summary['p_value']:.2g}")]
+    if summary["mechanism"]:
         # a specimen's says all that it names in another place
-        named = said.get("mechanisms") or [said]
+        named = summary.get("mechanisms") or [summary]
         facts.insert(0, ("mechanism", text(" and ".join(one["mechanism"] for one in named))))
         facts.append(("probability", " and ".join(percent(one["probability"]) for one in named)))
-    unit = unit_of(said)
-    held = said["fit"][f"heldout_rmse_{unit.suffix}"]
+    unit = unit_of(summary)
+    held = summary["fit"][f"heldout_rmse_{unit.suffix}"]
     if held.get("refitted") is not None:
         before = f"{unit.factor * held['refitted']:.3g}"
         after = f" → {unit.factor * held['explained']:.3g}" if held.get("explained") is not None else ""
         facts.append(("held-out error", f"{before}{after} {unit.name}"))
-    improvement = said["fit"]["improvement"]
+    improvement = summary["fit"]["improvement"]
     if improvement is not None:
         low, high = (100.0 * value for value in improvement["interval_95"])
         facts.append(("of it gone (95 %)", f"{100.0 * improvement['part']:.0f} % ({low:.0f} to {high:.0f})"))
     shown = "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in facts)
     return (
-        f'<header><h1>{text(said["case"]["title"])}</h1><div class="verdict">'
-        f'<span class="badge">{text(said["verdict"])}</span><p class="sentence">'
-        f"{text(said['sentence'])}</p>"
+        f'<header><h1>{text(summary["case"]["title"])}</h1><div class="verdict">'
+        f'<span class="badge">{text(summary["verdict"])}</span><p class="sentence">'
+        f"{text(summary['sentence'])}</p>"
         f'<dl class="facts">{shown}</dl></div></header>\n'
     )
 
 
 def _before_and_after(saved: Saved) -> str:
-    said = saved.said
+    summary = saved.summary
     parts = []
     if saved.anatomy is not None and saved.rows is not None and saved.rows.lengths.any():
-        parts.append(residuals_figure(said, saved.anatomy, saved.rows))
+        parts.append(residuals_figure(summary, saved.anatomy, saved.rows))
     if saved.curves is not None:
         parts.append(curves_figure(saved.curves))
-    parts.append(held_out_figure(said))
-    parts.append(fit_table(said))
-    fit = said["fit"]
+    parts.append(held_out_figure(summary))
+    parts.append(fit_table(summary))
+    fit = summary["fit"]
     placebos = [("A", fit.get("placebo_p"))]
     # of a specimen each addition has its own
     placebos += [(f"{text(one['mechanism'])}: a", one["placebo_p"]) for one in fit.get("confirmations", ())]
     known = [(whose, p) for whose, p in placebos if p is not None]
     parts += [f"<p>{whose} pattern that means nothing does as well with p = {p:.2g}.</p>" for whose, p in known]
     if saved.rows is not None and saved.rows.lengths.any():
-        parts.append(agreement_figure(said, saved.rows))
+        parts.append(agreement_figure(summary, saved.rows))
     return _section("Before and after", *parts)
 
 
@@ -158,11 +160,11 @@ def _view(saved: Saved) -> str:
     if saved.anatomy is None:
         return ""
     rows = saved.rows if saved.rows is not None and saved.rows.lengths.any() else None
-    return _section("In three dimensions", viewer(saved.said, saved.anatomy, rows))
+    return _section("In three dimensions", viewer(saved.summary, saved.anatomy, rows))
 
 
 def _where(saved: Saved) -> str:
-    said, where = saved.said, saved.said["where"]
+    summary, where = saved.summary, saved.summary["where"]
     parts = []
     if where is None:
         parts.append("<p>No place stands out: the mismatch is everywhere a little, or nothing is missing.</p>")
@@ -178,50 +180,52 @@ def _where(saved: Saved) -> str:
             f"<p>It shows most in {text(where['test'])} ({text(where['mode'])}), {text(where['segment'])}, at "
             f"stretches or shears from {low:.3g} to {high:.3g}.</p>"
         )
-    if said.get("when") is not None:
-        parts.append(f"<p>When: {text(when_in_words(said['when']))}.</p>")
+    if summary.get("when") is not None:
+        parts.append(f"<p>When: {text(when_in_words(summary['when']))}.</p>")
     if saved.anatomy is not None:
-        parts.append(map_figure(said, saved.anatomy))
+        parts.append(map_figure(summary, saved.anatomy))
     return _section("Where", *parts)
 
 
-def _apart(said: dict[str, Any]) -> str:
-    if len(said["group"]) > 1:
-        chances = {one["mechanism"]: one["probability"] for one in said["ranking"]}
+def _apart(summary: dict[str, Any]) -> str:
+    if len(summary["group"]) > 1:
+        chances = {one["mechanism"]: one["probability"] for one in summary["ranking"]}
         members = "".join(
-            f"<li><b>{text(kind)}</b>: probability {percent(chances.get(kind, 0.0))}</li>" for kind in said["group"]
+            f"<li><b>{text(kind)}</b>: probability {percent(chances.get(kind, 0.0))}</li>" for kind in summary["group"]
         )
         first = f"<p>These data do not tell these apart:</p><ul>{members}</ul>"
     else:
         first = "<p>No few mechanisms share the probability among them.</p>"
-    return _section("What cannot be told apart", first, _confusion(said), rejected_table(said))
+    return _section("What cannot be told apart", first, _confusion(summary), rejected_table(summary))
 
 
-def _confusion(said: dict[str, Any]) -> str:
-    confusion = said.get("confusion")
+def _confusion(summary: dict[str, Any]) -> str:
+    confusion = summary.get("confusion")
     if not confusion:
         return ""
     sentences = "".join(f"<p>{text(one)}</p>" for one in confusion["says"])
     return f"<h3>What could be taken for what</h3>{sentences}{confusion_figure(confusion)}"
 
 
-def _next(said: dict[str, Any]) -> str:
-    if not said["next_measurement"]:
+def _next(summary: dict[str, Any]) -> str:
+    if not summary["next_measurement"]:
         return "<p>There are no two mechanisms between which a measurement would decide.</p>"
     return (
         "<p>By how much each is expected to tell the two most probable mechanisms apart: a log Bayes factor of 3 is "
-        f"strong, of 5 decisive.</p>{next_table(said)}"
+        f"strong, of 5 decisive.</p>{next_table(summary)}"
     )
 
 
 def _assumptions(saved: Saved) -> str:
-    said = saved.said
-    assumed = "".join(f"<li>{text(one)}</li>" for one in said["assumptions"])
-    remarks = "".join(f"<li>{text(one)}</li>" for one in said["remarks"])
-    files = table(("file", "SHA-256"), [[text(k), f"<code>{text(v)}</code>"] for k, v in said["inputs_sha256"].items()])
-    options = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in said["options"].items())
-    versions = ", ".join(f"{key} {value}" for key, value in said["versions"].items())
-    seconds = sum(said["seconds"].values())
+    summary = saved.summary
+    assumed = "".join(f"<li>{text(one)}</li>" for one in summary["assumptions"])
+    remarks = "".join(f"<li>{text(one)}</li>" for one in summary["remarks"])
+    files = table(
+        ("file", "SHA-256"), [[text(k), f"<code>{text(v)}</code>"] for k, v in summary["inputs_sha256"].items()]
+    )
+    options = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in summary["options"].items())
+    versions = ", ".join(f"{key} {value}" for key, value in summary["versions"].items())
+    seconds = sum(summary["seconds"].values())
     return _section(
         "What was assumed",
         f"<ul>{assumed}</ul>",
@@ -229,7 +233,7 @@ def _assumptions(saved: Saved) -> str:
         aside_table(saved.rows),
         "<h3>How it was made</h3>",
         f"<p>Options: {text(options)}.<br>Versions: {text(versions)}.<br>{seconds:.0f} s on "
-        f"{text(said['device'])}.</p>",
+        f"{text(summary['device'])}.</p>",
         files,
         '<p class="note">All numbers of this page: <code>diagnosis.json</code>, <code>points.csv</code> and '
         "<code>map.vtu</code> beside it.</p>"

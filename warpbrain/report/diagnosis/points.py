@@ -6,13 +6,11 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.atomic import whole_file
 from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Diagnosis
 from warpbrain.report.files import MILLIMETRES
-
-Floats = NDArray[np.float64]
 
 #: Columns of `points.csv`; a number is a component of a point, a distance to a surface, or a component of a force.
 COLUMNS = (

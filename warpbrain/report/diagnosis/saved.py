@@ -11,14 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: States of a case in the order in which they are shown, and their names for people.
 STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what is named"}
@@ -113,7 +110,7 @@ class Saved:
 
     Attributes
     ----------
-    said : dict
+    summary : dict
         `diagnosis.json`.
     anatomy : Anatomy or None
         None of a specimen.
@@ -121,7 +118,7 @@ class Saved:
         What was recorded of a body, and of a specimen.
     """
 
-    said: dict[str, Any]
+    summary: dict[str, Any]
     anatomy: Anatomy | None
     rows: Rows | None
     curves: Rows | None
@@ -137,14 +134,14 @@ def read_saved(folder: Path) -> Saved:
     """
     path = folder / "diagnosis.json"
     try:
-        said = json.loads(path.read_text(encoding="utf-8"))
+        summary = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except ValueError as error:
         raise InputError(f"{path}: no JSON: {error}") from None
-    if not (isinstance(said, dict) and "verdict" in said):
+    if not (isinstance(summary, dict) and "verdict" in summary):
         raise InputError(f"{path}: verdict: missing: it is no diagnosis")
-    return Saved(said, _anatomy(folder / "map.vtu"), _rows(folder / "points.csv"), _rows(folder / "curves.csv"))
+    return Saved(summary, _anatomy(folder / "map.vtu"), _rows(folder / "points.csv"), _rows(folder / "curves.csv"))
 
 
 def _anatomy(path: Path) -> Anatomy | None:

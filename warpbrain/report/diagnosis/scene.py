@@ -9,18 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.report.diagnosis.figures.drawing import COLOURS, shades
 from warpbrain.report.diagnosis.saved import STATES, Anatomy, Rows
 from warpbrain.report.files import MILLIMETRES
 
-Floats = NDArray[np.float64]
 
-
-def describe_scene(said: dict[str, Any], anatomy: Anatomy, rows: Rows | None) -> dict[str, Any]:
+def describe_scene(summary: dict[str, Any], anatomy: Anatomy, rows: Rows | None) -> dict[str, Any]:
     """The scene, lengths in mm; arrays are 32-bit numbers in base64."""
     faces = anatomy.mesh.boundary
     used, triangles = np.unique(faces, return_inverse=True)
-    where = said["where"]
+    where = summary["where"]
     ball = None
     if where is not None and "centre_m" in where:
         centre = [MILLIMETRES * value for value in where["centre_m"]]
@@ -45,7 +44,7 @@ def describe_scene(said: dict[str, Any], anatomy: Anatomy, rows: Rows | None) ->
     return {
         "points": _packed(MILLIMETRES * anatomy.mesh.points[used]),
         "triangles": _packed(triangles.reshape(-1, 3), np.uint32),
-        "fields": _fields(said, anatomy, used),
+        "fields": _fields(summary, anatomy, used),
         "recorded": _packed(MILLIMETRES * recorded),
         "arrows": arrows,
         "enlarged": enlarged,
@@ -66,11 +65,11 @@ def scene_json(scene: dict[str, Any]) -> str:
     return json.dumps(scene, allow_nan=False).replace("</", "<\\/")
 
 
-def _fields(said: dict[str, Any], anatomy: Anatomy, used: NDArray[np.integer]) -> list[dict[str, Any]]:
+def _fields(summary: dict[str, Any], anatomy: Anatomy, used: NDArray[np.integer]) -> list[dict[str, Any]]:
     score = np.asarray(anatomy.fields["score"])[used]
     force = np.asarray(anatomy.fields["detectable_force"])[used]
     moved = np.linalg.norm(np.asarray(anatomy.fields["displacement"])[used], axis=1)
-    threshold, blind = said["map"]["threshold"], MILLIMETRES * said["map"]["blind_above_n"]
+    threshold, blind = summary["map"]["threshold"], MILLIMETRES * summary["map"]["blind_above_n"]
     # a few hidden places need a force beyond all others: they are as dark as what is blind twice over
     return [
         _field("significance", "score of a force there", score, 0.0, max(float(score.max()), threshold), threshold,

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.probability import percent
-from warpbrain.physics.values import Value
-from warpbrain.report.fingerprints import fingerprints
-from warpbrain.report.summary import machine
+from warpbrain.report.diagnosis.common import describe_common, describe_values
 from warpbrain.worlds.specimen.diagnose import SpecimenOptions
 from warpbrain.worlds.specimen.result import Ranked, SpecimenDiagnosis
 from warpbrain.worlds.specimen.sentences import sentence_of
@@ -23,17 +20,11 @@ _STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained"
 
 def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptions, device: str) -> dict[str, Any]:
     """Everything that is known of a diagnosis; stresses in Pa, other units beside the values."""
-    best = found.named[0] if found.named else None
     where = found.where
-    return {
-        "verdict": found.verdict,
-        "sentence": sentence_of(found),
-        "p_value": found.p_value,
-        "mechanism": best.name if best else None,
-        "named": [_ranked(one) for one in found.named],
-        "mechanisms": [_ranked(one) for one in found.named],
-        "probability": best.probability if best else (found.ranking[0].probability if found.ranking else None),
-        "parameters": _values(best.values) if best else {},
+    named = [_ranked(one) for one in found.named]
+    particular = {
+        "named": named,
+        "mechanisms": named,
         "where": None
         if where is None
         else {"test": where.test, "mode": where.mode, "segment": where.segment, "strain": list(where.strain)},
@@ -42,10 +33,7 @@ def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptio
         + [_rejected(name, why) for name, why in found.rejected.items()],
         "combinations": [asdict(one) for one in found.combinations],
         "stages": _stages(found),
-        "group": list(found.group),
-        "doubts": list(found.doubts),
         "before_checks": {"verdict": found.by_posterior.verdict, "causes": list(found.by_posterior.causes)},
-        "next_measurement": [asdict(one) for one in found.next_measurement],
         "smallest_detectable": {
             name: {"size": one.size, "unit": one.unit, "parameter": one.name} for name, one in found.smallest.items()
         },
@@ -55,19 +43,9 @@ def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptio
              "rows": len(test.strain), "largest_stress_pa": test.peak, "pa_per_unit": test.unit}
             for test in found.protocol.tests
         ],
-        "assumptions": list(found.assumptions),
-        "remarks": list(found.remarks),
-        "case": {"name": found.case.name, "title": found.case.title, "origin": found.case.origin},
-        "inputs_sha256": fingerprints(found.case),
-        "options": asdict(options) | {"candidates": "all" if options.candidates is None else list(options.candidates)},
-        "seconds": dict(found.seconds),
-        "device": device,
-        "versions": machine(),
     }  # fmt: skip
-
-
-def _values(values: Sequence[Value]) -> dict[str, Any]:
-    return {value.name: {"value": value.value, "sd": value.sd, "unit": value.unit} for value in values}
+    names = [one.name for one in found.named]
+    return describe_common(found, sentence_of(found), names, asdict(options), device, particular)
 
 
 def _ranked(one: Ranked) -> dict[str, Any]:
@@ -78,7 +56,7 @@ def _ranked(one: Ranked) -> dict[str, Any]:
         "probability": one.probability,
         "heldout_rmse_change_pa": one.change,
         "detectability": one.detectability,
-        "estimate": _values(one.values),
+        "estimate": describe_values(one.values),
         "region": one.region,
     }
 

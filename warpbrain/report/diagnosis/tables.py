@@ -23,8 +23,8 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[
         "<tr>" + "".join(f'<td class="{kind}">{cell}</td>' for cell, kind in zip(row, kinds, strict=True)) + "</tr>"
         for row in rows
     ]
-    said = f"<caption>{caption}</caption>" if caption else ""
-    return f'<div class="wide"><table>{said}<thead><tr>{top}</tr></thead><tbody>{"".join(lines)}</tbody></table></div>'
+    title = f"<caption>{caption}</caption>" if caption else ""
+    return f'<div class="wide"><table>{title}<thead><tr>{top}</tr></thead><tbody>{"".join(lines)}</tbody></table></div>'
 
 
 def text(value: Any) -> str:
@@ -32,12 +32,12 @@ def text(value: Any) -> str:
     return html.escape(str(value))
 
 
-def candidates_table(said: dict[str, Any]) -> str:
+def candidates_table(summary: dict[str, Any]) -> str:
     """Every candidate that was tried, the most probable first."""
-    unit = unit_of(said)
+    unit = unit_of(summary)
     change = "heldout_rmse_change" + ("" if unit.suffix == "m" else "_pa")
     rows = []
-    for one in said["ranking"]:
+    for one in summary["ranking"]:
         if one["log_evidence"] is None:
             continue
         held = one.get(change)
@@ -65,20 +65,20 @@ def estimate_of(one: dict[str, Any]) -> str:
     return "; ".join(size_in_words(one["mechanism"], values))
 
 
-def rejected_table(said: dict[str, Any]) -> str:
+def rejected_table(summary: dict[str, Any]) -> str:
     """What was not tried, and why; empty if everything was."""
     rows = [
         [text(one["mechanism"]), text(one["rejected_because"])]
-        for one in said["ranking"]
+        for one in summary["ranking"]
         if one["log_evidence"] is None
     ]
     return table(("not tried", "why"), rows) if rows else ""
 
 
-def stages_table(said: dict[str, Any]) -> str:
+def stages_table(summary: dict[str, Any]) -> str:
     """One mechanism after the other, as they were added to a specimen; empty of a body."""
     rows = []
-    for stage in said.get("stages", ()):
+    for stage in summary.get("stages", ()):
         best = stage["candidates"][0] if stage["candidates"] else None
         rows.append(
             [
@@ -93,9 +93,9 @@ def stages_table(said: dict[str, Any]) -> str:
     return table(head, rows, numbers=(1,), caption="One after the other") if rows else ""
 
 
-def fit_table(said: dict[str, Any]) -> str:
+def fit_table(summary: dict[str, Any]) -> str:
     """Errors of each state, at what was fitted, held out, and only checked."""
-    unit, fit = unit_of(said), said["fit"]
+    unit, fit = unit_of(summary), summary["fit"]
     rows = []
     for state, name in STATES.items():
         if fit[f"rmse_{unit.suffix}"].get(state) is None:
@@ -117,16 +117,16 @@ def _error(value: Any, factor: float) -> str:
     return f"{factor * value:.3g}"
 
 
-def next_table(said: dict[str, Any]) -> str:
+def next_table(summary: dict[str, Any]) -> str:
     """What to measure next, the most telling first."""
-    rows = [[text(one["what"]), f"{one['expected_nats']:.1f}"] for one in said["next_measurement"]]
+    rows = [[text(one["what"]), f"{one['expected_nats']:.1f}"] for one in summary["next_measurement"]]
     return table(("measurement", "expected log Bayes factor"), rows, numbers=(1,))
 
 
-def smallest_table(said: dict[str, Any]) -> str:
+def smallest_table(summary: dict[str, Any]) -> str:
     """What these data would have shown of each mechanism."""
     rows = []
-    for kind, one in said["smallest_detectable"].items():
+    for kind, one in summary["smallest_detectable"].items():
         size = "" if one["size"] is None else f"{one['parameter']} {one['size']:.2g} {one['unit']}"
         named = one.get("named_from")
         # of what is there or not there is no size

@@ -12,34 +12,34 @@ from warpbrain.report.files import MILLIMETRES
 _WIDTH = 110
 
 
-def diagnosis_lines(said: Mapping[str, Any]) -> list[str]:
+def diagnosis_lines(summary: Mapping[str, Any]) -> list[str]:
     """The verdict on top, then the candidates, the fit and what to do next."""
     lines = [
-        f"VERDICT: {said['verdict']}",
-        *textwrap.wrap(said["sentence"], _WIDTH, initial_indent="  ", subsequent_indent="  "),
+        f"VERDICT: {summary['verdict']}",
+        *textwrap.wrap(summary["sentence"], _WIDTH, initial_indent="  ", subsequent_indent="  "),
     ]
-    where = said["where"]
+    where = summary["where"]
     if where is not None:
         x, y, z = (MILLIMETRES * value for value in where["centre_m"])
         lines.append(
             f"  where: ({x:.1f}, {y:.1f}, {z:.1f}) mm, within {MILLIMETRES * where['radius_m']:.1f} mm; "
             f"p = {where['global_p']:.2g} looking everywhere"
         )
-    if said["when"] is not None:
-        lines.append(f"  when: {when_in_words(said['when'])}")
+    if summary["when"] is not None:
+        lines.append(f"  when: {when_in_words(summary['when'])}")
     lines += ["", "  candidate          probability   log evidence        d    held-out RMSE    estimate"]
-    lines += [_line(one) for one in said["ranking"] if one["log_evidence"] is not None]
-    rejected = [one for one in said["ranking"] if one["log_evidence"] is None]
+    lines += [_line(one) for one in summary["ranking"] if one["log_evidence"] is not None]
+    rejected = [one for one in summary["ranking"] if one["log_evidence"] is None]
     if rejected:
         lines += ["", "  not tried:"]
         lines += [f"    {one['mechanism']}: {one['rejected_because']}" for one in rejected]
-    lines += ["", *_fit_lines(said["fit"])]
-    if said["next_measurement"]:
+    lines += ["", *_fit_lines(summary["fit"])]
+    if summary["next_measurement"]:
         lines += ["", "  what to measure next (expected log Bayes factor between the two most probable mechanisms):"]
-        lines += [f"    {one['expected_nats']:8.1f}  {one['what']}" for one in said["next_measurement"][:5]]
-    if said["confusion"]:
+        lines += [f"    {one['expected_nats']:8.1f}  {one['what']}" for one in summary["next_measurement"][:5]]
+    if summary["confusion"]:
         lines.append("")
-        for sentence in said["confusion"]["says"]:
+        for sentence in summary["confusion"]["says"]:
             lines += textwrap.wrap(sentence, _WIDTH, initial_indent="  ", subsequent_indent="    ")
     return lines
 

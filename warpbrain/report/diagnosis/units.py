@@ -30,8 +30,8 @@ class Unit:
     error: str
 
 
-def unit_of(said: Mapping[str, Any]) -> Unit:
+def unit_of(summary: Mapping[str, Any]) -> Unit:
     """That of the errors of a diagnosis."""
-    if "rmse_m" in said["fit"]:
+    if "rmse_m" in summary["fit"]:
         return Unit("mm", MILLIMETRES, "m", "distance in space")
     return Unit("Pa", 1.0, "pa", "error of the stress")

@@ -18,9 +18,9 @@ def asset(name: str) -> str:
     return (files("warpbrain.report.diagnosis") / "page" / name).read_text(encoding="utf-8")
 
 
-def viewer(said: dict[str, Any], anatomy: Anatomy, rows: Rows | None) -> str:
+def viewer(summary: dict[str, Any], anatomy: Anatomy, rows: Rows | None) -> str:
     """The view; where a browser has no WebGL it says so, and the pictures above and below remain."""
-    scene = describe_scene(said, anatomy, rows)
+    scene = describe_scene(summary, anatomy, rows)
     fields = "".join(
         f'<label><input type="radio" name="field" value="{k}"{" checked" if k == 0 else ""}>'
         f"{text(field['name'])}</label>"

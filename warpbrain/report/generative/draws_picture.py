@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.gp.literature.dataset import OFFSET
 from warpbrain.gp.process import Process
 from warpbrain.gp.secant import invariant
 from warpbrain.report import views
 from warpbrain.report.generative import page
-
-Floats = NDArray[np.float64]
 
 _DRAWS = 16
 #: Steps to each side of rest: bands of the paper's process widen between any two of its hundred points a study.

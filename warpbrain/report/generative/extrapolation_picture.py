@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.gp.literature.dataset import OFFSET
 from warpbrain.gp.process import Process
 from warpbrain.report import views
 from warpbrain.report.generative import page
-
-Floats = NDArray[np.float64]
 
 #: Stretches that are shown, rest among them, and energies [Pa]: bands that leave these are wider than the picture.
 _STRETCHES = np.linspace(0.5, 1.5, 251)

@@ -12,14 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.atomic import whole_file
 from warpbrain.gp.literature.groups import ANATOMIES, METHODS
 from warpbrain.gp.literature.study import Study
 from warpbrain.gp.process import Process
-
-Floats = NDArray[np.float64]
 
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
 BLACK, QUIET, PALE, GROUND = "#000000", "#555555", "#bbbbbb", "#eeeeee"

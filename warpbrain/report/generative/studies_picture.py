@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.gp.literature.study import Study
 from warpbrain.gp.process import Process
 from warpbrain.report.generative import page
-
-Floats = NDArray[np.float64]
 
 _COLOURS = (page.BLUE, page.VERMILLION, page.GREEN, page.BLACK, page.PURPLE, page.ORANGE)
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))

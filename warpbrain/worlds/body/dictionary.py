@@ -18,7 +18,6 @@ from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situat
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.states import SolvedState
 from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, with_free_surfaces
@@ -153,12 +152,15 @@ class Candidates:
     alternatives : frozenset of str
         Kinds that are no physics.
     rejected : dict of str to str
+    source : Effects or None
+        Which made them at a state; None if they were given.
     """
 
     effects: tuple[Effect, ...]
     of_kind: dict[str, NDArray[np.int64]]
     alternatives: frozenset[str]
     rejected: dict[str, str]
+    source: Effects | None = None
 
 
 def candidates_at(
@@ -196,7 +198,7 @@ def candidates_at(
     for name, effect in alternatives.items():
         of_kind[name] = np.array([len(all_effects)])
         all_effects.append(effect)
-    return Candidates(tuple(all_effects), of_kind, frozenset(alternatives), rejected)
+    return Candidates(tuple(all_effects), of_kind, frozenset(alternatives), rejected, effects)
 
 
 def _switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | InputError | SolveError]:
@@ -221,7 +223,6 @@ def candidates_about_fit(
     acting: Sequence[Effect],
     candidates: Candidates,
     places: Mapping[str, NDArray[np.int64]],
-    mesh_errors: MeshErrors | None,
 ) -> Candidates:
     """The effects of a dictionary at the state of a fit, in which some mechanisms act.
 
@@ -236,8 +237,8 @@ def candidates_about_fit(
         At the base.
     places : mapping of str to int array
         Of each kind, numbers of the places whose columns are made anew.
-    mesh_errors : MeshErrors or None
     """
+    mesh_errors = None if candidates.source is None else candidates.source.mesh_errors
     effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=mesh_errors)
     acting_mechanisms = [effect.proposed.make(effect.proposed.mean) for effect in acting]
     acting_kinds = {mechanism.kind for mechanism in acting_mechanisms if not mechanism.several}
@@ -252,7 +253,7 @@ def candidates_about_fit(
             of_this_kind[k] = effect
         of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
         all_effects.extend(of_this_kind)
-    return replace(candidates, effects=tuple(all_effects), of_kind=of_kind)
+    return replace(candidates, effects=tuple(all_effects), of_kind=of_kind, source=effects)
 
 
 def _is_smooth(effect: Effect) -> bool:

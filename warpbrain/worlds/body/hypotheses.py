@@ -25,6 +25,7 @@ from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import causes_of
 from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit
+from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import Fitter
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.stopping import next_to_fit
@@ -60,7 +61,8 @@ class HypothesisSearch:
         self._fitter = Fitter(base)
         self._sets: dict[frozenset[str], WeightedSet] = {}
         # fitted sets whose supersets were weighed about their fit
-        self._expanded: list[frozenset[str]] = []
+        # by fitted sets whose supersets were weighed about their fit: what makes columns there
+        self._expanded: dict[frozenset[str], Effects] = {}
 
     @property
     def weighted_sets(self) -> tuple[WeightedSet, ...]:
@@ -148,13 +150,15 @@ class HypothesisSearch:
         candidate = self._sets[names]
         self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
         subset = self._fitted_subset(candidate)
-        if candidate.refit is None and len(names) <= 2:
-            candidate = with_refined_places(self.base, candidate, self.spacing)
+        if candidate.refit is None:
+            source = self.base.effects if subset is None else self._expanded[subset.names]
+            placed = 0 if subset is None else len(subset.effects)
+            candidate = with_refined_places(self.base, candidate, self.spacing, source, placed)
         starts, nearby = [candidate.coordinates], None
         if self.nothing.refit is not None and subset is None:
             starts.append(self._coordinates_about(self.nothing.refit, candidate))
             nearby = self.nothing.refit.state
-        about = None if subset is None else (subset, candidate.columns)
+        about = None if subset is None or subset.refit is None else (subset.refit, candidate.columns)
         try:
             refit = self._fitter.fit(
                 candidate.effects, candidate.linear_columns, starts, candidate.marginal, nearby, about
@@ -179,13 +183,13 @@ class HypothesisSearch:
                 gained = other.with_evidence(other.hypothesis.log_evidence - other.inherited_gain + gain)
                 self._sets[other.names] = replace(gained, inherited_gain=gain)
 
-    def _fitted_subset(self, candidate: WeightedSet) -> Refit | None:
-        """The fit of all causes of a set but one that its linear model is about; None if that is about the base."""
+    def _fitted_subset(self, candidate: WeightedSet) -> WeightedSet | None:
+        """The fitted set whose fit the linear model of another is about; None if that is about the base."""
         if candidate.refit is not None:
             return None
         subsets = [self._sets[names] for names in self._expanded if names < candidate.names]
-        same = (subset for subset in subsets if subset.effects == candidate.effects[: len(subset.effects)])
-        return next((subset.refit for subset in same), None)
+        same = [subset for subset in subsets if subset.effects == candidate.effects[: len(subset.effects)]]
+        return max(same, key=lambda subset: len(subset.names), default=None)
 
     def _coordinates_about(self, nothing: Refit, candidate: WeightedSet) -> Floats:
         """The most probable coordinates of a set in the linear model about the fit without any cause."""
@@ -195,12 +199,13 @@ class HypothesisSearch:
 
     def _weigh_supersets(self, fitted: WeightedSet, refit: Refit) -> None:
         """Weigh every set of one cause more than a fitted one in the linear model about its fit."""
-        self._expanded.append(fitted.names)
         self._listener.stage(f"what acts beside {' and '.join(sorted(fitted.names))}")
         noise_factor = fitted.marginal.noise.noise_factor
         model = GaussianModel(noise_factor, fitted.columns)
         places = likely_places(model, fitted.residual, self.causes.causes, _PLACES_ABOUT_FIT)
-        candidates = candidates_about_fit(refit.state, fitted.effects, self.candidates, places, self.base.mesh_errors)
+        candidates = candidates_about_fit(refit.state, fitted.effects, self.candidates, places)
+        assert candidates.source is not None
+        self._expanded[fitted.names] = candidates.source
         causes = causes_of(self.base, candidates)
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in fitted.names))
         unscaled = GaussianModel(noise_factor / fitted.marginal.scale, fitted.columns)

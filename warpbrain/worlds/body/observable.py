@@ -17,7 +17,7 @@ def require_observable(case: Case) -> None:
     if case.specimen is not None:
         raise InputError(f"{case.path}: [specimen]: a specimen is diagnosed test by test")
     observations = Observations.to_fit(case)
-    count = sum(observation.size * len(observation.rows) for observation in observations.each)
+    count = sum(observation.size * len(observation.rows) for observation in observations.recordings)
     if count < _FEWEST:
         points = int(np.ceil((_FEWEST - count) / 3))
         raise InputError(

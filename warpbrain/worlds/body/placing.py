@@ -13,10 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.inference import GaussianModel
+from warpbrain.inference.gross_errors import with_gross_errors
+from warpbrain.inference.noise import outliers
 from warpbrain.physics.proposal import Proposal
+from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import scaled
-from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.effects import Effect, Effects
 
 Floats = NDArray[np.float64]
 
@@ -33,13 +36,17 @@ class BestInCell:
 
 
 def best_in_cell(
-    base: Base, effect: Effect, size: float, spacing: float, without: GaussianModel, residual: Floats
+    base: Base, effects: Effects, effect: Effect, size: float, spacing: float, without: GaussianModel, residual: Floats
 ) -> BestInCell:
     """Scan the cell of an effect.
+
+    Each place has gross errors of its own: points that a local effect moves far are sound in the right place alone.
 
     Parameters
     ----------
     base : Base
+    effects : Effects
+        Which makes columns at the state that the linear model is about.
     effect : Effect
         Of a proposal that can be elsewhere.
     size : float
@@ -47,15 +54,20 @@ def best_in_cell(
     spacing : float
         Between the places of the scan [m].
     without : GaussianModel
-        Of rows with all else that acts, gross errors among the columns.
+        Of rows with all else that acts and all points sound.
     residual : (n,) array
         Less what is expected of all else.
     """
+
+    def log_density(tried: Effect) -> float:
+        model = without.with_columns(tried.columns)
+        return with_gross_errors(model, residual - tried.mean, base.points, outliers()).log_density
+
     best, gain = effect, 0.0
     for step in (0.5, 0.25):
-        around = base.effects.of(_around(base, best, step * spacing))
+        around = effects.of(_around(base, best, step * spacing))
         tried = [best, *(scaled(other, size) for other in around)]
-        logs = np.array([float(without.with_columns(e.columns).log_density(residual - e.mean)) for e in tried])
+        logs = np.array(in_threads(log_density, tried))
         if step == 0.5:
             gain = float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs[0])
         best = tried[int(np.argmax(logs))]

@@ -105,7 +105,7 @@ def sensors_at(instants: Sequence[Instant], centre: Floats) -> Sensors:
     from scipy.sparse import vstack
 
     parts = [row for time, observations, u, R in instants for row in _rows(time, observations, u, R, centre)]
-    states = [(u, R) for _, observations, u, R in instants for _ in observations.each]
+    states = [(u, R) for _, observations, u, R in instants for _ in observations.recordings]
     first = np.cumsum([0, *(len(part.values) for _, _, part in parts)])
     sizes = [part.values.size for _, _, part in parts]
     repeat = [observation.size for _, observation, _ in parts]
@@ -139,7 +139,7 @@ def _rows(
     time: float, observations: Observations, u: Floats, reactions: Floats, centre: Floats
 ) -> list[tuple[float, Observation, Residuals]]:
     parts = observations.at(u, reactions, centre)
-    return [(time, observation, part) for observation, part in zip(observations.each, parts, strict=True)]
+    return [(time, observation, part) for observation, part in zip(observations.recordings, parts, strict=True)]
 
 
 def tracked_points(mesh: TetMesh, points: Floats, centre: Floats) -> Sensors:

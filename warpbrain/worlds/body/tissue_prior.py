@@ -27,7 +27,7 @@ def tissue_prior(case: Case, parameters: Parameters) -> Gaussian:
         modes = prior_modes(prior_of(case), parameters)
     except (InputError, SolveError):
         mean = declared(case, parameters)
-        sd = np.array([_DEVIATIONS[parameter.coordinate.name] for parameter in parameters.each])
+        sd = np.array([_DEVIATIONS[parameter.coordinate.name] for parameter in parameters])
         return Gaussian(mean, np.diag(sd**2))
     try:
         theta = declared(case, parameters)

@@ -13,7 +13,7 @@ from warpbrain.inference.marginal import marginal
 from warpbrain.inference.noise import scales
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses
-from warpbrain.worlds.body.effects import Effect, width_of
+from warpbrain.worlds.body.effects import Effect, Effects, width_of
 from warpbrain.worlds.body.placing import best_in_cell
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
@@ -43,8 +43,11 @@ def weigh(
     about : WeightedSet, optional
         A fitted set, whose causes act beside those of the hypothesis; the base, where no cause acts, unless given.
     """
-    start, model_columns = (base.residual, base.model.columns) if about is None else (about.residual, about.columns)
-    acting: tuple[Effect, ...] = () if about is None else about.effects
+    acting: tuple[Effect, ...]
+    if about is None:
+        start, model_columns, acting = base.residual, base.model.columns, ()
+    else:
+        start, model_columns, acting = about.residual, about.columns, about.effects
     members = hypothesis.best.members
     effects = [(member, causes.effect(member)) for member in members]
     linear = [causes.columns(member) for member, effect in effects if effect is None]
@@ -70,19 +73,33 @@ def weigh(
     )
 
 
-def with_refined_places(base: Base, candidate: WeightedSet, spacing: float) -> WeightedSet:
-    """A set with its mechanisms at the best places within their cells of a scan of a spacing [m]."""
+def with_refined_places(
+    base: Base, candidate: WeightedSet, spacing: float, source: Effects, placed: int = 0
+) -> WeightedSet:
+    """A set with its mechanisms at the best places within their cells of a scan.
+
+    Parameters
+    ----------
+    base : Base
+    candidate : WeightedSet
+    spacing : float
+        Between the places of the scan [m].
+    source : Effects
+        Which makes columns at the state that the set is linear about.
+    placed : int
+        Effects, the first ones, whose places stay: those of the fit that the set is linear about.
+    """
     effects = list(candidate.effects)
     for number, (effect, part) in enumerate(zip(candidate.effects, candidate.slices, strict=True)):
-        if effect.proposal is None or effect.proposed.elsewhere is None:
+        if number < placed or effect.proposal is None or effect.proposed.elsewhere is None:
             continue
-        others = np.delete(candidate.marginal.model.columns, np.r_[part], axis=1)
-        without = GaussianModel(candidate.marginal.model.noise_factor, others, candidate.marginal.scale)
+        others = np.delete(candidate.columns, np.r_[part], axis=1)
+        without = GaussianModel(base.model.noise_factor, others, candidate.marginal.scale)
         assert effect.proposed.centre is not None and effect.proposed.radius is not None
         usual = effect.proposed.elsewhere(effect.proposed.centre, effect.proposed.radius)
         size = float(np.max(effect.proposed.sd / usual.sd))
         residual = candidate.residual + effect.mean
-        best = best_in_cell(base, effect, size, spacing, without, residual)
+        best = best_in_cell(base, source, effect, size, spacing, without, residual)
         columns = candidate.columns.copy()
         columns[:, part] = best.effect.columns
         residual = residual - best.effect.mean

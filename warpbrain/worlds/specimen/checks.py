@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.causes import Cause, Place
@@ -19,9 +19,6 @@ from warpbrain.inference.predict import predictive_p
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.linear import Linear
 from warpbrain.worlds.specimen.protocol import Protocol
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: Parts of a test that are held out where it is the only one, and blocks of its rows for intervals.
 _BLOCKS = 4
@@ -53,7 +50,7 @@ def folds_of(protocol: Protocol) -> Folds:
     return Folds(tuple(fitted & (blocks == block) for block in np.unique(blocks[fitted])), False)
 
 
-def blocks_of(protocol: Protocol) -> NDArray[np.int64]:
+def blocks_of(protocol: Protocol) -> Ints:
     """Parts of tests by number (n,)."""
     each = [
         _BLOCKS * k + np.minimum((_BLOCKS * test.path / max(float(test.path[-1]), 1e-12)).astype(np.int64), _BLOCKS - 1)
@@ -75,8 +72,8 @@ def held_out(fit: Fit, folds: Folds) -> tuple[Floats, float]:
     rows = fit.rows
     predicted, total = np.full(len(rows), np.nan), 0.0
     for held in folds.held:
-        again = fit.given(rows & ~held)
-        columns = np.column_stack([fit.rest, again.columns])[rows]
+        again = fit.refitted_to(rows & ~held)
+        columns = np.column_stack([fit.unknown, again.columns])[rows]
         model = GaussianModel(fit.model.noise_factor, columns, fit.scale)
         observed = ~held[rows]
         mean, _ = model.conditional(again.residual[rows], observed)
@@ -88,7 +85,7 @@ def held_out(fit: Fit, folds: Folds) -> tuple[Floats, float]:
 def placebo_p(about: Linear, name: str, folds: Folds, rng: np.random.Generator) -> float:
     """Probability that a pattern that means nothing predicts held-out rows as well as a cause does.
 
-    A pattern is a random smooth function of stretch, shear, the way along a test and the logarithm of its time, the
+    A pattern is a random smooth function of stretch, shear, the path of a test and the logarithm of its time, the
     same in all tests, so that it can carry over to those that are held out as a cause does. It has as many places and
     columns as the cause, of the same sizes, and both are in the same model: about the fit without the cause.
 
@@ -103,7 +100,7 @@ def placebo_p(about: Linear, name: str, folds: Folds, rng: np.random.Generator) 
     fit = about.fit
     cause = next(one for one in about.causes if one.name == name)
     length = np.sqrt(np.mean([np.mean(place.columns**2) for place in cause.places]))
-    peaks = np.concatenate([np.full(len(test.strain), test.peak) for test in fit.forward.protocol.tests])[fit.rows]
+    peaks = fit.forward.protocol.peaks[fit.rows]
     where, causes = _coordinates(fit.forward.protocol)[fit.rows], [cause]
     for number in range(_PLACEBOS):
         places = []
@@ -141,7 +138,7 @@ def _pattern(where: Floats, count: int, rng: np.random.Generator) -> Floats:
 
 
 def _coordinates(protocol: Protocol) -> Floats:
-    """Stretch and shear over their largest, way along the test and logarithm of its time (n, 4)."""
+    """Stretch and shear over their largest, path of the test and logarithm of its time (n, 4)."""
     rows = []
     for test in protocol.tests:
         strain, zero = (test.strain - test.rest) / test.reach, np.zeros(len(test.strain))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,12 +13,14 @@ from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.confirm import after_checks
 from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, Decision, decide
-from warpbrain.physics.values import Value
+from warpbrain.physics.values import Measurement, Value
 from warpbrain.recordings.recording import TestRecording
+from warpbrain.seconds import Seconds
 from warpbrain.simulation.specimen import specimen_of
 from warpbrain.threads import one_thread_of_blas
-from warpbrain.worlds.specimen.acting import Effect
-from warpbrain.worlds.specimen.checking import Checking, what_grows
+from warpbrain.worlds.listener import Listener
+from warpbrain.worlds.specimen.actions import Effect
+from warpbrain.worlds.specimen.checking import Checker, grown_errors
 from warpbrain.worlds.specimen.effects import effects_of
 from warpbrain.worlds.specimen.explained import explained_case
 from warpbrain.worlds.specimen.fit import Fit, Fitting
@@ -30,8 +30,8 @@ from warpbrain.worlds.specimen.measures import score, smallest_of, values_of, wh
 from warpbrain.worlds.specimen.next_tests import next_measurements
 from warpbrain.worlds.specimen.noise import noise_factor
 from warpbrain.worlds.specimen.protocol import protocol_of
-from warpbrain.worlds.specimen.result import Combination, Measurement, Ranked, SpecimenDiagnosis
-from warpbrain.worlds.specimen.search import Found, Sets, names_of
+from warpbrain.worlds.specimen.result import Combination, Ranked, SpecimenDiagnosis
+from warpbrain.worlds.specimen.search import CauseSet, Sets
 from warpbrain.worlds.specimen.sentences import assumptions_of
 
 #: Rows below which nothing is concluded; combinations that are told.
@@ -73,8 +73,7 @@ class DiagnosingSpecimen:
     options : SpecimenOptions, optional
     device : str, optional
         Of the finite elements that glued ends need.
-    say : callable, optional
-        Told what is done.
+    listener : Listener, optional
 
     Raises
     ------
@@ -87,16 +86,16 @@ class DiagnosingSpecimen:
         case: Case,
         options: SpecimenOptions | None = None,
         device: str | None = None,
-        say: Callable[[str], None] = lambda _text: None,
+        listener: Listener | None = None,
     ) -> None:
-        self.case, self.device, self.say = case, device, say
+        self.case, self.device, self._listener = case, device, listener or Listener()
         self.options = options or SpecimenOptions()
-        self.seconds: dict[str, float] = {}
+        self.seconds = Seconds()
         recordings = [one for one in case.recordings if isinstance(one, TestRecording)]
         self._check(recordings)
         #: All recorded rows, and those that densities are of.
         self.protocol = protocol_of(specimen_of(case), recordings)
-        self.few = self.protocol.few
+        self.thinned = self.protocol.thinned
 
     def _check(self, recordings: Sequence[TestRecording]) -> None:
         specimen, path = specimen_of(self.case), self.case.path
@@ -125,22 +124,22 @@ class DiagnosingSpecimen:
             return self._run()
 
     def _run(self) -> SpecimenDiagnosis:
-        options, few, everything = self.options, self.few, self.protocol
-        self.say("base: the case as declared, its tissue refitted")
-        with self._timed("base"):
+        options, thinned, everything = self.options, self.thinned, self.protocol
+        self._listener.stage("base: the case as declared, its tissue refitted")
+        with self.seconds.of("base"):
             assert self.case.specimen is not None
             glued = self.case.specimen.grips == "glued" and options.ends
-            forward = Forward(self.case, few, GluedEnds(self.case, everything, self.device), glued)
-            fitting = Fitting(noise_factor(few), few.mask(few.to_fit))
-            effects, rejected = effects_of(self.case, few, options.candidates)
-            base = fitting.fit(forward, (), np.zeros((len(few), 0)), np.zeros(forward.size(())), 1.0)
+            forward = Forward(self.case, thinned, GluedEnds(self.case, everything, self.device), glued)
+            fitting = Fitting(noise_factor(thinned), thinned.mask(thinned.to_fit))
+            effects, rejected = effects_of(self.case, thinned, options.candidates)
+            base = fitting.fit(forward, (), np.zeros((len(thinned), 0)), np.zeros(len(forward.nuisances)), 1.0)
         if base is None:
             raise InputError(f"{self.case.path}: the declared law finds no state in the tests")
-        with self._timed("sets of causes"):
-            sets = Sets(fitting, effects, base, self.say)
+        with self.seconds.of("sets of causes"):
+            sets = Sets(fitting, effects, base, self._listener)
             ordered = sets.ordered()
-        with self._timed("checks"):
-            checking = Checking(sets, everything, options.draws, np.random.default_rng([options.seed, 11]))
+        with self.seconds.of("checks"):
+            checking = Checker(sets, everything, options.draws, np.random.default_rng([options.seed, 11]))
             p_value = checking.p_left(base)
             hypotheses, chances = [one.hypothesis for one, _ in ordered], np.array([p for _, p in ordered])
             by_posterior, _ = decide(hypotheses, chances, calibration().losses)
@@ -148,16 +147,16 @@ class DiagnosingSpecimen:
                 by_posterior = Decision(NOTHING)
             best = base if by_posterior.verdict == NOTHING else _explaining(ordered, by_posterior)
             checked = checking.of(best)
-            grown, worse = what_grows(checked)
+            grown, worse = grown_errors(checked)
             decision, doubts = after_checks(
                 by_posterior, checked.confirmations, checked.p_left, options.alpha, grown, worse
             )
         named = decision.causes if decision.verdict in (NAMED, NAMED_AND_REST) else ()
-        with self._timed("next measurement"):
+        with self.seconds.of("next measurement"):
             measurements = _next(ordered, base)
-        with self._timed("explained"):
+        with self.seconds.of("explained"):
             explained = explained_case(fitting, best) if named else None
-        declared = forward.of(everything).stress((), np.zeros(forward.size(())))
+        declared = forward.of(everything).stress((), np.zeros(len(forward.nuisances)))
         scores = {"declared": score(everything, declared, None)} | checked.scores
         ranking = _ranking(sets, ordered, effects, checking)
         by_name = {one.name: one for one in ranking}
@@ -177,7 +176,7 @@ class DiagnosingSpecimen:
                 Combination(one.hypothesis.causes, one.hypothesis.log_evidence - nothing, p, one.fit is not None)
                 for one, p in ordered[:_TOLD]
             ),
-            assumed=tuple(sorted(names_of(best))),
+            assumed=tuple(sorted(best.names)),
             where=where_it_shows(everything, checked.stresses["refitted"], checked.stresses["explained"])
             if best is not base
             else None,
@@ -199,14 +198,8 @@ class DiagnosingSpecimen:
             seconds=self.seconds,
         )
 
-    @contextmanager
-    def _timed(self, stage: str) -> Iterator[None]:
-        begun = time.perf_counter()
-        yield
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
 
-
-def _explaining(ordered: Sequence[tuple[Found, float]], decision: Decision) -> Fit:
+def _explaining(ordered: Sequence[tuple[CauseSet, float]], decision: Decision) -> Fit:
     """The most probable fit that has all causes of a verdict; of one that speaks of none, of all with any."""
     fits = [one.fit for one, _ in ordered if one.fit is not None and one.names]
     wanted = {name for name in decision.causes if name != UNKNOWN}
@@ -214,10 +207,10 @@ def _explaining(ordered: Sequence[tuple[Found, float]], decision: Decision) -> F
         wanted = set()
     nothing = next(one.fit for one, _ in ordered if not one.names)
     assert nothing is not None
-    return next((fit for fit in fits if wanted <= names_of(fit)), nothing)
+    return next((fit for fit in fits if wanted <= fit.names), nothing)
 
 
-def _next(ordered: Sequence[tuple[Found, float]], base: Fit) -> tuple[Measurement, ...]:
+def _next(ordered: Sequence[tuple[CauseSet, float]], base: Fit) -> tuple[Measurement, ...]:
     """What would tell the two most probable sets with mechanisms of a run apart, or the only one from none."""
     fits: dict[frozenset[str], Fit] = {}
     for one, _ in ordered:
@@ -233,7 +226,7 @@ def _values(fit: Fit, name: str) -> tuple[Value, ...]:
 
 
 def _ranking(
-    sets: Sets, ordered: Sequence[tuple[Found, float]], effects: Sequence[Effect], checking: Checking
+    sets: Sets, ordered: Sequence[tuple[CauseSet, float]], effects: Sequence[Effect], checking: Checker
 ) -> tuple[Ranked, ...]:
     """Every cause alone, that which most probably acts first, and what has no name."""
     nothing = sets.by_names[frozenset()].hypothesis.log_evidence
@@ -258,7 +251,7 @@ def _ranking(
                 detectability=d,
                 change=change,
                 values=() if one is None or fit is None else _values(fit, name),
-                region="" if one is None else one.way.region,
+                region="" if one is None else one.variant.region,
             )
         )
     return tuple(sorted(found, key=lambda one: (-one.probability, -one.log_evidence)))

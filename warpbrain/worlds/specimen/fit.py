@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError
+from warpbrain.inference.decide import UNKNOWN
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.noise import scales
-from warpbrain.worlds.specimen.forward import Assumed, Forward
+from warpbrain.worlds.specimen.forward import Component, Forward
 from warpbrain.worlds.specimen.material import NoStateError
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: Steps at most, and the relative gain that ends them; how often a fit is repeated with the scale of the noise, and
 #: with the glued ends of the law, that it arrived at.
@@ -37,8 +35,8 @@ class Fit:
     Attributes
     ----------
     forward : Forward
-    assumed : tuple of Assumed
-    rest : (n, q) array
+    assumed : tuple of Component
+    unknown : (n, q) array
         Columns of smooth changes without a name, one standard deviation each; q is 0 without them.
     rows : (n,) bool array
         That were fitted.
@@ -57,8 +55,8 @@ class Fit:
     """
 
     forward: Forward
-    assumed: tuple[Assumed, ...]
-    rest: Floats
+    assumed: tuple[Component, ...]
+    unknown: Floats
     rows: Bools
     noise: Floats
     z: Floats
@@ -69,8 +67,9 @@ class Fit:
 
     @property
     def names(self) -> frozenset[str]:
-        """Of its causes."""
-        return frozenset(one.effect.name for one in self.assumed)
+        """Of its causes, what has no name among them."""
+        names = frozenset(one.effect.name for one in self.assumed)
+        return names | {UNKNOWN} if self.unknown.shape[1] else names
 
     @cached_property
     def residual(self) -> Floats:
@@ -80,18 +79,18 @@ class Fit:
     @cached_property
     def model(self) -> GaussianModel:
         """Of the residual at the fitted rows."""
-        return _model(self.noise, self.rows, self.rest, self.columns, self.scale)
+        return _model(self.noise, self.rows, self.unknown, self.columns, self.scale)
 
     @cached_property
     def covariance(self) -> Floats:
         """Of the coefficients (k, k)."""
-        return self.model.coefficients(self.residual[self.rows])[1][self.rest.shape[1] :, self.rest.shape[1] :]
+        return self.model.coefficients(self.residual[self.rows])[1][self.unknown.shape[1] :, self.unknown.shape[1] :]
 
-    def given(self, rows: Bools) -> Fit:
+    def refitted_to(self, rows: Bools) -> Fit:
         """The same causes fitted to other rows (n,), with its noise and glued ends; itself where no fit stands."""
         fitting = Fitting(self.noise, rows)
         try:
-            return fitting.once(self.forward, self.assumed, self.rest, self.z, self.scale)
+            return fitting.once(self.forward, self.assumed, self.unknown, self.z, self.scale)
         except CANNOT_BE:
             return self
 
@@ -115,14 +114,16 @@ class Fitting:
     def __init__(self, noise: Floats, rows: Bools) -> None:
         self.noise, self.rows = noise, rows
 
-    def fit(self, forward: Forward, assumed: tuple[Assumed, ...], rest: Floats, z: Floats, scale: float) -> Fit | None:
+    def fit(
+        self, forward: Forward, assumed: tuple[Component, ...], unknown: Floats, z: Floats, scale: float
+    ) -> Fit | None:
         """A fit whose noise and glued ends are those that it was made with; None if none stands.
 
         Parameters
         ----------
         forward : Forward
-        assumed : tuple of Assumed
-        rest : (n, q) array
+        assumed : tuple of Component
+        unknown : (n, q) array
         z : (k,) array
             Where it begins.
         scale : float
@@ -131,7 +132,7 @@ class Fitting:
         found = None
         for _ in range(_SETTLING):
             try:
-                again = self.once(forward, assumed, rest, z, scale)
+                again = self.once(forward, assumed, unknown, z, scale)
                 law = forward.material(assumed, again.z)
             except CANNOT_BE:
                 return found
@@ -145,12 +146,12 @@ class Fitting:
             forward = moved if ends > _SAME else forward
         return found
 
-    def once(self, forward: Forward, assumed: tuple[Assumed, ...], rest: Floats, z: Floats, scale: float) -> Fit:
+    def once(self, forward: Forward, assumed: tuple[Component, ...], unknown: Floats, z: Floats, scale: float) -> Fit:
         """A fit with one scale of the noise and the glued ends of one law; raises one of `CANNOT_BE` if none stands."""
         from scipy.optimize import least_squares
 
         rows, observed = self.rows, forward.protocol.observed
-        white = GaussianModel(self.noise[np.ix_(rows, rows)], rest[rows], scale).standardised
+        white = GaussianModel(self.noise[np.ix_(rows, rows)], unknown[rows], scale).standardised
 
         def residuals(at: Floats) -> Floats:
             try:
@@ -171,15 +172,15 @@ class Fitting:
         residual = (observed - stress + columns @ z)[rows]
         each = []
         for kappa, log_prior in zip(*(values.tolist() for values in scales()), strict=True):
-            model = _model(self.noise, rows, rest, columns, kappa)
-            each.append(log_prior + float(model.log_density(residual)) - _beyond(model, residual, z, rest.shape[1]))
+            model = _model(self.noise, rows, unknown, columns, kappa)
+            each.append(log_prior + float(model.log_density(residual)) - _beyond(model, residual, z, unknown.shape[1]))
         best = int(np.argmax(each))
         kappa = float(scales()[0][best])
-        return Fit(forward, assumed, rest, rows, self.noise, z, stress, columns, kappa, each[best])
+        return Fit(forward, assumed, unknown, rows, self.noise, z, stress, columns, kappa, each[best])
 
 
-def _model(noise: Floats, rows: Bools, rest: Floats, columns: Floats, scale: float) -> GaussianModel:
-    return GaussianModel(noise[np.ix_(rows, rows)], np.column_stack([rest, columns])[rows], scale)
+def _model(noise: Floats, rows: Bools, unknown: Floats, columns: Floats, scale: float) -> GaussianModel:
+    return GaussianModel(noise[np.ix_(rows, rows)], np.column_stack([unknown, columns])[rows], scale)
 
 
 def _beyond(model: GaussianModel, residual: Floats, z: Floats, first: int) -> float:

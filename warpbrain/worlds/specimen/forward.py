@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.physics.mechanism import Mechanism
-from warpbrain.worlds.specimen.acting import Acting, Declared, Effect, Way
+from warpbrain.worlds.specimen.actions import Action, Baseline, Effect, Variant
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.material import HomogeneousMaterial
 from warpbrain.worlds.specimen.nuisances import Nuisances
 from warpbrain.worlds.specimen.protocol import Protocol
-
-Floats = NDArray[np.float64]
 
 #: Step of differences, in standard deviations.
 _STEP = 1e-3
@@ -25,39 +23,39 @@ _REMEMBERED = 500
 
 
 @dataclass(frozen=True, eq=False)
-class Assumed:
-    """A cause that acts in one of its ways, near one of its trials, with one of its sizes.
+class Component:
+    """A cause of a fit: it acts in one of its variants, near one of its trials, with one of its sizes.
 
     Attributes
     ----------
     effect : Effect
-    way : Way
+    variant : Variant
     trial : (m, k) array
     size : float
     """
 
     effect: Effect
-    way: Way
+    variant: Variant
     trial: Floats
     size: float
 
     def __len__(self) -> int:
-        return len(self.way.mean)
+        return len(self.variant.mean)
 
     @property
     def sd(self) -> Floats:
         """Standard deviations (k,) of the coefficients: the size is of those by which it does something."""
-        sized = np.any(self.trial != self.way.nothing, axis=0)
-        return np.where(sized, self.size, 1.0) * self.way.sd
+        sized = np.any(self.trial != self.variant.nothing, axis=0)
+        return np.where(sized, self.size, 1.0) * self.variant.sd
 
     def coefficients(self, z: Floats) -> Floats:
         """Coefficients (k,) from standard deviations (k,)."""
-        c = np.asarray(self.way.mean + self.sd * z)
-        if not self.way.one_sign:
+        c = np.asarray(self.variant.mean + self.sd * z)
+        if not self.variant.one_sign:
             return c
         # half of a normal distribution, folded: where it does nothing it has a slope
-        move = self.trial[0] - self.way.nothing
-        return np.where(move != 0.0, self.way.nothing + np.sign(move) * np.abs(c - self.way.nothing), c)
+        move = self.trial[0] - self.variant.nothing
+        return np.where(move != 0.0, self.variant.nothing + np.sign(move) * np.abs(c - self.variant.nothing), c)
 
 
 class Forward:
@@ -95,7 +93,7 @@ class Forward:
         sticking = (lambda: factor) if glued else (lambda: ends.factor(declared, protocol))
         [tissue] = case.tissues.values()
         elastic = self._homogeneous(()) * factor
-        self.declared = Declared(protocol, elastic, tissue.known_law.shear_modulus, factor, sticking)
+        self.declared = Baseline(protocol, elastic, tissue.known_law.shear_modulus, factor, sticking)
         self.nuisances = Nuisances(self.declared, shape_of_law)
 
     def of(
@@ -108,23 +106,15 @@ class Forward:
         shape = self.shape_of_law if shape_of_law is None else shape_of_law
         return Forward(self.case, protocol or self.protocol, self.ends, self.glued, law or self.law, shape)
 
-    def size(self, assumed: Sequence[Assumed]) -> int:
-        """How many coefficients there are."""
-        return len(self.nuisances) + sum(map(len, assumed))
-
-    def parts(self, assumed: Sequence[Assumed], z: Floats) -> list[Floats]:
-        """Those (k,) of each cause in standard deviations."""
-        return np.split(z, np.cumsum([len(self.nuisances), *map(len, assumed)])[:-1])[1:]
-
-    def mechanisms(self, assumed: Sequence[Assumed], z: Floats) -> tuple[Mechanism, ...]:
+    def mechanisms(self, assumed: Sequence[Component], z: Floats) -> tuple[Mechanism, ...]:
         """Of the registry, at coefficients (k,)."""
-        return tuple(mechanism for one in self._acting(assumed, z) for mechanism in one.mechanisms)
+        return tuple(mechanism for one in self.actions(assumed, z) for mechanism in one.mechanisms)
 
-    def material(self, assumed: Sequence[Assumed], z: Floats) -> HomogeneousMaterial:
+    def material(self, assumed: Sequence[Component], z: Floats) -> HomogeneousMaterial:
         """Of the tissue, at coefficients (k,)."""
         return HomogeneousMaterial.of_case(self.case, self.mechanisms(assumed, z))
 
-    def stress(self, assumed: Sequence[Assumed], z: Floats) -> Floats:
+    def stress(self, assumed: Sequence[Component], z: Floats) -> Floats:
         """Nominal stress (n,) at all rows [Pa].
 
         Raises
@@ -134,18 +124,14 @@ class Forward:
         NoStateError
             If there is no state.
         """
-        return self._stress(z, self._acting(assumed, z))
+        return self.stress_of(self.actions(assumed, z), z)
 
-    def stress_of(self, acting: Sequence[Acting], z: Floats) -> Floats:
-        """The same of what acts, with the coefficients of nuisances alone."""
-        return self._stress(z, acting)
-
-    def tangent(self, assumed: Sequence[Assumed], z: Floats, stress: Floats) -> Floats:
+    def tangent(self, assumed: Sequence[Component], z: Floats, stress: Floats) -> Floats:
         """Change (n, k) of the stress with each coefficient: differences for causes, exact for nuisances."""
-        acting = self._acting(assumed, z)
+        actions = self.actions(assumed, z)
         logs, _, zeros = self.nuisances.split(z)
-        scaled = stress - self.nuisances.added @ zeros - _sum([one.added for one in acting], len(stress))
-        scale = np.exp(self.nuisances.logarithmic @ logs) * _product([one.factor for one in acting], len(stress))
+        scaled = stress - self.nuisances.added @ zeros - _sum([one.added for one in actions], len(stress))
+        scale = np.exp(self.nuisances.logarithmic @ logs) * _product([one.factor for one in actions], len(stress))
         columns = [
             self.nuisances.logarithmic * scaled[:, None],
             self.nuisances.scaled * scale[:, None],
@@ -157,18 +143,20 @@ class Forward:
             columns.append(((self.stress(assumed, moved) - stress) / _STEP)[:, None])
         return np.concatenate(columns, axis=1)
 
-    def _acting(self, assumed: Sequence[Assumed], z: Floats) -> list[Acting]:
-        parts = self.parts(assumed, z)
-        return [one.way.act(one.coefficients(c), self.declared) for one, c in zip(assumed, parts, strict=True)]
+    def actions(self, assumed: Sequence[Component], z: Floats) -> list[Action]:
+        """What causes do at coefficients (k,)."""
+        parts = np.split(z, np.cumsum([len(self.nuisances), *map(len, assumed)])[:-1])[1:]
+        return [one.variant.act(one.coefficients(c), self.declared) for one, c in zip(assumed, parts, strict=True)]
 
-    def _stress(self, z: Floats, acting: Sequence[Acting]) -> Floats:
+    def stress_of(self, actions: Sequence[Action], z: Floats) -> Floats:
+        """The stress of what causes do, with the coefficients of nuisances among all (k,)."""
         logs, shapes, zeros = self.nuisances.split(z)
         n = len(self.protocol)
-        mechanisms = tuple(mechanism for one in acting for mechanism in one.mechanisms)
+        mechanisms = tuple(mechanism for one in actions for mechanism in one.mechanisms)
         simulated = self._homogeneous(mechanisms) * self.declared.glued if mechanisms else self.declared.elastic
-        simulated = simulated + self.nuisances.scaled @ shapes + _sum([one.scaled for one in acting], n)
-        scale = np.exp(self.nuisances.logarithmic @ logs) * _product([one.factor for one in acting], n)
-        return np.asarray(scale * simulated + self.nuisances.added @ zeros + _sum([one.added for one in acting], n))
+        simulated = simulated + self.nuisances.scaled @ shapes + _sum([one.scaled for one in actions], n)
+        scale = np.exp(self.nuisances.logarithmic @ logs) * _product([one.factor for one in actions], n)
+        return np.asarray(scale * simulated + self.nuisances.added @ zeros + _sum([one.added for one in actions], n))
 
     def _homogeneous(self, mechanisms: tuple[Mechanism, ...]) -> Floats:
         key = repr(mechanisms)

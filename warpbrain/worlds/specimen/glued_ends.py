@@ -11,17 +11,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import SolveError
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.specimen import Rig
 from warpbrain.worlds.specimen.material import HomogeneousMaterial, NoStateError
-from warpbrain.worlds.specimen.protocol import Protocol, radius_of, strain_of, stress_unit
-
-Floats = NDArray[np.float64]
+from warpbrain.worlds.specimen.protocol import REST, Protocol, radius_of, strain_of, stress_unit
 
 #: Steps of the rig to the farther extreme; the largest strain it is asked for, of a stretch and of a shear.
 _STEPS, _STRETCH, _SHEAR = 4, 0.6, 0.8
@@ -76,7 +74,7 @@ class GluedEnds:
         return np.concatenate([curves[test.mode].at(test.strain) for test in protocol.tests])
 
     def _curve(self, mode: str, material: HomogeneousMaterial) -> Curve:
-        rest = 1.0 if mode == "axial" else 0.0
+        rest = REST[mode]
         most = _STRETCH if mode == "axial" else _SHEAR
         strains = np.concatenate([test.strain for test in self.protocol.tests if test.mode == mode]) - rest
         low, high = max(float(strains.min()), -most), min(float(strains.max()), most)

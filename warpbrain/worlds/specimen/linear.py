@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Cause, Kind, Place
@@ -15,12 +15,10 @@ from warpbrain.inference.decide import UNKNOWN
 from warpbrain.inference.hypothesis import Configuration, Posterior
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import Search, posterior
-from warpbrain.worlds.specimen.acting import Effect, Way
+from warpbrain.worlds.specimen.actions import Effect, Variant
 from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
-from warpbrain.worlds.specimen.forward import Assumed
+from warpbrain.worlds.specimen.forward import Component
 from warpbrain.worlds.specimen.noise import smooth_patterns
-
-Floats = NDArray[np.float64]
 
 _PRIORS = {Kind.PHYSICS: "causes.mechanism", Kind.NOT_PHYSICS: "causes.not_physics", Kind.UNKNOWN: "causes.unknown"}
 
@@ -42,7 +40,7 @@ class Linear:
         With columns at the fitted rows.
     effects : tuple of Effect or None
         Of each cause; None of the unknown.
-    trials : tuple of tuples of (Way, (m, k) array)
+    trials : tuple of tuples of (Variant, (m, k) array)
         Of each cause, of each of its places.
     smooth : tuple of (n, q) arrays
         The places of the unknown, at all rows.
@@ -51,7 +49,7 @@ class Linear:
     fit: Fit
     causes: tuple[Cause, ...]
     effects: tuple[Effect | None, ...]
-    trials: tuple[tuple[tuple[Way, Floats], ...], ...]
+    trials: tuple[tuple[tuple[Variant, Floats], ...], ...]
     smooth: tuple[Floats, ...]
 
     def posterior(self, beam: int) -> Posterior:
@@ -60,10 +58,10 @@ class Linear:
         residual = self.fit.residual[self.fit.rows]
         return posterior(self.fit.model.with_scale(1.0), residual, self.causes, Search(values, logs, beam=beam))
 
-    def start(self, best: Configuration) -> tuple[tuple[Assumed, ...], Floats, Floats]:
+    def start(self, best: Configuration) -> tuple[tuple[Component, ...], Floats, Floats]:
         """Causes of the fit and of a configuration, smooth changes, and coefficients to begin at."""
         fit, sizes = self.fit, beliefs("specimen.sizes")
-        assumed, rest, widths = list(fit.assumed), fit.rest, []
+        assumed, unknown, widths = list(fit.assumed), fit.unknown, []
         columns = []
         for member in best.members:
             size = float(sizes[member.size])
@@ -71,30 +69,30 @@ class Linear:
             widths.append(columns[-1].shape[1])
             effect = self.effects[member.cause]
             if effect is None:
-                rest = size * self.smooth[member.place]
+                unknown = size * self.smooth[member.place]
             else:
-                assumed.append(Assumed(effect, *self.trials[member.cause][member.place], size))
+                assumed.append(Component(effect, *self.trials[member.cause][member.place], size))
         model = fit.model.with_scale(best.scale)
         known = model.columns.shape[1]
         if columns:
             model = model.with_columns(np.concatenate(columns, axis=1))
         mean = model.coefficients(fit.residual[fit.rows])[0]
-        parts = [mean[fit.rest.shape[1] : known]]
+        parts = [mean[fit.unknown.shape[1] : known]]
         moves = iter(np.split(mean[known:], np.cumsum(widths)[:-1]) if widths else [])
         new = iter(assumed[len(fit.assumed) :])
         for member, move in zip(best.members, moves, strict=True):
             if self.effects[member.cause] is not None:
                 one = next(new)
-                c = one.way.nothing + one.size * move @ (one.trial - one.way.nothing)
-                parts.append((c - one.way.mean) / one.sd)
-        return tuple(assumed), rest, np.concatenate(parts)
+                c = one.variant.nothing + one.size * move @ (one.trial - one.variant.nothing)
+                parts.append((c - one.variant.mean) / one.sd)
+        return tuple(assumed), unknown, np.concatenate(parts)
 
 
 def linearise(fit: Fit, effects: Sequence[Effect]) -> Linear:
     """Of all causes that the fit does not have; places where there is no state are left out."""
     causes: list[Cause] = []
     kept: list[Effect | None] = []
-    trials: list[tuple[tuple[Way, Floats], ...]] = []
+    trials: list[tuple[tuple[Variant, Floats], ...]] = []
     rows, sizes = fit.rows, beliefs("specimen.sizes")
     for effect in effects:
         if effect.name in fit.names:
@@ -105,14 +103,14 @@ def linearise(fit: Fit, effects: Sequence[Effect]) -> Linear:
             causes.append(Cause(effect.name, columns, log_odds(effect.kind), sizes, effect.kind))
             kept.append(effect)
             trials.append(tuple(place for place, _ in places))
-    few = fit.forward.protocol
+    thinned = fit.forward.protocol
     smooth = tuple(
-        belief("specimen.largest_unknown") * smooth_patterns(few, reach)
+        belief("specimen.largest_unknown") * smooth_patterns(thinned, reach)
         for reach in beliefs("specimen.unknown_reaches")
     )
     # what acts in tests that were not fitted shows in no row
     smooth = tuple(own[:, np.any(own[rows] != 0.0, axis=0)] for own in smooth)
-    if not fit.rest.shape[1]:
+    if UNKNOWN not in fit.names:
         anywhere = tuple(Place(own[rows]) for own in smooth)
         causes.append(Cause(UNKNOWN, anywhere, log_odds(Kind.UNKNOWN), sizes, Kind.UNKNOWN))
         kept.append(None)
@@ -120,16 +118,13 @@ def linearise(fit: Fit, effects: Sequence[Effect]) -> Linear:
     return Linear(fit, tuple(causes), tuple(kept), tuple(trials), smooth)
 
 
-def _columns(fit: Fit, way: Way, trial: Floats) -> Floats | None:
+def _columns(fit: Fit, variant: Variant, trial: Floats) -> Floats | None:
     """What trials change (n, m) beside all that the fit has; None where there is no state."""
     forward = fit.forward
     try:
         with np.errstate(all="ignore"):
-            acting = [
-                one.way.act(one.coefficients(z), forward.declared)
-                for one, z in zip(fit.assumed, forward.parts(fit.assumed, fit.z), strict=True)
-            ]
-            each = [forward.stress_of([*acting, way.act(c, forward.declared)], fit.z) for c in trial]
+            actions = forward.actions(fit.assumed, fit.z)
+            each = [forward.stress_of([*actions, variant.act(c, forward.declared)], fit.z) for c in trial]
     except CANNOT_BE:
         return None
     found = np.column_stack(each) - fit.stress[:, None]

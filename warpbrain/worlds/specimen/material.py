@@ -15,15 +15,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.total_energy import total_energy
 from warpbrain.physics.mechanism import Mechanism, Relaxing, Storing, Substituting
-
-Floats = NDArray[np.float64]
 
 _STEP = 2e-5
 _NEWTON, _TOLERANCE = 60, 1e-9

@@ -5,38 +5,33 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.physics.values import Smallest, Value
+from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.linear import Linear
 from warpbrain.worlds.specimen.protocol import Protocol, Test
 from warpbrain.worlds.specimen.result import Score, Segment
 
-Floats = NDArray[np.float64]
-
 #: Movement between rows, over the largest strain, below which a test rests; step of differences.
 _STILL, _STEP = 0.002, 1e-3
-
-
-def rms(errors: Floats) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(errors**2)))
 
 
 def score(protocol: Protocol, stress: Floats, held: Floats | None) -> Score:
     """Errors of stresses (n,) at all recorded rows [Pa]."""
     errors, fitted = protocol.observed - stress, protocol.mask(protocol.to_fit)
-    check = {protocol.tests[k].name: rms(errors[protocol.rows[k]]) for k in protocol.to_check}
-    outside = None if held is None else rms((protocol.observed - held)[fitted])
-    return Score(rms(errors[fitted]), outside, check)
+    check = {protocol.tests[k].name: root_mean_square(errors[protocol.rows[k]]) for k in protocol.to_check}
+    outside = None if held is None else root_mean_square((protocol.observed - held)[fitted])
+    return Score(root_mean_square(errors[fitted]), outside, check)
 
 
 def values_of(fit: Fit, number: int) -> tuple[Value, ...]:
     """Parameters of one of the causes of a fit, with standard deviations to first order."""
     one, part = fit.assumed[number], fit.part(number)
     z = fit.z[part]
-    here = np.array(one.way.values(one.coefficients(z)))
-    moved = [np.array(one.way.values(one.coefficients(z + _STEP * move))) for move in np.eye(len(z))]
+    here = np.array(one.variant.values(one.coefficients(z)))
+    moved = [np.array(one.variant.values(one.coefficients(z + _STEP * move))) for move in np.eye(len(z))]
     slope = (np.array(moved) - here).T / _STEP
     sd = np.sqrt(np.maximum(np.diag(slope @ fit.covariance[part, part] @ slope.T), 0.0))
     return tuple(
@@ -85,8 +80,10 @@ def smallest_of(about: Linear) -> dict[str, Smallest]:
             continue
         seen = [float(np.linalg.norm(model.standardised(place.columns[:, :1]))) for place in cause.places]
         best = int(np.argmax(seen))
-        way, trial = trials[best]
+        variant, trial = trials[best]
         part = belief("specimen.seen") / max(seen[best], 1e-12)
-        nothing, there = (way.values(c)[0] for c in (way.nothing, way.nothing + part * (trial[0] - way.nothing)))
+        nothing, there = (
+            variant.values(c)[0] for c in (variant.nothing, variant.nothing + part * (trial[0] - variant.nothing))
+        )
         found[effect.name] = Smallest(abs(there - nothing), effect.units[0], effect.names[0])
     return found

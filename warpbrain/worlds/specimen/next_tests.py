@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.physics.values import Measurement
 from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
 from warpbrain.worlds.specimen.noise import noise_factor
-from warpbrain.worlds.specimen.protocol import Test, protocol
-from warpbrain.worlds.specimen.result import Measurement
-
-Floats = NDArray[np.float64]
+from warpbrain.worlds.specimen.protocol import REST, Test, protocol
 
 #: Rows of a side of a test, largest strain of one, duration [s] where no test has times, and part of a modulus that
 #: differs from specimen to specimen and tells nothing.
@@ -49,8 +47,7 @@ def next_measurements(one: Fit, other: Fit) -> tuple[Measurement, ...]:
             first, second = (_stress(fit, mode, strain, time) for fit in (one, other))
         except CANNOT_BE:
             continue
-        peak, rest = float(np.abs(first).max()), 1.0 if mode == "axial" else 0.0
-        away = np.abs(strain - rest)
+        peak, away = float(np.abs(first).max()), np.abs(strain - REST[mode])
         test = Test(
             what, mode, "", True, np.arange(len(strain)), strain, first, time,
             np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain)))]) / away.max(),

@@ -12,12 +12,13 @@ is.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.worlds.specimen.protocol import Protocol, Test
 
-Floats = NDArray[np.float64]
+#: Patterns of a test at most, the smoothest.
+_PATTERNS = 8
 
 
 def noise_factor(protocol: Protocol) -> Floats:
@@ -30,13 +31,13 @@ def noise_factor(protocol: Protocol) -> Floats:
     return np.asarray(np.linalg.cholesky(covariance))
 
 
-def smooth_patterns(protocol: Protocol, reach: float, count: int = 8) -> Floats:
-    """Columns (n, count per test) of any smooth change of a test, as large as its largest stress."""
+def smooth_patterns(protocol: Protocol, reach: float) -> Floats:
+    """Columns (n, 8 per test at most) of any smooth change of a test, as large as its largest stress."""
     columns = []
     for test, rows in zip(protocol.tests, protocol.rows, strict=True):
         values, vectors = np.linalg.eigh(_alike(test, reach))
-        own = np.zeros((len(protocol), min(count, len(values))))
-        own[rows] = test.peak * vectors[:, -count:] * np.sqrt(np.maximum(values[-count:], 0.0))
+        own = np.zeros((len(protocol), min(_PATTERNS, len(values))))
+        own[rows] = test.peak * vectors[:, -_PATTERNS:] * np.sqrt(np.maximum(values[-_PATTERNS:], 0.0))
         columns.append(own)
     return np.concatenate(columns, axis=1)
 

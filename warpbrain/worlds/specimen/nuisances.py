@@ -10,14 +10,12 @@ the zero of a gauge and its drift.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
-from warpbrain.worlds.specimen.acting import Declared
+from warpbrain.worlds.specimen.actions import Baseline
 from warpbrain.worlds.specimen.effects.law_shape import excess_rows, invariant_rows
 from warpbrain.worlds.specimen.effects.not_physics import specimen_rows
-
-Floats = NDArray[np.float64]
 
 
 class Nuisances:
@@ -25,7 +23,7 @@ class Nuisances:
 
     Parameters
     ----------
-    rows : Declared
+    rows : Baseline
     shape_of_law : bool
         Whether the shape of the law and ends are among them: `run` has none but the case's.
 
@@ -35,7 +33,7 @@ class Nuisances:
         Change of the logarithm of all stress; of the simulated stress before it is scaled; and after [Pa].
     """
 
-    def __init__(self, rows: Declared, shape_of_law: bool = True) -> None:
+    def __init__(self, rows: Baseline, shape_of_law: bool = True) -> None:
         protocol = rows.protocol
         logs, self.names = [belief("specimen.modulus") * np.ones(len(protocol))], ["modulus"]
         if len(protocol.specimens) > 1:

@@ -1,12 +1,12 @@
-"""The tests of a specimen: stress over strain at the recorded rows, in chains of one memory; few rows for inference.
+"""The tests of a specimen: stress over strain at the recorded rows, in chains of one memory; fewer rows for inference.
 
 Every response is turned into a nominal stress [Pa]: a force over the area of an end, a torque over `int r dA`. Every
 imposed value is turned into a strain: a stretch, a shear, or the shear at the rim of a twisted cylinder.
 
-A `Protocol` has all recorded rows, of which every printed error is, or few of them, of which densities are: of a test
-with times so many that straight lines between them follow what was imposed, and that a rest is followed at ever longer
-steps (`warpbrain.simulation.history`). What a test is measured by (its largest stress and strain, the way along it) is
-that of the whole record in both.
+A `Protocol` has all recorded rows, of which every printed error is; thinned it has those of which densities are: of a
+test with times so many that straight lines between them follow what was imposed, and that a rest is followed at ever
+longer steps (`warpbrain.simulation.history`). What a test is measured by (its largest stress and strain, its strain
+path) is that of the whole record in both.
 
 Tests of one mode and one specimen whose times go on from one to the next are a chain: tissue remembers the earlier one.
 """
@@ -17,18 +17,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.specimen import Specimen
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.history import corners_of, history_of
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 #: Steps from rest to the largest imposed value, rows of a test without times, and the part of a test's duration that
 #: the first step of a rest takes: how rows are chosen.
 _STEPS, _ROWS, _FIRST = 4, 60, 0.005
+#: Strain at rest, of each mode.
+REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +46,7 @@ class Test:
     time : (n,) array or None
         [s]
     gone : (n,) array
-        Way along the test: strain that was gone through, over the largest.
+        Absolute changes of strain so far, summed, over the largest strain.
     sigma : float
         Of a reading [Pa]: as declared, or as rough as the record is.
     unit : float
@@ -68,7 +67,7 @@ class Test:
     strain: Floats
     stress: Floats
     time: Floats | None
-    gone: Floats
+    strain_path: Floats
     sigma: float
     unit: float
     peak: float
@@ -78,7 +77,7 @@ class Test:
     @property
     def rest(self) -> float:
         """Strain at rest."""
-        return 1.0 if self.mode == "axial" else 0.0
+        return REST[self.mode]
 
     @property
     def share(self) -> Floats:
@@ -89,15 +88,15 @@ class Test:
 
     @property
     def path(self) -> Floats:
-        """Way (n,) along the test from 0: in strain, and in time."""
-        return self.gone + self.share
+        """Progress (n,) of the test from 0: strain path and part of its time together."""
+        return self.strain_path + self.share
 
     def at(self, rows: Ints) -> Test:
         """The test at some of its rows, by their places among them."""
         time = None if self.time is None else self.time[rows]
         return replace(
             self, rows=self.rows[rows], strain=self.strain[rows], stress=self.stress[rows], time=time,
-            gone=self.gone[rows],
+            strain_path=self.strain_path[rows],
         )  # fmt: skip
 
 
@@ -135,7 +134,12 @@ class Protocol:
         """Stress (n,) at all rows [Pa]."""
         return np.concatenate([test.stress for test in self.tests])
 
-    def mask(self, tests: Sequence[int]) -> NDArray[np.bool_]:
+    @property
+    def peaks(self) -> Floats:
+        """Largest stress of the test (n,) of each row [Pa]."""
+        return np.concatenate([np.full(len(test.strain), test.peak) for test in self.tests])
+
+    def mask(self, tests: Sequence[int]) -> Bools:
         """The rows (n,) of some tests."""
         found = np.zeros(len(self), dtype=bool)
         for number in tests:
@@ -158,15 +162,15 @@ class Protocol:
         return tuple(dict.fromkeys(test.specimen for test in self.tests))
 
     @property
-    def few(self) -> Protocol:
+    def thinned(self) -> Protocol:
         """The same tests at the rows that densities are of."""
         return protocol(tuple(test.at(_kept(test)) for test in self.tests))
 
-    def spread(self, of_few: Floats, few: Protocol) -> Floats:
-        """Values (m,) at the few rows on all of them (n,): straight from one to the next."""
+    def spread(self, of_thinned: Floats, thinned: Protocol) -> Floats:
+        """Values (m,) of thinned rows at all of them (n,): straight from one to the next."""
         each = [
-            np.interp(test.rows, sparse.rows, of_few[rows])
-            for test, sparse, rows in zip(self.tests, few.tests, few.rows, strict=True)
+            np.interp(test.rows, sparse.rows, of_thinned[rows])
+            for test, sparse, rows in zip(self.tests, thinned.tests, thinned.rows, strict=True)
         ]
         return np.concatenate(each)
 
@@ -204,7 +208,7 @@ def test_of(specimen: Specimen, recording: TestRecording) -> Test:
     unit = stress_unit(specimen, recording)
     strain = strain_of(specimen, recording.mode, recording.quantities[0], recording.imposed)
     stress = unit * recording.response
-    away = np.abs(strain - (1.0 if recording.mode == "axial" else 0.0))
+    away = np.abs(strain - REST[recording.mode])
     test = Test(
         name=recording.name,
         mode=recording.mode,
@@ -214,17 +218,17 @@ def test_of(specimen: Specimen, recording: TestRecording) -> Test:
         strain=strain,
         stress=stress,
         time=recording.time,
-        gone=np.zeros(len(strain)),
+        strain_path=np.zeros(len(strain)),
         sigma=unit * recording.sigma if recording.sigma is not None else roughness(stress),
         unit=unit,
         peak=float(np.abs(stress).max()),
         reach=max(float(away.max()), 1e-12),
         turn=recording.turn,
     )
-    # without the jitter of a reading, which would make every way long
+    # without the jitter of a reading, which would make every path long
     kept = _kept(test)
-    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain[kept])))]) / test.reach
-    return replace(test, gone=np.interp(test.rows, kept, gone))
+    strain_path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain[kept])))]) / test.reach
+    return replace(test, strain_path=np.interp(test.rows, kept, strain_path))
 
 
 test_of.__test__ = False  # type: ignore[attr-defined]  # not a test of pytest's

@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.decide import Decision
-from warpbrain.physics.values import Smallest, Value
+from warpbrain.physics.values import Measurement, Smallest, Value
 from warpbrain.worlds.specimen.protocol import Protocol
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -79,14 +75,6 @@ class Score:
     fitted: float
     heldout: float | None
     check: dict[str, float]
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """A test that could be run, and the log Bayes factor that is expected of it."""
-
-    what: str
-    expected_nats: float
 
 
 @dataclass(frozen=True, eq=False)

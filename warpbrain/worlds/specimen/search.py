@@ -8,21 +8,19 @@ the log density of the same rows; in which order they were found decides nothing
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.decide import UNKNOWN
 from warpbrain.inference.hypothesis import Hypothesis
-from warpbrain.worlds.specimen.acting import Effect
+from warpbrain.worlds.listener import Listener
+from warpbrain.worlds.specimen.actions import Effect
 from warpbrain.worlds.specimen.fit import Fit, Fitting
 from warpbrain.worlds.specimen.linear import Linear, linearise, log_odds
-
-Floats = NDArray[np.float64]
 
 #: Part of the probability that fitted sets have in the end, fits at most, causes of a set at most, and pairs to which a
 #: third cause is added.
@@ -30,7 +28,7 @@ _MASS, _FITS, _CAUSES, _BEAM = 0.99, 14, 4, 30
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class CauseSet:
     """A set of causes.
 
     Attributes
@@ -68,20 +66,19 @@ class Sets:
     effects : sequence of Effect
     base : Fit
         Without any cause.
-    say : callable
-        Told what is fitted.
+    listener : Listener
     """
 
-    def __init__(self, fitting: Fitting, effects: Sequence[Effect], base: Fit, say: Callable[[str], None]) -> None:
-        self.fitting, self.effects, self.base, self.say = fitting, tuple(effects), base, say
-        self.by_names: dict[frozenset[str], Found] = {}
+    def __init__(self, fitting: Fitting, effects: Sequence[Effect], base: Fit, listener: Listener) -> None:
+        self.fitting, self.effects, self.base, self._listener = fitting, tuple(effects), base, listener
+        self.by_names: dict[frozenset[str], CauseSet] = {}
         self._about: dict[frozenset[str], Linear] = {}
         self._propose(base, 0.0)
         nothing = self.by_names[frozenset()]
         self.by_names[frozenset()] = replace(nothing, fit=base, spread=0.0)
         self._search()
 
-    def ordered(self) -> list[tuple[Found, float]]:
+    def ordered(self) -> list[tuple[CauseSet, float]]:
         """Sets with their probabilities, the most probable first."""
         found = list(self.by_names.values())
         chances = calibration().probabilities([one.hypothesis for one in found])
@@ -89,7 +86,7 @@ class Sets:
 
     def about(self, fit: Fit) -> Linear:
         """All other causes, linearised about a fit."""
-        names = names_of(fit)
+        names = fit.names
         if names not in self._about or self._about[names].fit is not fit:
             self._about[names] = linearise(fit, self.effects)
         return self._about[names]
@@ -124,11 +121,11 @@ class Sets:
                 best = leading.names
                 self._propose(leading.fit, leading.spread)
 
-    def _fit(self, found: Found) -> Found:
+    def _fit(self, found: CauseSet) -> CauseSet:
         hypothesis = found.hypothesis
-        self.say(f"fit with {' and '.join(hypothesis.causes)}")
-        assumed, rest, z = found.linear.start(hypothesis.best)
-        fit = self.fitting.fit(found.linear.fit.forward, assumed, rest, z, hypothesis.best.scale)
+        self._listener.stage(f"fit with {' and '.join(hypothesis.causes)}")
+        assumed, unknown, z = found.linear.start(hypothesis.best)
+        fit = self.fitting.fit(found.linear.fit.forward, assumed, unknown, z, hypothesis.best.scale)
         if fit is None:
             del self.by_names[found.names]
             return found
@@ -147,7 +144,7 @@ class Sets:
         """Sets with the causes of a fit and others: those that were not fitted take their evidence from here."""
         linear = self.about(fit)
         kinds = {one.effect.name: one.effect.kind for one in fit.assumed}
-        if fit.rest.shape[1]:
+        if UNKNOWN in fit.names:
             kinds[UNKNOWN] = Kind.UNKNOWN
         hypotheses = linear.posterior(_BEAM if not kinds else 0).hypotheses
         nothing = next(one for one in hypotheses if not one.causes)
@@ -164,9 +161,4 @@ class Sets:
                 log_evidence=one.log_evidence + spread,
                 log_prior=one.log_prior + sum(log_odds(kind) for kind in kinds.values()),
             )
-            self.by_names[names] = Found(whole, linear, spread, of_scale)
-
-
-def names_of(fit: Fit) -> frozenset[str]:
-    """Of the causes of a fit, what has no name among them."""
-    return fit.names | (frozenset({UNKNOWN}) if fit.rest.shape[1] else frozenset())
+            self.by_names[names] = CauseSet(whole, linear, spread, of_scale)

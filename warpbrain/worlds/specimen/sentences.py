@@ -57,12 +57,12 @@ def _size(one: Ranked) -> str:
 
 def assumptions_of(fit: Fit, protocol: Protocol, by_test: bool) -> tuple[str, ...]:
     """What was taken for granted."""
-    case, few, glued = fit.forward.case, fit.forward.protocol, fit.forward.declared.glued
+    case, thinned, glued = fit.forward.case, fit.forward.protocol, fit.forward.declared.glued
     assert case.specimen is not None
     found = [*case.assumptions]
     found.append(
         f"Errors are of all {len(protocol)} recorded rows of {len(protocol.tests)} tests, as nominal stress; "
-        f"probabilities are of {len(few)} of them."
+        f"probabilities are of {len(thinned)} of them."
     )
     if any(len(chain.tests) > 1 for chain in protocol.chains):
         found.append("Tests whose times go on are one history: tissue remembers the earlier ones.")

@@ -12,7 +12,7 @@ from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.generative.page import BLACK
 
 
-def agreement_figure(said: dict[str, Any], rows: Rows) -> str:
+def agreement_figure(summary: dict[str, Any], rows: Rows) -> str:
     """One panel a state, on common scales: every component of a displacement that was recorded."""
     from matplotlib.ticker import MaxNLocator
 
@@ -42,7 +42,7 @@ def agreement_figure(said: dict[str, Any], rows: Rows) -> str:
         panel.set_aspect("equal")
         for axis in (panel.xaxis, panel.yaxis):
             axis.set_major_locator(MaxNLocator(5))
-        rmse = MILLIMETRES * said["fit"]["rmse_m"][state]
+        rmse = MILLIMETRES * summary["fit"]["rmse_m"][state]
         errors.append(f"{STATES[state]} {rmse:.2f} mm")
         panel.set_title(f"{STATES[state]}\nRMSE {rmse:.2f} mm", fontsize=TEXT)
         panel.set_xlabel("computed [mm]", fontsize=TEXT)

@@ -12,11 +12,11 @@ from warpbrain.report.generative.page import BLACK, BLUE, ORANGE, PALE
 _MOST = 10
 
 
-def candidates_figure(said: dict[str, Any]) -> str:
+def candidates_figure(summary: dict[str, Any]) -> str:
     """Bars of probability, and of the evidence beside it, which a probability of nearly one hides."""
-    tried = [one for one in said["ranking"] if one["log_evidence"] is not None][:_MOST]
+    tried = [one for one in summary["ranking"] if one["log_evidence"] is not None][:_MOST]
     figure, (chances, evidence) = panels(0.8 + 0.26 * max(len(tried), 2), 2, sharey=True)
-    named = {said["mechanism"], *said["group"]}
+    named = {summary["mechanism"], *summary["group"]}
     for row, one in enumerate(tried):
         colour = BLUE if one["mechanism"] in named else (PALE if one["physics"] else ORANGE)
         hatch = "" if one["physics"] else "...."
@@ -44,5 +44,5 @@ def candidates_figure(said: dict[str, Any]) -> str:
         "Left: probability that it acts. Right: logarithm of the evidence. "
         "Blue: named, or of the group; dotted bars: no physics, or a force without a name."
     )
-    said_best = ", ".join(f"{one['mechanism']} {percent(one['probability'])}" for one in tried[:3])
-    return inlined(figure, f"Probabilities of the candidates as bars: {said_best}.", caption)
+    most_probable = ", ".join(f"{one['mechanism']} {percent(one['probability'])}" for one in tried[:3])
+    return inlined(figure, f"Probabilities of the candidates as bars: {most_probable}.", caption)

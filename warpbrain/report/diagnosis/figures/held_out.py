@@ -10,9 +10,9 @@ from warpbrain.report.diagnosis.units import unit_of
 from warpbrain.report.generative.page import BLACK, GREEN, PALE, QUIET
 
 
-def held_out_figure(said: dict[str, Any]) -> str:
+def held_out_figure(summary: dict[str, Any]) -> str:
     """Bars of the held-out errors of each state, and how large noise alone would be."""
-    fit, unit = said["fit"], unit_of(said)
+    fit, unit = summary["fit"], unit_of(summary)
     errors = {state: fit[f"heldout_rmse_{unit.suffix}"].get(state) for state in STATES}
     shown = {state: unit.factor * value for state, value in errors.items() if value is not None}
     figure, (axes,) = panels(0.9 + 0.42 * (len(shown) + 1))

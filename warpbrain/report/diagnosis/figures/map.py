@@ -14,13 +14,13 @@ from warpbrain.report.generative.page import BLACK
 from warpbrain.report.views import VIEWS, in_view
 
 
-def map_figure(said: dict[str, Any], anatomy: Anatomy) -> str:
+def map_figure(summary: dict[str, Any], anatomy: Anatomy) -> str:
     """Scores as colours, with the threshold of significance as a line and the located ball as a dashed circle."""
     from matplotlib.collections import PolyCollection
     from matplotlib.patches import Circle
 
-    threshold = said["map"]["threshold"]
-    centre = centre_of(said, anatomy)
+    threshold = summary["map"]["threshold"]
+    centre = centre_of(summary, anatomy)
     largest = max(float(np.max(anatomy.fields["score"])), threshold)
     figure, axes = panels(3.6, 3)
     tint: Any = None
@@ -33,7 +33,7 @@ def map_figure(said: dict[str, Any], anatomy: Anatomy) -> str:
         )  # fmt: skip
         tint.set_clim(0.0, largest)
         panel.add_collection(tint)
-        where = said["where"]
+        where = summary["where"]
         if where is not None and "centre_m" in where:
             across, up = in_view(centre[view.plane]).tolist()
             radius = MILLIMETRES * where["radius_m"]
@@ -46,12 +46,12 @@ def map_figure(said: dict[str, Any], anatomy: Anatomy) -> str:
     bar.set_label("score of a force there (chi-squared of 3 degrees of freedom)", fontsize=TEXT - 1)
     bar.ax.tick_params(labelsize=TEXT - 2)
     bar.ax.axvline(threshold, color=BLACK, linewidth=1.6)
-    blind = said["map"]["blind_above_n"]
-    verdict = "is" if said["map"]["significant"] else "is not"
+    blind = summary["map"]["blind_above_n"]
+    verdict = "is" if summary["map"]["significant"] else "is not"
     caption = (
         "How strongly a force at each place would explain the mismatch. The largest score, "
-        f"{said['map']['largest']:.1f}, {verdict} above the threshold of {threshold:.1f} that pays for looking at "
-        f"{said['map']['places']} places (bar; green line). Dashed: the ball that was located. Hatched: a force of "
+        f"{summary['map']['largest']:.1f}, {verdict} above the threshold of {threshold:.1f} that pays for looking at "
+        f"{summary['map']['places']} places (bar; green line). Dashed: the ball that was located. Hatched: a force of "
         f"{blind:.2g} N would not be found."
     )
     return inlined(figure, "Three cuts with the score of a force at every place.", caption)

@@ -19,7 +19,7 @@ from warpbrain.report.views import VIEWS, in_view, scale_length
 _LONG = 0.16
 
 
-def residuals_figure(said: dict[str, Any], anatomy: Anatomy, rows: Rows) -> str:
+def residuals_figure(summary: dict[str, Any], anatomy: Anatomy, rows: Rows) -> str:
     """One panel a state."""
     vectors = rows.vectors
     counted = ~vectors.aside
@@ -27,7 +27,7 @@ def residuals_figure(said: dict[str, Any], anatomy: Anatomy, rows: Rows) -> str:
     first = vectors.left[shown[0]][counted]
     # the cut in whose plane most of the mismatch lies
     view = max(VIEWS, key=lambda one: float(np.sum(first[:, one.plane] ** 2)))
-    centre = centre_of(said, anatomy)
+    centre = centre_of(summary, anatomy)
     place = float(centre[view.axis])
     size = float(np.ptp(anatomy.mesh.points, axis=0).max())
     large = float(np.quantile(np.linalg.norm(first, axis=1), 0.95)) or 1e-3
@@ -36,7 +36,7 @@ def residuals_figure(said: dict[str, Any], anatomy: Anatomy, rows: Rows) -> str:
     figure, axes = panels(0.9 + 2.8 * float(high / across), len(shown), width=3.0 * len(shown))
     errors = []
     for panel, state in zip(axes, shown, strict=True):
-        draw_slice(panel, anatomy, view, place, said["map"]["threshold"])
+        draw_slice(panel, anatomy, view, place, summary["map"]["threshold"])
         start = in_view(vectors.where[:, view.plane])
         along = in_view(vectors.left[state][:, view.plane]) * enlarged
         panel.quiver(
@@ -45,7 +45,7 @@ def residuals_figure(said: dict[str, Any], anatomy: Anatomy, rows: Rows) -> str:
         )  # fmt: skip
         panel.plot(*start[counted].T, ".", color=BLACK, markersize=2.0, zorder=6)
         panel.plot(*start[vectors.aside].T, "x", color=BLACK, markersize=6.0, zorder=6)
-        rmse = MILLIMETRES * said["fit"]["rmse_m"][state]
+        rmse = MILLIMETRES * summary["fit"]["rmse_m"][state]
         errors.append(f"{STATES[state]} {rmse:.2f} mm")
         panel.set_title(f"{STATES[state]}\nRMSE {rmse:.2f} mm", fontsize=TEXT + 1)
         frame_slice(panel, anatomy, view)

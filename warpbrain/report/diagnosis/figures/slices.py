@@ -61,9 +61,9 @@ def frame_slice(axes: Any, anatomy: Anatomy, view: View) -> None:
     axes.text(low[0] + 1.1 * length, low[1] + 0.15 * length, f"{length:g} mm", fontsize=8, va="center", color="#333333")
 
 
-def centre_of(said: dict[str, Any], anatomy: Anatomy) -> Any:
+def centre_of(summary: dict[str, Any], anatomy: Anatomy) -> Any:
     """Where to cut (3,) [m]: through what was located, else through the middle of the body."""
-    where = said["where"]
+    where = summary["where"]
     if where is not None and "centre_m" in where:
         return np.array(where["centre_m"])
     points = anatomy.mesh.points

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.physics.proposal import NotTestableError
-from warpbrain.worlds.specimen.acting import Effect
+from warpbrain.worlds.specimen.actions import Effect
 from warpbrain.worlds.specimen.effects import law_shape, not_physics, registered, softening
 from warpbrain.worlds.specimen.protocol import Protocol
 

@@ -10,16 +10,14 @@ What stiffens is all of the stress, what the tissue remembers among it. Small on
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.causes import Kind
 from warpbrain.physics.proposal import NotTestableError
-from warpbrain.worlds.specimen.acting import Acting, Declared, Effect, Way
+from warpbrain.worlds.specimen.actions import Action, Baseline, Effect, Variant
 from warpbrain.worlds.specimen.protocol import Protocol
-
-Floats = NDArray[np.float64]
 
 STIFFENING, SECOND_INVARIANT = "stiffening", "second invariant"
 #: Beyond which no exponential is computed.
@@ -36,7 +34,7 @@ def invariant_rows(protocol: Protocol) -> Floats:
     return np.concatenate([first_invariant(test.mode, test.strain) for test in protocol.tests])
 
 
-def excess_rows(rows: Declared) -> Floats:
+def excess_rows(rows: Baseline) -> Floats:
     """Stress (n,) of `I2` less that of `I1` [Pa]: `(1 - l^-3) - (l - l^-2)` at one shear modulus, none in shear."""
     found = [
         1.0 - test.strain**-3 - test.strain + test.strain**-2 if test.mode == "axial" else np.zeros(len(test.strain))
@@ -49,12 +47,12 @@ def stiffening(case: Case, protocol: Protocol) -> Effect:
     """A factor on the response; a negative `k` softens."""
     largest = float(invariant_rows(protocol).max())
 
-    def act(k: float, rows: Declared) -> Acting:
-        return Acting(factor=np.exp(np.clip(k * invariant_rows(rows.protocol), -_MOST, _MOST)))
+    def act(k: float, rows: Baseline) -> Action:
+        return Action(factor=np.exp(np.clip(k * invariant_rows(rows.protocol), -_MOST, _MOST)))
 
-    way = Way.of_one(act, belief("specimen.largest_stiffening") / largest, False)
+    variant = Variant.of_one(act, belief("specimen.largest_stiffening") / largest, False)
     sentence = "Tissue stiffens with strain more than its law says (k > 0) or less (k < 0), in all directions alike."
-    return Effect(STIFFENING, Kind.PHYSICS, sentence, ("k",), ("",), (way,))
+    return Effect(STIFFENING, Kind.PHYSICS, sentence, ("k",), ("",), (variant,))
 
 
 def second_invariant(case: Case, protocol: Protocol) -> Effect:
@@ -62,9 +60,9 @@ def second_invariant(case: Case, protocol: Protocol) -> Effect:
     if not any(test.mode == "axial" for test in protocol.tests if test.fitted):
         raise NotTestableError("needs an axial test: in shear both invariants are one")
 
-    def act(share: float, rows: Declared) -> Acting:
-        return Acting(scaled=share * excess_rows(rows))
+    def act(share: float, rows: Baseline) -> Action:
+        return Action(scaled=share * excess_rows(rows))
 
-    way = Way.of_one(act, belief("specimen.largest_second_invariant"), False)
+    variant = Variant.of_one(act, belief("specimen.largest_second_invariant"), False)
     sentence = "The law of the tissue depends on the second invariant."
-    return Effect(SECOND_INVARIANT, Kind.PHYSICS, sentence, ("share",), ("",), (way,))
+    return Effect(SECOND_INVARIANT, Kind.PHYSICS, sentence, ("share",), ("",), (variant,))

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.causes import Kind
 from warpbrain.physics.proposal import NotTestableError
-from warpbrain.worlds.specimen.acting import Acting, Declared, Effect, Way
+from warpbrain.worlds.specimen.actions import Action, Baseline, Effect, Variant
 from warpbrain.worlds.specimen.protocol import Protocol
-
-Floats = NDArray[np.float64]
 
 FRICTION, DRIFT, UNLIKE = "end friction", "drift of the zero", "unlike specimens"
 
@@ -24,16 +22,16 @@ def friction(case: Case, protocol: Protocol) -> Effect:
         raise NotTestableError("needs an axial test")
     glued = case.specimen.grips == "glued"
 
-    def act(share: float, rows: Declared) -> Acting:
+    def act(share: float, rows: Baseline) -> Action:
         axial = rows.protocol.mask([k for k, test in enumerate(rows.protocol.tests) if test.mode == "axial"])
         part = float(np.clip(share, 0.0, 1.0))
         sticks = 1.0 - part if glued else part
         whole = rows.glued if glued else np.ones(len(rows.protocol))
-        return Acting(factor=np.where(axial, (1.0 + sticks * (rows.sticking() - 1.0)) / whole, 1.0))
+        return Action(factor=np.where(axial, (1.0 + sticks * (rows.sticking() - 1.0)) / whole, 1.0))
 
-    way = Way.of_one(act, belief("specimen.largest_slip"), True)
+    variant = Variant.of_one(act, belief("specimen.largest_slip"), True)
     sentence = "The ends of the specimen slip." if glued else "The ends of the specimen stick to the platens."
-    return Effect(FRICTION, Kind.NOT_PHYSICS, sentence, ("share",), ("",), (way,))
+    return Effect(FRICTION, Kind.NOT_PHYSICS, sentence, ("share",), ("",), (variant,))
 
 
 def drift(case: Case, protocol: Protocol) -> Effect:
@@ -44,12 +42,14 @@ def drift(case: Case, protocol: Protocol) -> Effect:
         for shape in (("constant",) if chain.time is None else ("constant", "line", "parabola"))
     ]
 
-    def act(c: Floats, rows: Declared) -> Acting:
-        return Acting(added=_drifts(rows.protocol) @ c)
+    def act(c: Floats, rows: Baseline) -> Action:
+        return Action(added=_drifts(rows.protocol) @ c)
 
-    way = Way.of_columns(act, belief("specimen.largest_drift"), len(names))
+    variant = Variant.of_columns(act, belief("specimen.largest_drift"), len(names))
     units = ("of the largest stress",) * len(names)
-    return Effect(DRIFT, Kind.NOT_PHYSICS, "The zero of the force drifts, or is wrong.", tuple(names), units, (way,))
+    return Effect(
+        DRIFT, Kind.NOT_PHYSICS, "The zero of the force drifts, or is wrong.", tuple(names), units, (variant,)
+    )
 
 
 def _drifts(protocol: Protocol) -> Floats:
@@ -70,13 +70,13 @@ def unlike(case: Case, protocol: Protocol) -> Effect:
     if len(protocol.specimens) < 2:
         raise NotTestableError("needs tests of several specimens ([[recording]] specimen)")
 
-    def act(c: Floats, rows: Declared) -> Acting:
-        return Acting(factor=np.exp(specimen_rows(rows.protocol) @ c))
+    def act(c: Floats, rows: Baseline) -> Action:
+        return Action(factor=np.exp(specimen_rows(rows.protocol) @ c))
 
     count = len(protocol.specimens)
-    way = Way.of_columns(act, belief("specimen.largest_unlike"), count)
+    variant = Variant.of_columns(act, belief("specimen.largest_unlike"), count)
     names = tuple(f"ln stiffness of {name or 'the unnamed'}" for name in protocol.specimens)
-    return Effect(UNLIKE, Kind.NOT_PHYSICS, "The specimens are not of one stiffness.", names, ("",) * count, (way,))
+    return Effect(UNLIKE, Kind.NOT_PHYSICS, "The specimens are not of one stiffness.", names, ("",) * count, (variant,))
 
 
 def specimen_rows(protocol: Protocol) -> Floats:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.causes import Kind
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.simulation.history import corners_of
-from warpbrain.worlds.specimen.acting import Acting, Effect, Way
+from warpbrain.worlds.specimen.actions import Action, Effect, Variant
 from warpbrain.worlds.specimen.material import can_act
 from warpbrain.worlds.specimen.protocol import Protocol, Test
-
-Floats = NDArray[np.float64]
 
 #: Rates that differ less than this are one rate, relative; a share of the duration at rest that counts as a hold.
 _RATES, _HOLD = 1.5, 0.1
@@ -55,7 +53,7 @@ def tells_time(protocol: Protocol) -> bool:
             continue
         if _turns(test):
             return True
-        rates.setdefault(test.mode, []).append(float(test.gone[-1] * test.reach / max(np.ptp(test.time), 1e-12)))
+        rates.setdefault(test.mode, []).append(float(test.strain_path[-1] * test.reach / max(np.ptp(test.time), 1e-12)))
     return any(max(of_mode) > _RATES * min(of_mode) for of_mode in rates.values())
 
 
@@ -90,12 +88,12 @@ def _effect(kind: type[Mechanism], proposals: object) -> Effect:
         sentence=kind.sentence,
         names=tuple(varying),
         units=tuple(says[name].unit for name in varying),
-        ways=tuple(_way(proposal, varying) for proposal in proposals),
+        variants=tuple(_variant(proposal, varying) for proposal in proposals),
         runs=True,
     )
 
 
-def _way(proposal: Proposal, names: list[str]) -> Way:
+def _variant(proposal: Proposal, names: list[str]) -> Variant:
     """A proposal; it is tried where its first coefficient, its size, is one standard deviation away."""
     nothing = proposal.without
     move = np.zeros(len(proposal))
@@ -104,8 +102,8 @@ def _way(proposal: Proposal, names: list[str]) -> Way:
     both = proposal.make(nothing - move), proposal.make(nothing)
     one_sign = _same(*both)
     signs = (1.0,) if one_sign else (1.0, -1.0)
-    return Way(
-        act=lambda c, rows: Acting(mechanisms=(proposal.make(c),)),
+    return Variant(
+        act=lambda c, rows: Action(mechanisms=(proposal.make(c),)),
         mean=proposal.mean,
         sd=proposal.sd,
         nothing=nothing,

@@ -10,18 +10,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.causes import Kind
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.worlds.specimen.protocol import Protocol
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
-class Declared:
-    """Rows of tests, and what the case as declared says of them.
+class Baseline:
+    """What the case as declared, without any cause, says of the rows of tests.
 
     Attributes
     ----------
@@ -44,7 +42,7 @@ class Declared:
 
 
 @dataclass(frozen=True, eq=False)
-class Acting:
+class Action:
     """What a cause does: mechanisms of the registry, a factor (n,) on the stress, stress (n,) that is added [Pa].
 
     `scaled` is added before the stress is scaled by the modulus, `added` after that.
@@ -57,8 +55,8 @@ class Acting:
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """One way in which a cause may act, with k coefficients.
+class Variant:
+    """One of the ways in which a cause may act, with k coefficients.
 
     Attributes
     ----------
@@ -78,7 +76,7 @@ class Way:
         In which way it acts, in words.
     """
 
-    act: Callable[[Floats, Declared], Acting]
+    act: Callable[[Floats, Baseline], Action]
     mean: Floats
     sd: Floats
     nothing: Floats
@@ -88,8 +86,8 @@ class Way:
     region: str = ""
 
     @classmethod
-    def of_one(cls, act: Callable[[float, Declared], Acting], sd: float, one_sign: bool, region: str = "") -> Way:
-        """A way with one coefficient that does nothing at 0 and is its own value."""
+    def of_one(cls, act: Callable[[float, Baseline], Action], sd: float, one_sign: bool, region: str = "") -> Variant:
+        """A variant with one coefficient that does nothing at 0 and is its own value."""
         return cls(
             lambda c, rows: act(float(c[0]), rows), np.zeros(1), np.array([sd]), np.zeros(1),
             tuple(np.array([[sign * sd]]) for sign in ((1.0,) if one_sign else (1.0, -1.0))),
@@ -97,8 +95,8 @@ class Way:
         )  # fmt: skip
 
     @classmethod
-    def of_columns(cls, act: Callable[[Floats, Declared], Acting], sd: float, count: int) -> Way:
-        """A way with coefficients that act side by side, each of one size."""
+    def of_columns(cls, act: Callable[[Floats, Baseline], Action], sd: float, count: int) -> Variant:
+        """A variant with coefficients that act side by side, each of one size."""
         zero = np.zeros(count)
         values = lambda c: tuple(float(x) for x in c)  # noqa: E731
         return cls(act, zero, np.full(count, sd), zero, (sd * np.eye(count),), values)
@@ -106,7 +104,7 @@ class Way:
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """A cause with all its ways.
+    """A cause with all its variants.
 
     Attributes
     ----------
@@ -114,8 +112,8 @@ class Effect:
     kind : Kind
     sentence : str
     names, units : tuple of str
-        Of what `Way.values` says.
-    ways : tuple of Way
+        Of what `Variant.values` says.
+    variants : tuple of Variant
     runs : bool
         Whether `warpbrain run` can simulate it.
     """
@@ -125,10 +123,10 @@ class Effect:
     sentence: str
     names: tuple[str, ...]
     units: tuple[str, ...]
-    ways: tuple[Way, ...]
+    variants: tuple[Variant, ...]
     runs: bool = False
 
     @property
-    def places(self) -> tuple[tuple[Way, Floats], ...]:
-        """Every way with each of its trials, in the order of the places of the cause."""
-        return tuple((way, trial) for way in self.ways for trial in way.trials)
+    def places(self) -> tuple[tuple[Variant, Floats], ...]:
+        """Every variant with each of its trials, in the order of the places of the cause."""
+        return tuple((variant, trial) for variant in self.variants for trial in variant.trials)
