@@ -264,7 +264,7 @@ class _LinearModel:
         self.noise = noise_of(sensors, self.residual, self.nuisances.columns, smooth)
         self.noise_factor = noise_factor(sensors.positions, sensors.directions, sensors.times, self.noise)
         self.typical_noise = float(np.median(self.noise[rows] if rows.any() else self.noise))
-        self.points = tuple(rows for alike in rows_of_points(sensors) for rows in alike)
+        self.points = tuple(rows for group in rows_of_points(sensors) for rows in group)
 
     def _residual_at_mean(self, state: SolvedState) -> Floats:
         """Residual of the linear model about a state with its tissue, field and motion at their prior mean."""

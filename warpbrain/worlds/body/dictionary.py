@@ -146,7 +146,6 @@ class Candidates:
 
     Attributes
     ----------
-    kinds : tuple of str
     effects : tuple of Effect
     of_kind : dict of str to int array
         Numbers of the effects of each kind.
@@ -157,17 +156,11 @@ class Candidates:
         Which made them at a state; None if they were given.
     """
 
-    kinds: tuple[str, ...]
     effects: tuple[Effect, ...]
     of_kind: dict[str, NDArray[np.int64]]
     alternatives: frozenset[str]
     rejected: dict[str, str]
     source: Effects | None = None
-
-    def changes_in_time(self, kind: str) -> bool:
-        """Whether the effect of a kind changes under constant loads."""
-        proposal = self.effects[self.of_kind[kind][0]].proposal
-        return proposal is not None and proposal.changes_in_time
 
 
 def candidates_at(
@@ -205,7 +198,7 @@ def candidates_at(
     for name, effect in alternatives.items():
         of_kind[name] = np.array([len(all_effects)])
         all_effects.append(effect)
-    return Candidates(tuple(of_kind), tuple(all_effects), of_kind, frozenset(alternatives), rejected, effects)
+    return Candidates(tuple(all_effects), of_kind, frozenset(alternatives), rejected, effects)
 
 
 def _switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | InputError | SolveError]:
@@ -260,7 +253,7 @@ def candidates_about_fit(
             of_this_kind[k] = effect
         of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
         all_effects.extend(of_this_kind)
-    return replace(candidates, kinds=tuple(of_kind), effects=tuple(all_effects), of_kind=of_kind, source=effects)
+    return replace(candidates, effects=tuple(all_effects), of_kind=of_kind, source=effects)
 
 
 def _is_smooth(effect: Effect) -> bool:

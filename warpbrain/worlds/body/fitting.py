@@ -1,10 +1,4 @@
-"""A set of causes fitted without linearising: tissue, stiffness field and mechanisms together, then its evidence.
-
-Gauss-Newton's method on standard normal coordinates: those of tissue, field and mechanisms act through an equilibrium,
-those of other nuisances linearly. Columns are made anew where the coordinates have moved away from. The evidence is
-Laplace's: that of the linear model about the best point, summed over the scale of the noise and over gross errors as in
-screening.
-"""
+"""Fits of sets of causes of one case without linearising: their starts, their noise, and the error of the mesh."""
 
 from __future__ import annotations
 
@@ -14,37 +8,24 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.discretisation import Difference
-from warpbrain.inference.beliefs import belief
-from warpbrain.inference.marginal import Marginal, marginal
-from warpbrain.simulation.extrapolated import extrapolated
+from warpbrain.errors import SolveError
+from warpbrain.inference.marginal import Marginal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect
-from warpbrain.worlds.body.fit_columns import Layout, columns_about
-from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
-from warpbrain.worlds.body.mesh_share import MeshShare, excess_error, mesh_share_of
-from warpbrain.worlds.body.nuisances import registration_sd
+from warpbrain.worlds.body.fit_search import FitSearch
+from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors
+from warpbrain.worlds.body.mesh_share import excess_error
 from warpbrain.worlds.body.refit import Refit
-from warpbrain.worlds.body.states import Hypothesis, SolvedState
+from warpbrain.worlds.body.states import SolvedState
 
 Floats = NDArray[np.float64]
 
-_ITERATIONS, _HALVINGS = 20, 6
 #: How often at most a fit is repeated with the gross errors and the noise of its result.
 _ROUNDS = 3
 #: Change of the log evidence below which the fit is not repeated again.
 _SAME = 0.1
-#: How far [standard deviations] coordinates go until columns are made anew.
-_RELINEARISE = 0.3
 #: Change of the mesh's error [standard deviations of the noise, all sensors together] with which a fit is repeated.
 _MATTERS = 0.3
-#: Step [standard deviations] of a difference between states.
-_DIFFERENCE = 0.05
-#: Earlier states from which the next one is extrapolated at most.
-_KEPT = 9
-#: Steps shorter than this in standard deviations of the prior end the search.
-_SHORT = 0.03
 
 
 class Fitter:
@@ -95,7 +76,7 @@ class Fitter:
         SolveError
             If there is no equilibrium near the start.
         """
-        search = _Search(self, effects, linear_columns, screened)
+        search = FitSearch(self.base, self.mesh_errors, effects, linear_columns, screened)
         if subset is not None:
             nearby = subset[0].state
             starts = [*starts, search.linearise_about(*subset)]
@@ -116,11 +97,13 @@ class Fitter:
                 break
         return fit
 
-    def _mesh_error_changed(self, search: _Search, screened: Marginal, known: MeshErrors) -> bool:
+    def _mesh_error_changed(self, search: FitSearch, screened: Marginal, known: MeshErrors) -> bool:
         """Compute the error of the mesh at the best point; whether the search has to go on with it."""
         if search.effects:
-            return search.update_mesh_share(known) or not search.converged
-        return self._update_mesh_errors(search.state, known, screened)
+            return search.update_mesh_share(known, self.finer) or not search.converged
+        matters = self._update_mesh_errors(search.state, known, screened)
+        search.mesh_errors = self.mesh_errors
+        return matters
 
     def _update_mesh_errors(self, state: SolvedState, known: MeshErrors, screened: Marginal) -> bool:
         """Take the error of the mesh from a fit without any cause, for all fits to come; whether it matters.
@@ -134,249 +117,3 @@ class Fitter:
         change = excess_error(known, error, state, self.base.prior)
         self.mesh_errors = replace(known, error=error)
         return float(np.linalg.norm(screened.noise.whitened(change))) > _MATTERS
-
-
-class _Search:
-    """One fit on its way: the best point so far, and the columns of the linear model about it."""
-
-    def __init__(self, fitter: Fitter, effects: tuple[Effect, ...], linear_columns: Floats, screened: Marginal) -> None:
-        self._fitter, self._base, self.effects = fitter, fitter.base, effects
-        self._marginal, self._noise = screened, screened.noise
-        nuisances = fitter.base.nuisances
-        self._U = np.column_stack([nuisances.columns, linear_columns])
-        self._layout = Layout.of(nuisances, self._U.shape[1], effects)
-        # recordings were realigned by a rigid motion already, which keeps its prior cost as coordinates
-        self._realigned = np.zeros(self._U.shape[1])
-        self._realigned[nuisances.part("registration")] = fitter.base.states.motion / registration_sd()
-        # nonlinear coordinates and displacements of states of this fit
-        self._solved: list[tuple[Floats, Floats]] = []
-        self._mesh_share: MeshShare | None = None
-        # the state that was linearised last, and the coordinates of that of the columns
-        self._nearby = fitter.base.at
-        self._linearised_at = np.full(len(self._layout.nonlinear), np.inf)
-        # of the last state of this fit that was followed over time
-        self._course: tuple[Floats, ...] = ()
-        self.columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
-        self.state, self.converged = fitter.base.state, False
-        self.z, self.residual, self._best = np.zeros(self.columns.shape[1]), np.zeros(len(self._U)), np.inf
-
-    def start(self, starts: Sequence[Floats], nearby: SolvedState) -> None:
-        """Take the best of some coordinates, within limits."""
-        self._best = np.inf
-        for number, start in enumerate(starts, 1):
-            z = self._clipped(start)
-            try:
-                self._accept_if_better(z, *self._evaluate(z, nearby))
-            except (SolveError, InputError):
-                if number == len(starts) and not np.isfinite(self._best):
-                    raise
-
-    def linearise_about(self, subset: Refit, columns: Floats) -> Floats:
-        """Take columns about a fit with the first of the effects, and its share of the mesh's error.
-
-        Returns
-        -------
-        (q + e + k,) array
-            Coordinates of that fit.
-        """
-        first, coefficients = self._U.shape[1], np.concatenate(subset.coefficients)
-        z = np.zeros(len(self.z))
-        z[: len(subset.nuisances)] = subset.nuisances
-        z[first : first + len(coefficients)] = coefficients
-        self.columns, self._linearised_at = columns, z
-        if subset.mesh_share is not None:
-            self._mesh_share = subset.mesh_share.extended(len(self.z) - first)
-        return z
-
-    def backtrack_to_base(self) -> None:
-        """Move tissue and field toward the base while that is better: far from it the linear model may fail."""
-        base = self.z.copy()
-        coordinates = self._base.nuisances.coordinates(self._base.prior, self._base.state.hypothesis)
-        for part in (self._layout.tissue, self._layout.field):
-            base[part] = coordinates[part]
-        far = self.z
-        for share in (0.5, 0.0):
-            between = base + share * (far - base)
-            if not self._accept_if_better(between, *self._evaluate(between, self.state)):
-                return
-
-    def minimise(self, relinearise: bool) -> None:
-        """Go to the best point nearby by Gauss-Newton's method; `relinearise`: with columns made anew on the way.
-
-        Where something relaxes, columns of a state that does not help are replaced by differences of states: tissue
-        that is several times as stiff at first is no small change of what it is in the end.
-        """
-        self.converged, by_differences = False, False
-        for iteration in range(_ITERATIONS):
-            moved = np.abs(self.z - self._linearised_at)[self._layout.nonlinear].max(initial=0.0)
-            if relinearise and iteration > 0 and moved > _RELINEARISE:
-                self._relinearise()
-                if by_differences:
-                    self.columns = self._difference_columns()
-            step, current = self._gauss_newton_step(), np.array_equal(self._linearised_at, self.z)
-            if not self._line_search(step):
-                if relinearise and not current and np.abs(step).max() >= 2.0 * _SHORT:
-                    # columns that were made elsewhere may point uphill
-                    self._linearised_at = np.full(len(self.z), np.inf)
-                    continue
-                # what is left is rounding, or no better point lies this way: the last good one stands
-                self.converged = bool(np.abs(step).max() < 2.0 * _SHORT)
-                relaxing = any(effect.proposed.history for effect in self.effects)
-                if self.converged or by_differences or not relinearise or not relaxing:
-                    return
-                by_differences, self._linearised_at = True, np.full(len(self.z), np.inf)
-            if self.converged:
-                return
-
-    def update_noise(self, marginal: Marginal) -> bool:
-        """Take the noise and the gross errors of a result; whether they are others than it was fitted with."""
-        same = marginal.scale == self._marginal.scale and np.array_equal(marginal.gross, self._marginal.gross)
-        self._marginal, self._noise = marginal, marginal.noise
-        if not same:
-            self._best = np.inf
-            self._accept_if_better(self.z, self.state, self.residual)
-        return not same
-
-    def update_mesh_share(self, known: MeshErrors) -> bool:
-        """Compute the mechanisms' share of the mesh's error at the best point; whether a finer mesh tells it."""
-        coefficients, prior = [self.z[part] for part in self._layout.effects], self._base.prior
-        share = mesh_share_of(self.effects, coefficients, self.state, known, self._fitter.finer, prior)
-        if share is None:
-            return False
-        self.columns, part = self.columns.copy(), self._layout.coefficients
-        if self._mesh_share is not None:
-            self.columns[:, part] -= self._mesh_share.columns()
-        self.columns[:, part] += share.columns()
-        self._mesh_share = share
-        return True
-
-    def result(self) -> Refit:
-        """The fit at its best point."""
-        base, z = self._base, self.z
-        q = self._U.shape[1]
-        linear = self.residual + self.columns @ z
-        evidence = marginal(base.model.of_noise(self.columns), linear, base.points, self._marginal.scale)
-        # what is not known of the mesh's share widens the sizes of mechanisms, not their evidence
-        columns = np.column_stack([self.columns, *self._mesh_share_deviation(z[q:])])
-        W = self._noise.whitened(columns)
-        covariance = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
-        # how far the best point would move with it, or if the search had gone on, is uncertainty, too
-        shift = (covariance @ (W.T @ self._noise.whitened(linear)))[: len(z)] - z
-        parts = self._layout.effects
-        return Refit(
-            self.effects,
-            self.state,
-            z[:q],
-            tuple(z[part] for part in parts),
-            tuple(covariance[part, part] + np.outer(shift[part], shift[part]) for part in parts),
-            self.residual,
-            linear,
-            self.columns,
-            evidence,
-            self.converged,
-            self._mesh_share,
-        )
-
-    def _mesh_share_deviation(self, z: Floats) -> list[Floats]:
-        """Columns (n, 1) of what is not known of the mechanisms' share of the mesh's error.
-
-        On meshes that lock it is as large as the effect itself: there the error does not yet fall with the power of the
-        element size that is assumed.
-        """
-        return [] if self._mesh_share is None else [belief("mesh.share") * self._mesh_share.at(z)[:, None]]
-
-    def _gauss_newton_step(self) -> Floats:
-        white = self._noise.whitened(np.column_stack([self.residual, self.columns]))
-        gradient = white[:, 1:].T @ white[:, 0] - self.z
-        return np.asarray(np.linalg.solve(np.eye(len(self.z)) + white[:, 1:].T @ white[:, 1:], gradient))
-
-    def _line_search(self, step: Floats) -> bool:
-        """Go along a step, halved until it is downhill; whether any of it was."""
-        for _ in range(_HALVINGS):
-            before, trial = self.z, self._clipped(self.z + step)
-            try:
-                better = self._accept_if_better(trial, *self._evaluate(trial, self.state))
-            except (SolveError, InputError):
-                better = False
-            if better:
-                self.converged = bool(np.abs(trial - before).max() < _SHORT)
-                return True
-            step = 0.5 * step
-        return False
-
-    def _accept_if_better(self, z: Floats, state: SolvedState, residual: Floats) -> bool:
-        white = self._noise.whitened(residual)
-        objective = 0.5 * float(white @ white + z @ z)
-        if not objective <= self._best + 1e-9:
-            return False
-        self.z, self.state, self.residual, self._best = z, state, residual, objective
-        return True
-
-    def _clipped(self, z: Floats) -> Floats:
-        clipped, farthest = z.copy(), belief("tissue.farthest")
-        for part in (self._layout.tissue, self._layout.field):
-            clipped[part] = np.clip(clipped[part], -farthest, farthest)
-        return clipped
-
-    def _evaluate(self, z: Floats, nearby: SolvedState) -> tuple[SolvedState, Floats]:
-        """State and residual at coordinates."""
-        base, layout, mesh = self._base, self._layout, self._fitter.mesh_errors
-        mechanisms, patches = [], []
-        for effect, part in zip(self.effects, layout.effects, strict=True):
-            mechanisms.append(effect.proposed.make(effect.coefficients(z[part])))
-            if effect.proposed.patch is not None:
-                patches.append(effect.proposed.patch)
-        theta = base.prior.mean + base.prior.factor @ z[layout.tissue]
-        hypothesis = Hypothesis(theta, z[layout.field], tuple(mechanisms), tuple(patches))
-        error = None if mesh is None else expected(mesh.of(hypothesis, base.prior))
-        state = self._solve(hypothesis, z[layout.nonlinear], nearby, error)
-        self._course = state.course or self._course
-        q = self._U.shape[1]
-        residual = state.sensors.residual - self._U[:, layout.linear] @ (z[:q] - self._realigned)[layout.linear]
-        if self._mesh_share is not None:
-            residual = residual - self._mesh_share.at(z[q:])
-        for effect, part in zip(self.effects, layout.effects, strict=True):
-            if effect.proposed.is_there_or_not:
-                # the state has a switch as a whole: its coefficient is how exactly it is simulated
-                residual = residual - effect.columns @ z[part]
-        return state, residual
-
-    def _solve(
-        self, hypothesis: Hypothesis, nonlinear: Floats, nearby: SolvedState, error: Difference | None
-    ) -> SolvedState:
-        """The state at nonlinear coordinates, begun at an extrapolation of those of this fit."""
-        states = self._base.states
-        start = extrapolated(self._solved, nonlinear) if self._solved else nearby.u
-        try:
-            state = states.solve(hypothesis, start, error, nearby.course or self._course, nearby=self._nearby)
-        except SolveError:
-            state = states.solve(hypothesis, None, error)
-        self._solved = [*self._solved[-_KEPT:], (nonlinear, state.u)]
-        return state
-
-    def _relinearise(self) -> None:
-        """Make the columns of tissue, field and mechanisms anew at the best point."""
-        self.columns, at = columns_about(
-            self.state,
-            self.z,
-            self.columns,
-            self._layout,
-            self.effects,
-            self._base,
-            self._fitter.mesh_errors,
-            self._mesh_share,
-        )
-        self._nearby = self._nearby if at is None else at
-        self._linearised_at = self.z
-
-    def _difference_columns(self) -> Floats:
-        """Columns with those of tissue and mechanisms as differences between states."""
-        columns = self.columns.copy()
-        numbers = np.arange(len(self.z))
-        for k in (*numbers[self._layout.tissue].tolist(), *numbers[self._layout.coefficients].tolist()):
-            shifted = self.z + _DIFFERENCE * np.eye(1, len(self.z), k)[0]
-            try:
-                columns[:, k] = (self.residual - self._evaluate(shifted, self.state)[1]) / _DIFFERENCE
-            except (SolveError, InputError):
-                continue
-        return columns
