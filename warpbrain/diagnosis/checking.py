@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.held_out import distance
 from warpbrain.errors import SolveError
@@ -19,8 +16,6 @@ from warpbrain.worlds.body.mesh_error import MeshErrors, expected
 from warpbrain.worlds.body.nuisances import registration_sd
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.sensors import sensors_at
-
-Floats = NDArray[np.float64]
 
 
 def check_errors(case: Case, base: Base, fits: Sequence[Refit]) -> tuple[float, ...] | None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.diagnosis.held_out import HeldOut, share_of_patterns, tries_of
 from warpbrain.inference import GaussianModel, Kind
 from warpbrain.inference.beliefs import beliefs
@@ -16,8 +16,6 @@ from warpbrain.inference.predict import Prediction, predictive_p
 from warpbrain.worlds.body.effects import width_of
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.weighted_set import WeightedSet
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

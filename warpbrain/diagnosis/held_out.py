@@ -9,17 +9,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.inference import Cause, GaussianModel, Place
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.predict import Prediction, predict, predict_with
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.body.sensors import Sensors, spread_points
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Blocks, and random patterns.
 _BLOCKS, _PATTERNS = 24, 100

@@ -12,14 +12,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.unknown import force_patches
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +48,7 @@ class ScoreMap:
     global_p: float
     local_p: float
     detectable: Floats
-    region: NDArray[np.bool_]
+    region: Bools
 
     @property
     def best(self) -> int:

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.values import Measurement
@@ -20,8 +20,6 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.weighted_set import WeightedSet
-
-Floats = NDArray[np.float64]
 
 #: Points of a further recording.
 _POINTS = 25

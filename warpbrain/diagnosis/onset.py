@@ -12,16 +12,14 @@ import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference import Cause, GaussianModel, Place
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.blocks import Blocks
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import unknown_cause
 from warpbrain.worlds.body.time_courses import TimeCourse, time_courses
-
-Floats = NDArray[np.float64]
 
 #: Course of a mechanism that changes in time by itself.
 OF_ITS_OWN = "as its own law says, since the load came"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.diagnosis.confirming import Confirming
 from warpbrain.diagnosis.locating import ball_of
 from warpbrain.diagnosis.result import Ranked
@@ -14,8 +14,6 @@ from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.parameters import scanned_values, values_of
 from warpbrain.worlds.body.weighted_set import WeightedSet
-
-Floats = NDArray[np.float64]
 
 
 class Ranking:

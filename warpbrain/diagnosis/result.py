@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.onset import Onset
@@ -21,8 +21,6 @@ from warpbrain.physics.values import Measurement, Smallest, Value
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.weighted_set import WeightedSet
-
-Floats = NDArray[np.float64]
 
 #: Sets of causes: without any, and with all that is named.
 REFITTED, EXPLAINED = "refitted", "explained"
@@ -227,7 +225,7 @@ class Diagnosis:
         return self.weighted_sets.get(EXPLAINED, self.weighted_sets[REFITTED])
 
     @property
-    def gross(self) -> NDArray[np.bool_]:
+    def gross(self) -> Bools:
         """Rows (n,) of points that are gross errors under that set."""
         rows = np.zeros(len(self.base.residual), dtype=bool)
         for number in np.flatnonzero(self.best.marginal.gross).tolist():

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.diagnosis.result import Confusion
 from warpbrain.inference import Cause, GaussianModel, Kind
 from warpbrain.inference.beliefs import belief
@@ -19,8 +19,6 @@ from warpbrain.inference.calibration import Calibration, calibration
 from warpbrain.physics.values import Smallest
 from warpbrain.worlds.body.causes import BodyCauses
 from warpbrain.worlds.body.parameters import smallest_of
-
-Floats = NDArray[np.float64]
 
 
 def imitations(causes: BodyCauses, model: GaussianModel) -> Confusion:

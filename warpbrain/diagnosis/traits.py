@@ -13,15 +13,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.mesh import nodes_of
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.unknown import force_patches
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,8 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from warpbrain.arrays import Floats
 
 #: Factors to SI of the units that the file uses.
 UNITS = {"1": 1.0, "mm": 1e-3, "deg": math.radians(1.0), "nats": 1.0, "kg/m3": 1.0, "Pa": 1.0, "kPa": 1e3, "s": 1.0}
@@ -40,6 +41,6 @@ def belief(key: str) -> float:
     return value
 
 
-def beliefs(key: str) -> NDArray[np.float64]:
+def beliefs(key: str) -> Floats:
     """Several numbers [SI], (k,), by `table.name`; raises as `belief`."""
     return np.array(_values(key))

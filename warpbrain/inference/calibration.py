@@ -9,8 +9,8 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.hypothesis import Hypothesis
 
@@ -38,7 +38,7 @@ class Calibration:
     losses: Mapping[str, float]
     most_said: float
 
-    def probabilities(self, hypotheses: Sequence[Hypothesis]) -> NDArray[np.float64]:
+    def probabilities(self, hypotheses: Sequence[Hypothesis]) -> Floats:
         """Of each hypothesis, (h,)."""
         from scipy.special import softmax
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from warpbrain.arrays import Floats
 
 
 class Kind(Enum):

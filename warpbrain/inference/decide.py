@@ -10,13 +10,9 @@ import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Floats
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.hypothesis import Hypothesis
-
-Floats = NDArray[np.float64]
 
 #: The seven verdicts.
 NOTHING, NAMED, GROUP, NAMED_AND_REST, UNKNOWN, NOT_PHYSICS, CANNOT_SAY = VERDICTS = (

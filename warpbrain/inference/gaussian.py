@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from warpbrain.arrays import Bools, Floats, Ints
 
 
 class _Noise:
@@ -80,7 +79,7 @@ class GaussianModel:
         other.__dict__["_whitened_columns"] = np.column_stack([self._whitened_columns, self._by_noise(columns)])
         return other
 
-    def rows(self, rows: NDArray[np.bool_]) -> GaussianModel:
+    def rows(self, rows: Bools) -> GaussianModel:
         """The marginal distribution of some rows, (n,) bool."""
         noise = self.noise_factor[rows]
         factor: Floats = np.asarray(np.linalg.cholesky(noise @ noise.T), dtype=np.float64)
@@ -104,16 +103,16 @@ class GaussianModel:
         B = solve_triangular(self.noise_factor, directions, lower=True, trans="T", check_finite=False)
         return np.asarray(B), 1.0 / (self.scale**2 + values)
 
-    def noise_blocks(self, rows: NDArray[np.int64]) -> Floats:
+    def noise_blocks(self, rows: Ints) -> Floats:
         """Covariance (g, d, d) of the noise of points with the rows (g, d)."""
         return np.asarray(self.scale**2 * self._noise.covariance[rows[:, :, None], rows[:, None, :]])
 
-    def precision_columns(self, rows: NDArray[np.int64]) -> Floats:
+    def precision_columns(self, rows: Ints) -> Floats:
         """Columns (n, d) of `S^-1` by their numbers (d,)."""
         B, weights = self._low_rank
         return np.asarray((self._noise.precision[:, rows] - B @ (weights * B[rows]).T) / self.scale**2)
 
-    def precision_blocks(self, rows: NDArray[np.int64]) -> Floats:
+    def precision_blocks(self, rows: Ints) -> Floats:
         """Diagonal blocks (g, d, d) of `S^-1` of points with the rows (g, d)."""
         B, weights = self._low_rank
         of_noise = self._noise.precision[rows[:, :, None], rows[:, None, :]]
@@ -181,7 +180,7 @@ class GaussianModel:
         covariance: Floats = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
         return covariance @ (W.T @ self._by_noise(rows)) / self.scale, covariance
 
-    def conditional(self, rows: Floats, observed: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    def conditional(self, rows: Floats, observed: Bools) -> tuple[Floats, Floats]:
         """Distribution of the rows that were not observed given those that were.
 
         Parameters
@@ -201,7 +200,7 @@ class GaussianModel:
         covariance: Floats = S[np.ix_(hidden, hidden)] - S[np.ix_(hidden, observed)] @ gain
         return gain.T @ rows[observed], covariance
 
-    def log_density_of_hidden(self, rows: Floats, observed: NDArray[np.bool_]) -> float:
+    def log_density_of_hidden(self, rows: Floats, observed: Bools) -> float:
         """`ln p(r_hidden | r_observed)`: the joint log density less that of the observed rows."""
         return float(self.log_density(rows)) - float(self.rows(observed).log_density(rows[observed]))
 

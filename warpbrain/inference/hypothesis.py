@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.causes import Kind
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
 from warpbrain.inference.noise import outliers, scales
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: The sum over scales ends where a term is below this part of the largest.
 _NEGLIGIBLE = 1e-3
@@ -39,7 +36,7 @@ class Marginal:
 
     log_evidence: float
     scale: float
-    gross: NDArray[np.bool_]
+    gross: Bools
     model: GaussianModel
     excess_columns: int
 

@@ -12,12 +12,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.gross_errors import Outliers
-
-Floats = NDArray[np.float64]
 
 
 def noise_covariance(positions: Floats, directions: Floats, times: Floats, sigma: Floats) -> Floats:

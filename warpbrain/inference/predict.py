@@ -10,12 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.gaussian import GaussianModel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +33,7 @@ class Prediction:
     log_densities: Floats
 
     def improvement(
-        self, over: Prediction, rows: NDArray[np.bool_], random: np.random.Generator, draws: int = 2000
+        self, over: Prediction, rows: Bools, random: np.random.Generator, draws: int = 2000
     ) -> tuple[float, float, float]:
         """Part of another's root mean square error that is removed, and its 95 % interval by bootstrap over blocks."""
         names = np.unique(self.blocks[rows])

@@ -10,14 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.causes import Cause
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.hypothesis import Configuration, Hypothesis, Member, Posterior
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,9 +118,7 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
     )
 
 
-def likely_places(
-    model: GaussianModel, residual: Floats, causes: Sequence[Cause], most: int
-) -> dict[str, NDArray[np.int64]]:
+def likely_places(model: GaussianModel, residual: Floats, causes: Sequence[Cause], most: int) -> dict[str, Ints]:
     """Numbers of the most probable places of each cause by its name, if it acts alone, at the scale of a model.
 
     Parameters
@@ -139,7 +135,7 @@ def likely_places(
     return {cause.name: blocks.place[chosen[blocks.cause[chosen] == c]] for c, cause in enumerate(causes)}
 
 
-def _best_places(blocks: Blocks, logs: Floats, most: int) -> NDArray[np.int64]:
+def _best_places(blocks: Blocks, logs: Floats, most: int) -> Ints:
     """Numbers of the best blocks of each cause."""
     of_block = np.logaddexp.reduce(logs, axis=1)
     chosen = []

@@ -10,13 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.inference.causes import Kind
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

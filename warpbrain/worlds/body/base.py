@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.inference import GaussianModel
@@ -33,9 +33,6 @@ from warpbrain.worlds.body.switching import SolvedSwitches
 from warpbrain.worlds.body.tissue_prior import declared, tissue_prior
 from warpbrain.worlds.body.unknown import body_forces, fields
 from warpbrain.worlds.listener import Listener
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Gauss-Newton steps at most; the last one moves tissue and field by less than this [standard deviations].
 _STEPS, _CONVERGED = 3, 0.5

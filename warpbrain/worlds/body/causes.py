@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference import Cause, Kind, Place
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.hypothesis import Member
@@ -16,8 +16,6 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import Candidates
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.time_courses import main_courses
-
-Floats = NDArray[np.float64]
 
 UNKNOWN = "unknown"
 

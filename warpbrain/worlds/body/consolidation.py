@@ -20,14 +20,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.physics.term import Coupling, Term
 from warpbrain.simulation.symmetric_factors import symmetric_factors
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import Sensors
-
-Floats = NDArray[np.float64]
 
 #: Steps of Lanczos' method at most, and the part of the first vector below which there is no further one.
 _STEPS, _LAST = 40, 1e-10

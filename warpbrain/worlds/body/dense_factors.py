@@ -10,11 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.simulation.cupy_on import has_cupy, require_memory
-
-Floats = NDArray[np.float64]
 
 #: Matrices of the size of the dense one for which there has to be memory, and columns that are solved together.
 _MATRICES, _TOGETHER = 3, 2048

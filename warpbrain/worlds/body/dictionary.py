@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
@@ -21,8 +21,6 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.states import SolvedState
 from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, with_free_surfaces
-
-Floats = NDArray[np.float64]
 
 #: About how many sites a scan has in the tissue, and on its surface.
 _VOLUME_SITES, _SURFACE_SITES = 350, 480
@@ -90,7 +88,7 @@ def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
     return [Patch(nodes, nodes, held, held, where.mean(axis=0), size), *(part for part in parts if part is not None)]
 
 
-def patch_of(mesh: TetMesh, nodes: str, held: NDArray[np.bool_], centre: Floats, radius: float) -> Patch | None:
+def patch_of(mesh: TetMesh, nodes: str, held: Bools, centre: Floats, radius: float) -> Patch | None:
     """Nodes of a held set within a radius [m] of a point; None if they have no face."""
     members = held & (np.linalg.norm(mesh.points - centre, axis=1) <= radius)
     if not members[mesh.boundary].all(axis=1).any():
@@ -157,7 +155,7 @@ class Candidates:
     """
 
     effects: tuple[Effect, ...]
-    of_kind: dict[str, NDArray[np.int64]]
+    of_kind: dict[str, Ints]
     alternatives: frozenset[str]
     rejected: dict[str, str]
     source: Effects | None = None
@@ -174,7 +172,7 @@ def candidates_at(
     Kinds that cannot be simulated are rejected with a reason.
     """
     all_effects: list[Effect] = []
-    of_kind: dict[str, NDArray[np.int64]] = {}
+    of_kind: dict[str, Ints] = {}
     rejected = dict(dictionary.rejected)
     for kind, proposals in dictionary.proposals.items():
         if on_kind is not None:
@@ -222,7 +220,7 @@ def candidates_about_fit(
     state: SolvedState,
     acting: Sequence[Effect],
     candidates: Candidates,
-    places: Mapping[str, NDArray[np.int64]],
+    places: Mapping[str, Ints],
 ) -> Candidates:
     """The effects of a dictionary at the state of a fit, in which some mechanisms act.
 
@@ -243,7 +241,7 @@ def candidates_about_fit(
     acting_mechanisms = [effect.proposed.make(effect.proposed.mean) for effect in acting]
     acting_kinds = {mechanism.kind for mechanism in acting_mechanisms if not mechanism.several}
     all_effects: list[Effect] = []
-    of_kind: dict[str, NDArray[np.int64]] = {}
+    of_kind: dict[str, Ints] = {}
     for kind, numbers in candidates.of_kind.items():
         if kind in acting_kinds:
             continue

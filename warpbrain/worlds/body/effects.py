@@ -9,8 +9,8 @@ from functools import cache
 from typing import Any, Protocol, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
@@ -23,8 +23,6 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer, volume_of
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.sparse_columns import SparseColumns
-
-Floats = NDArray[np.float64]
 
 #: Part of a standard deviation by which a smooth or a fading proposal is differentiated.
 _STEP = 1e-3
@@ -302,7 +300,7 @@ def _faces(kind: Hashable) -> frozenset[type]:
     return frozenset(face for face in _ACTING if issubclass(cast(type, kind), face))
 
 
-def faded(parts: Floats, is_displacement: NDArray[np.bool_]) -> Floats:
+def faded(parts: Floats, is_displacement: Bools) -> Floats:
     """Factor on the instantaneous effect of a fading proposal where it is present so many times (n,).
 
     Tissue that is `1 + p` times as stiff has forces larger by `p`, and displacements smaller by `p / (1 + p)`.

@@ -13,14 +13,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
 from warpbrain.simulation.symmetric_factors import symmetric_factors
 from warpbrain.threads import fill_columns
 from warpbrain.worlds.body.dense_factors import dense_factors
-
-Floats = NDArray[np.float64]
 
 #: Columns that are solved together.
 _TOGETHER = 16

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
 from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.base import Base
@@ -18,8 +18,6 @@ from warpbrain.worlds.body.mesh_share import MeshShare
 from warpbrain.worlds.body.nuisances import Nuisances, field_columns, mesh_by_tissue, tissue_columns
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +40,8 @@ class Layout:
     field: slice
     coefficients: slice
     effects: tuple[slice, ...]
-    linear: NDArray[np.bool_]
-    nonlinear: NDArray[np.bool_]
+    linear: Bools
+    nonlinear: Bools
 
     @classmethod
     def of(cls, nuisances: Nuisances, count: int, effects: Sequence[Effect]) -> Layout:

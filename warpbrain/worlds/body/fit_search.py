@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.inference.beliefs import belief
@@ -26,8 +26,6 @@ from warpbrain.worlds.body.mesh_share import MeshShare, mesh_share_of
 from warpbrain.worlds.body.nuisances import registration_sd
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
-
-Floats = NDArray[np.float64]
 
 _ITERATIONS, _HALVINGS = 20, 6
 #: How far [standard deviations] coordinates go until columns are made anew.

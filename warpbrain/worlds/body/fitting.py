@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
 from warpbrain.inference.marginal import Marginal
 from warpbrain.worlds.body.base import Base
@@ -17,8 +17,6 @@ from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors
 from warpbrain.worlds.body.mesh_share import excess_error
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.states import SolvedState
-
-Floats = NDArray[np.float64]
 
 #: How often at most a fit is repeated with the gross errors and the noise of its result.
 _ROUNDS = 3

@@ -12,8 +12,8 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.inference import GaussianModel, Posterior, Search, posterior
 from warpbrain.inference.calibration import calibration
@@ -32,8 +32,6 @@ from warpbrain.worlds.body.stopping import next_to_fit
 from warpbrain.worlds.body.weighing import weigh, with_refined_places
 from warpbrain.worlds.body.weighted_set import WeightedSet
 from warpbrain.worlds.listener import Listener
-
-Floats = NDArray[np.float64]
 
 #: Places of each cause of which pairs are made, and sets that are weighed with gross errors of their own.
 _PLACES, _SETS = 20, 12

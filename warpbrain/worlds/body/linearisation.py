@@ -21,6 +21,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.mesh import TetMesh, vertex_normals
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.chord import toward_equilibrium
@@ -29,8 +30,6 @@ from warpbrain.threads import fill_columns, in_threads
 from warpbrain.worlds.body.factors import Factors
 from warpbrain.worlds.body.releasing import HeldSurface
 from warpbrain.worlds.body.sensors import Sensors
-
-Floats = NDArray[np.float64]
 
 #: Growth by which the derivative of the forces of growing tissue is taken.
 _GROWTH = 1e-4
@@ -122,7 +121,7 @@ class Linearisation:
         A[:, ~free] = held[different]
         return A, which.ravel()
 
-    def released(self, patch: NDArray[np.bool_], held: NDArray[np.bool_], lifts: bool) -> Floats:
+    def released(self, patch: Bools, held: Bools, lifts: bool) -> Floats:
         """Change (n,) of what is recorded if held nodes are released, to first order.
 
         They slide along the surface; where they are under tension they also leave it, if they can.
@@ -146,7 +145,7 @@ class Linearisation:
         loose = np.flatnonzero(moved)
         return np.asarray(self._surface_responses[key][:, loose] @ moved[loose])
 
-    def _surface(self, key: bytes, held: NDArray[np.bool_]) -> HeldSurface:
+    def _surface(self, key: bytes, held: Bools) -> HeldSurface:
         """A held surface with the responses of the sensors to it, made once."""
         if key not in self._surfaces:
             mesh = self.system.model.mesh

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference, Discretisation
 from warpbrain.estimation.gaussian import Gaussian
@@ -31,8 +31,6 @@ from warpbrain.simulation.system import System
 from warpbrain.worlds.body.factors import Factors
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import TOLERANCE, Hypothesis, SolvedState, States
-
-Floats = NDArray[np.float64]
 
 #: Out-of-balance force of the finer state, relative: far below the error that is looked for, and where nothing is
 #: derived from it, still a hundredth of that which the state of the coarser mesh has there.
@@ -113,7 +111,7 @@ class FinerStates:
         # of earlier states: kinds of mechanisms, coarse displacements, flat, and the finer ones less those
         self._earlier: list[tuple[frozenset[str], Floats, Floats]] = []
         self._system: System | None = None
-        self._factors: tuple[Factors, NDArray[np.bool_]] | None = None
+        self._factors: tuple[Factors, Bools] | None = None
         # solver of the system with these factors
         self._linear: TwoLevelGradient | None = None
 

@@ -10,16 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
 from warpbrain.worlds.body.states import SolvedState
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.nuisances import Nuisances
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
 from warpbrain.worlds.body.stiffness_field import stiffness_modes
-
-Floats = NDArray[np.float64]
 
 #: What each means, in a sentence.
 SENTENCES = {

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.inference.beliefs import belief, beliefs
@@ -29,8 +29,6 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
 from warpbrain.worlds.body.states import Hypothesis, States
-
-Floats = NDArray[np.float64]
 
 #: Step of a difference in `theta`.
 _STEP = 1e-3

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.values import Smallest, Value
 from warpbrain.worlds.body.effects import Effect
-
-Floats = NDArray[np.float64]
 
 
 def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, ...]:

@@ -10,8 +10,8 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.gross_errors import with_gross_errors
 from warpbrain.inference.noise import outliers
@@ -20,8 +20,6 @@ from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import scaled
 from warpbrain.worlds.body.effects import Effect, Effects
-
-Floats = NDArray[np.float64]
 
 #: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
 _RADII = (0.8, 1.0, 1.25)

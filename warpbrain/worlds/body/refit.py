@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Floats
 from warpbrain.inference.marginal import Marginal
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.mesh_share import MeshShare
 from warpbrain.worlds.body.states import SolvedState
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

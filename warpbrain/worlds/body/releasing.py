@@ -14,14 +14,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
 from warpbrain.mesh import tangents
 from warpbrain.worlds.body.factors import Factors
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: Changes of the active set at most.
 _CHANGES = 20

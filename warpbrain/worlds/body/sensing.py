@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.worlds.body.sensors import Sensors
-
-Floats = NDArray[np.float64]
 
 #: Residual [robust standard deviations] above which a row does not count for the noise.
 _FAR = 3.0
@@ -45,7 +43,7 @@ def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Float
     return sigma
 
 
-def _inliers(residual: Floats, explained: Floats) -> NDArray[np.bool_]:
+def _inliers(residual: Floats, explained: Floats) -> Bools:
     """Rows without outliers from a smooth fit: a few gross errors must not set the noise of all."""
     scale = max(float(np.median(np.abs(residual))), 1e-12)
     W = explained / scale

@@ -8,15 +8,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.estimation.observations import Observation, Observations, Residuals
 from warpbrain.estimation.registration import rigid_columns
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.location import locate
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,12 +63,12 @@ class Sensors:
         return len(self.residual)
 
     @property
-    def is_displacement(self) -> NDArray[np.bool_]:
+    def is_displacement(self) -> Bools:
         """Which rows are lengths, not forces."""
         return np.asarray(self.directions.any(axis=1))
 
     @property
-    def of_surfaces(self) -> NDArray[np.bool_]:
+    def of_surfaces(self) -> Bools:
         """Which rows are of points of a surface: each of these has one number, along the normal."""
         return np.asarray(self.is_displacement & (np.bincount(self.groups)[self.groups] == 1))
 

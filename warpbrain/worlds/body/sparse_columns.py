@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from warpbrain.arrays import Floats, Ints
 
 
 class SparseColumns:
@@ -27,7 +26,7 @@ class SparseColumns:
     def __init__(self, size: int) -> None:
         self.numbers: list[int] = []
         self._size = size
-        self._rows: list[NDArray[np.int64]] = []
+        self._rows: list[Ints] = []
         self._values: list[Floats] = []
 
     def add(self, number: int, column: Floats) -> None:

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.boundary import Boundary, Fixed
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
@@ -32,8 +32,6 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import Sensors, sensors_at
 from warpbrain.worlds.body.stiffness_field import StiffnessField, stiffness_modes
 from warpbrain.worlds.body.surfaces import with_free_surfaces
-
-Floats = NDArray[np.float64]
 
 #: Out-of-balance force of an equilibrium, relative.
 TOLERANCE = 1e-6

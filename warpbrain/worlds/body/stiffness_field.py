@@ -10,14 +10,12 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.worlds.body.sensors import spread_points
-
-Floats = NDArray[np.float64]
 
 
 def stiffness_modes(mesh: TetMesh, count: int | None = None) -> Floats:

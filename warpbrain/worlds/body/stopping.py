@@ -10,15 +10,13 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import Decision, decide
 from warpbrain.inference.hypothesis import Hypothesis
 from warpbrain.worlds.body.weighted_set import WeightedSet
-
-Floats = NDArray[np.float64]
 
 #: Probability below which a set is not fitted.
 _NEGLIGIBLE = 0.005

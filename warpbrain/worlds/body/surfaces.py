@@ -12,14 +12,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools
 from warpbrain.cases.boundary import Forced, Pressed
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh, nodes_of, split_boundary
 from warpbrain.mesh.free_surfaces import FreePart, FreeSurface, free_faces, free_parts, rim_corners, set_of
 from warpbrain.mesh.surface import in_rows
-
-Bools = NDArray[np.bool_]
 
 #: Names of the wall that a resection leaves, and of the outside.
 WALL, OUTSIDE = "wall of the cavity", "outer surface"

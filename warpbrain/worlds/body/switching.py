@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Floats
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState, States
-
-Floats = NDArray[np.float64]
 
 #: Newton iterations after which a state is taken not to exist: those that exist take 3 to 18.
 _ITERATIONS = 30

@@ -14,9 +14,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from warpbrain.arrays import Floats
 
 AT_ONCE, EVENLY, SLOWER = "all at once", "growing evenly", "growing ever more slowly"
 #: Size over the elapsed part of the time from onset to the last recording.

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.prior_modes import prior_modes, prior_of
+from warpbrain.inference.beliefs import belief
 
-Floats = NDArray[np.float64]
-
-#: Standard deviations where no study is named: of a log modulus, of a share of C2, of an exponent.
-_DEVIATIONS = {"ln(mu0 / Pa)": 0.5, "C2 / (C1 + C2)": 0.2, "alpha": 3.0}
+#: Beliefs of their standard deviations where no study is named, by what a coordinate is of.
+_DEVIATIONS = {
+    "ln(mu0 / Pa)": "tissue.declared_modulus",
+    "C2 / (C1 + C2)": "tissue.declared_share",
+    "alpha": "tissue.declared_exponent",
+}
 
 
 def tissue_prior(case: Case, parameters: Parameters) -> Gaussian:
@@ -27,7 +30,7 @@ def tissue_prior(case: Case, parameters: Parameters) -> Gaussian:
         modes = prior_modes(prior_of(case), parameters)
     except (InputError, SolveError):
         mean = declared(case, parameters)
-        sd = np.array([_DEVIATIONS[parameter.coordinate.name] for parameter in parameters])
+        sd = np.array([belief(_DEVIATIONS[parameter.coordinate.name]) for parameter in parameters])
         return Gaussian(mean, np.diag(sd**2))
     try:
         theta = declared(case, parameters)

@@ -10,15 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import node_areas
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import spread_points
-
-Floats = NDArray[np.float64]
 
 #: Components of a symmetric tensor.
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
@@ -109,7 +107,7 @@ def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Floats]
     return {name: columns for name, columns in columns_by_name.items() if columns.shape[1]}
 
 
-def _visible_modes(columns: Floats, rows: NDArray[np.bool_]) -> Floats:
+def _visible_modes(columns: Floats, rows: Bools) -> Floats:
     """The modes (n, k) of columns that displacements, in some of the rows (n,), see."""
     # modes of displacements alone: recorded forces have another unit, and would dominate
     rows = rows if rows.any() else np.ones(len(rows), dtype=bool)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.hypothesis import Hypothesis
@@ -16,8 +15,6 @@ from warpbrain.worlds.body.causes import BodyCauses
 from warpbrain.worlds.body.effects import Effect, Effects, width_of
 from warpbrain.worlds.body.placing import best_in_cell
 from warpbrain.worlds.body.weighted_set import WeightedSet
-
-Floats = NDArray[np.float64]
 
 
 def weigh(

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.inference import GaussianModel, Kind
 from warpbrain.inference.hypothesis import Hypothesis
 from warpbrain.inference.marginal import Marginal, marginal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
 from warpbrain.worlds.body.refit import Refit
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
