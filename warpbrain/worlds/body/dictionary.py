@@ -240,6 +240,8 @@ def candidates_about_fit(
     effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=mesh_errors)
     acting_mechanisms = [effect.proposed.make(effect.proposed.mean) for effect in acting]
     acting_kinds = {mechanism.kind for mechanism in acting_mechanisms if not mechanism.several}
+    largest = float(np.linalg.norm(np.ptp(state.system.model.mesh.points, axis=0)))
+    rows = state.sensors.is_displacement
     all_effects: list[Effect] = []
     of_kind: dict[str, Ints] = {}
     for kind, numbers in candidates.of_kind.items():
@@ -248,7 +250,9 @@ def candidates_about_fit(
         of_this_kind = [candidates.effects[k] for k in numbers.tolist()]
         smooth = [k for k in places[kind].tolist() if _is_smooth(of_this_kind[k])]
         for k, effect in zip(smooth, effects.of([of_this_kind[k].proposed for k in smooth]), strict=True):
-            of_this_kind[k] = effect
+            # what stiffens exponentially moves a strained body by more than its size, and is not linear about it
+            if np.abs(effect.columns[rows]).max(initial=0.0) < largest:
+                of_this_kind[k] = effect
         of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
         all_effects.extend(of_this_kind)
     return replace(candidates, effects=tuple(all_effects), of_kind=of_kind, source=effects)

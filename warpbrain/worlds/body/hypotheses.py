@@ -39,6 +39,8 @@ _PLACES, _SETS = 20, 12
 _PLACES_ABOUT_FIT = 8
 #: How often at most a set is fitted, or its supersets are weighed.
 _MOST = 10
+#: By how much [nats] another optimum is better that is worth a fit.
+_BETTER = 1.0
 
 
 class HypothesisSearch:
@@ -173,6 +175,50 @@ class HypothesisSearch:
         log_evidence = candidate.hypothesis.log_evidence - (candidate.inherited_gain or 0.0) + gain
         self._sets[names] = fitted.with_evidence(log_evidence)
         self._pass_on(gain, names)
+        self._refit_subsets(names)
+
+    def _refit_subsets(self, names: frozenset[str]) -> None:
+        """Fit subsets again from a fit, where without one of its mechanisms it is a better optimum than theirs.
+
+        Which points are gross errors makes several optima. A set must not be more probable than a subset for no reason
+        but that its fit has found another one: a mechanism that does nothing would be named.
+        """
+        superset = self._sets[names]
+        assert superset.refit is not None
+        for number, mechanism in enumerate(superset.mechanisms):
+            subset = self._sets.get(names - {mechanism})
+            if subset is None or subset.refit is None or not subset.mechanisms:
+                continue
+            reduced = superset.without(mechanism, self.base)
+            if reduced.marginal.log_evidence < subset.marginal.log_evidence + _BETTER:
+                continue
+            begun = superset.refit.without(number), reduced.columns
+            try:
+                refit = self._fitter.fit(
+                    reduced.effects, reduced.linear_columns, [reduced.coordinates], reduced.marginal, subset=begun
+                )
+            except (SolveError, InputError):
+                continue
+            gain = refit.log_evidence - subset.refit.log_evidence
+            if gain > 0.0:
+                log_evidence = subset.hypothesis.log_evidence + gain
+                better = replace(
+                    subset,
+                    effects=reduced.effects,
+                    residual=refit.linear,
+                    columns=refit.columns,
+                    marginal=refit.marginal,
+                    refit=refit,
+                )
+                self._sets[subset.names] = better.with_evidence(log_evidence)
+                self._forget_supersets(subset.names)
+
+    def _forget_supersets(self, names: frozenset[str]) -> None:
+        """Forget sets that are linear about a former fit of a set; they are weighed anew if it is expanded again."""
+        if self._expanded.pop(names, None) is not None:
+            for other in list(self._sets.values()):
+                if names < other.names and other.refit is None and other.inherited_gain is None:
+                    del self._sets[other.names]
 
     def _pass_on(self, gain: float, names: frozenset[str]) -> None:
         """Give the gain of a fit to supersets that are not fitted, in the place of that of a fit of fewer causes."""

@@ -44,6 +44,11 @@ class MeshShare:
         """The same where further mechanisms have coefficients after these, `count` in all."""
         return replace(self, gradient=np.append(self.gradient, np.zeros(count - len(self.gradient))))
 
+    def with_fixed(self, part: slice, z: Floats) -> MeshShare:
+        """The same without some of the coefficients, which stay where they are (j,)."""
+        constant = self.constant + float(self.gradient[part] @ z)
+        return replace(self, gradient=np.delete(self.gradient, part), constant=constant)
+
     def columns(self, part: slice = slice(None)) -> Floats:
         """Derivatives (n, k) by the coefficients, or by some of them."""
         return np.outer(self.answer, self.gradient[part])

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from warpbrain.arrays import Floats
 from warpbrain.inference.marginal import Marginal
-from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.effects import Effect, column_slices
 from warpbrain.worlds.body.mesh_share import MeshShare
 from warpbrain.worlds.body.states import SolvedState
 
@@ -55,3 +56,19 @@ class Refit:
     def log_evidence(self) -> float:
         """Laplace approximation."""
         return self.marginal.log_evidence
+
+    def without(self, number: int) -> Refit:
+        """The same point without one of its effects, from which a set without it is fitted."""
+        part = column_slices(self.effects, 0)[number]
+        share = self.mesh_share
+
+        def others(values: tuple[Any, ...]) -> tuple[Any, ...]:
+            return values[:number] + values[number + 1 :]
+
+        return replace(
+            self,
+            effects=others(self.effects),
+            coefficients=others(self.coefficients),
+            covariances=others(self.covariances),
+            mesh_share=None if share is None else share.with_fixed(part, self.coefficients[number]),
+        )
