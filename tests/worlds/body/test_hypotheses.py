@@ -1,5 +1,7 @@
 """Sets of causes of a block that sinks under a weight of which its case says nothing."""
 
+import copy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,3 +75,24 @@ def test_no_set_that_is_not_fitted_would_change_the_verdict(search):
             ]
             best, losses = decide(others, calibration().probabilities(others), calibration().losses)
             assert losses[verdict] - losses[best] <= belief("fits.regret")
+
+
+def test_a_fit_that_has_missed_its_optimum_is_mended_by_one_with_a_cause_more(search):
+    """As where points are taken for gross errors: another cause, which does nothing, must not get the gain."""
+    mended = copy.copy(search)
+    mended._sets, mended._expanded = dict(search._sets), dict(search._expanded)
+    subset = search.get(("gravity",))
+    if subset.names not in mended._expanded:
+        mended._weigh_supersets(subset, subset.refit)
+    pair = frozenset(("gravity", "swelling"))
+    mended._fit(pair)
+    missed = replace(subset.marginal, log_evidence=subset.marginal.log_evidence - 30.0)
+    worse = replace(subset, marginal=missed, refit=replace(subset.refit, marginal=missed))
+    mended._sets[subset.names] = worse.with_evidence(subset.hypothesis.log_evidence - 30.0)
+    mended._refit_subsets(pair)
+    again = mended.get(("gravity",))
+    np.testing.assert_allclose(again.hypothesis.log_evidence, subset.hypothesis.log_evidence, atol=1.0)
+    # what was weighed about the fit that missed it is forgotten
+    assert subset.names not in mended._expanded
+    left = [one for one in mended.weighted_sets if subset.names < one.names and one.inherited_gain is None]
+    assert all(one.refit is not None for one in left)
