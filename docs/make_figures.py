@@ -22,7 +22,7 @@ RUNS = {"0529.png": ["--case", "0529"]}
 ENSEMBLES = {"0529-spread.png": ["--case", "0529", "--tissue", "single", "--grid"]}
 CASES = {"0529-case.png": ["0529"]}
 #: The diagnosis of which the top of the report is shown.
-DIAGNOSED = ["--case", "0529", "--tissue", "single"]
+DIAGNOSED = ["--case", "0529"]
 #: Colours that are left of a picture of curves, and its width [pixel]: a screen's, and a fraction of the bytes.
 PALETTE, WIDTH = 48, 1280
 #: Figures of an estimate and of a sweep of the same case, by file.

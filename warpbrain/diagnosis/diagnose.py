@@ -198,7 +198,8 @@ class Diagnosing:
         if set(decision.causes) != set(by_posterior.causes):
             best = search.fitted_with(frozenset(decision.causes))
             if best is None:
-                return _not_fitted(search, decision.causes)
+                # what the checks leave is no set that was worth weighing by itself, or has no equilibrium
+                return _Checked(Decision(CANNOT_SAY, by_posterior.causes), doubts, nothing, confirmations, p_left)
             p_left = confirming.p_left(best)
         return _Checked(decision, doubts, best, confirmations, p_left)
 
