@@ -49,7 +49,7 @@ def next_measurements(
         Measurement("the same points with half the noise", discrimination.as_recorded(0.5)),
     ]
     places = _places(base)
-    further = _further(base, effects[0], effects[1], z, np.concatenate(list(places.values())))
+    further = discrimination.rows_at(np.concatenate(list(places.values())))
     at = 0
     for name, points in places.items():
         rows = further[3 * at : 3 * (at + len(points))]
@@ -81,28 +81,35 @@ def _places(base: Base) -> dict[str, Floats]:
 
 
 class _Discrimination:
-    """Expected log Bayes factor of one effect over its best approximation by another."""
+    """Expected log Bayes factor of one effect over its best approximation by another.
+
+    Rows are (n, 1 + k + q): the effect, the k columns of the other, and the q of nuisances.
+    """
 
     def __init__(self, base: Base, first: Effect, second: Effect, z: Floats, scale: float) -> None:
         self._base, self._effects, self._z, self._scale = base, (first, second), z, scale
-        self._rows = np.column_stack([first.mean + first.columns @ z, _columns_of(second), base.nuisances.columns])
-        self._second_width = _columns_of(second).shape[1]
+        self._with_mean = bool(second.mean.any())
+        self._width = second.columns.shape[1] + self._with_mean
+        self._rows = self._rows_of(first, second, base.nuisances.columns)
+
+    def _rows_of(self, first: Effect, second: Effect, nuisances: Floats) -> Floats:
+        mean = [second.mean] if self._with_mean else []
+        return np.column_stack([first.mean + first.columns @ self._z, *mean, second.columns, nuisances])
 
     def as_recorded(self, noise: float = 1.0) -> float:
         """With the recorded rows, their noise so many times as large."""
-        factor = noise * self._base.model.noise_factor
-        return self._expected_nats(
-            GaussianModel(factor, self._rows[:, 1 + self._second_width :], self._scale), self._rows
-        )
+        return self._expected_nats(self._rows, noise * self._base.model.noise_factor)
+
+    def rows_at(self, points: Floats) -> Floats:
+        """Rows of tracked points at other places (m, 3) [m]."""
+        nuisances, effects = self._base.at_points(points)
+        first, second = effects.of([effect.proposed for effect in self._effects])
+        return self._rows_of(first, second, nuisances.columns)
 
     def with_rows(self, further: Floats) -> float:
-        """With further rows (m, 1 + k + q)."""
-        n, m = len(self._rows), len(further)
-        factor = np.zeros((n + m, n + m))
-        factor[:n, :n] = self._base.model.noise_factor
-        factor[n:, n:] = self._base.typical_noise * np.eye(m)
-        whole = np.concatenate([self._rows, further])
-        return self._expected_nats(GaussianModel(factor, whole[:, 1 + self._second_width :], self._scale), whole)
+        """With further rows."""
+        noise = self._base.typical_noise * np.eye(len(further))
+        return self._expected_nats(np.concatenate([self._rows, further]), self._base.model.noise_factor, noise)
 
     def turned(self) -> list[tuple[str, float]]:
         """With the same points again after the best turn of the head; empty if both effects turn with the body.
@@ -111,45 +118,33 @@ class _Discrimination:
         """
         from scipy.spatial.transform import Rotation
 
+        part, columns = self._base.nuisances.part("registration"), self._base.nuisances.columns
+        own, factor = columns[:, part], self._base.model.noise_factor
+        common = columns.copy()
+        common[:, part] = 0.0
         measurements = []
         for axis, words in enumerate(_AXES):
             rotation = Rotation.from_rotvec(np.radians(_TURN) * np.eye(3)[axis]).as_matrix()
             effects = [_turned(self._base, effect, rotation) for effect in self._effects]
-            if all(turned_effect is effect for turned_effect, effect in zip(effects, self._effects, strict=True)):
+            if all(turned is effect for turned, effect in zip(effects, self._effects, strict=True)):
                 return []
-            nuisances = self._base.nuisances
-            second_registration = np.zeros_like(nuisances.columns)
-            registration = nuisances.part("registration")
-            second_registration[:, registration] = nuisances.columns[:, registration]
-            first = np.column_stack([self._rows, np.zeros_like(second_registration)])
-            second = np.column_stack(
-                [
-                    effects[0].mean + effects[0].columns @ self._z,
-                    _columns_of(effects[1]),
-                    nuisances.columns,
-                    second_registration,
-                ]
-            )
-            second[:, 1 + self._second_width :][:, registration] = 0.0
-            rows = np.concatenate([first, second])
-            factor: Floats = np.kron(np.eye(2), self._base.model.noise_factor).astype(np.float64)
-            expected_nats = self._expected_nats(
-                GaussianModel(factor, rows[:, 1 + self._second_width :], self._scale), rows
-            )
+            first = np.column_stack([self._rows, np.zeros_like(own)])
+            second = np.column_stack([self._rows_of(effects[0], effects[1], common), own])
+            expected_nats = self._expected_nats(np.concatenate([first, second]), factor, factor)
             measurements.append((f"by {_TURN:g} degrees about its {words} axis", expected_nats))
         return [max(measurements, key=lambda measurement: measurement[1])]
 
-    def _expected_nats(self, model: GaussianModel, rows: Floats) -> float:
-        white = model.standardised(rows[:, : 1 + self._second_width])
+    def _expected_nats(self, rows: Floats, *noise_factors: Floats) -> float:
+        """Of rows whose parts, one after the other, have independent noise with these factors."""
+        from scipy.linalg import block_diag
+
+        model = GaussianModel(block_diag(*noise_factors), rows[:, 1 + self._width :], self._scale)
+        white = model.standardised(rows[:, : 1 + self._width])
         g, G = white[:, 0], white[:, 1:]
         M = G.T @ G
         M += 1e-10 * max(float(np.trace(M)), 1e-300) * np.eye(len(M))
         b = G.T @ g
         return 0.5 * max(float(g @ g - b @ np.linalg.solve(M, b)), 0.0)
-
-
-def _columns_of(effect: Effect) -> Floats:
-    return np.column_stack([effect.mean, effect.columns]) if effect.mean.any() else effect.columns
 
 
 def _turned(base: Base, effect: Effect, rotation: Floats) -> Effect:
@@ -160,12 +155,3 @@ def _turned(base: Base, effect: Effect, rotation: Floats) -> Effect:
         return effect
     other = replace(proposed, make=lambda c: proposed.make(c).with_body_turned(rotation))
     return base.effects.of([other])[0]
-
-
-def _further(base: Base, first: Effect, second: Effect, z: Floats, points: Floats) -> Floats:
-    """Rows of tracked points at other places (k, 3) [m]: effect of the first, columns of the second, nuisances."""
-    nuisances, effects = base.at_points(points)
-    effect, other = effects.of([first.proposed, second.proposed])
-    # as many columns as at the recorded points
-    columns = np.column_stack([other.mean, other.columns]) if second.mean.any() else other.columns
-    return np.column_stack([effect.mean + effect.columns @ z, columns, nuisances.columns])

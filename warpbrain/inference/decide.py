@@ -132,7 +132,7 @@ def _group(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> flo
     inside = len(truth.mechanisms.intersection(decision.causes)) + (truth.unknown and UNKNOWN in decision.causes)
     if not inside:
         return losses["false group"]
-    # it says that one of its members acts: a second one is left out as much as any other
+    # a group tells that one of its members acts: any further one is left out
     left_out = len(truth.mechanisms.difference(decision.causes)) + inside - 1
     return losses["member of a group"] * len(decision.causes) + losses["name left out"] * left_out
 
@@ -141,7 +141,7 @@ def _named(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> flo
     false = len(set(decision.causes) - truth.mechanisms)
     left_out = len(truth.mechanisms.difference(decision.causes))
     cost = losses["false name"] * false + losses["name left out"] * left_out
-    # a rest that is spoken of stands for what is left out, without its name
+    # "and rest" tells of causes that are left out, without their names
     rest = left_out > 0 or truth.unknown
     if decision.verdict == NAMED_AND_REST:
         return cost + losses["rest where nothing is"] * (not rest)

@@ -1,9 +1,8 @@
 """Toward an equilibrium with the stiffness of a state that is near: the chord method, accelerated.
 
-Newton's method makes and solves a new tangent in each iteration. Where factors of one that is near are known already,
-an iteration with these costs internal forces and one solve, a fifth of that; steps that were taken say what the tangent
-has become since (`warpbrain.simulation.multisecant`). What is reached is only where Newton's method begins: it looks at
-the residual, and goes on if that is not small enough.
+Newton's method assembles and solves with a new tangent stiffness in each iteration. With the factors of one nearby, an
+iteration costs internal forces and one solve, a fifth of that; earlier steps tell by how much the tangent differs
+(`warpbrain.simulation.multisecant`). The result is a start for Newton's method, which checks the residual.
 """
 
 from __future__ import annotations
@@ -12,12 +11,10 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.simulation.multisecant import Multisecant
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: Iterations at most, and what a residual must have fallen to after two of them.
 _MOST, _FALLS = 12, 0.5

@@ -250,7 +250,7 @@ def candidates_about_fit(
         of_this_kind = [candidates.effects[k] for k in numbers.tolist()]
         smooth = [k for k in places[kind].tolist() if _is_smooth(of_this_kind[k])]
         for k, effect in zip(smooth, effects.of([of_this_kind[k].proposed for k in smooth]), strict=True):
-            # what stiffens exponentially moves a strained body by more than its size, and is not linear about it
+            # a response larger than the body is not linear: fibres that stiffen exponentially, in a strained state
             if np.abs(effect.columns[rows]).max(initial=0.0) < largest:
                 of_this_kind[k] = effect
         of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))

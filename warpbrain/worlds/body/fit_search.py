@@ -99,7 +99,7 @@ class FitSearch:
                     raise
 
     def linearise_about(self, subset: Refit, columns: Floats) -> Floats:
-        """Take columns about a fit with the first of the effects, and its share of the mesh's error.
+        """Take columns about a fit with the first of the effects, or all, and its share of the mesh's error.
 
         Returns
         -------

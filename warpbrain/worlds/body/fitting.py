@@ -66,8 +66,8 @@ class Fitter:
         nearby : SolvedState, optional
             Nearer to the start than the base.
         subset : (Refit, (n, q + e + k) array), optional
-            The fit with the first of the effects alone, nearer still, whose share of the mesh's error is kept; and the
-            columns of all about it.
+            A fit with the first of the effects, or with all of them, nearer still, whose share of the mesh's error is
+            kept; and the columns of all about it.
 
         Raises
         ------

@@ -60,8 +60,7 @@ class HypothesisSearch:
         self.causes = causes_of(base, candidates)
         self._fitter = Fitter(base)
         self._sets: dict[frozenset[str], WeightedSet] = {}
-        # fitted sets whose supersets were weighed about their fit
-        # by fitted sets whose supersets were weighed about their fit: what makes columns there
+        # of fitted sets whose supersets were weighed: what makes columns about the fit
         self._expanded: dict[frozenset[str], Effects] = {}
 
     @property
@@ -132,7 +131,7 @@ class HypothesisSearch:
 
     def fitted_with(self, mechanisms: frozenset[str]) -> WeightedSet | None:
         """The most probable fitted set with exactly these mechanisms, fitted if none was; None if none can be."""
-        sets = [candidate for candidate in self.weighted_sets if frozenset(candidate.mechanisms) == mechanisms]
+        sets = self._with_mechanisms(mechanisms)
         fitted = next((candidate for candidate in sets if candidate.refit is not None), None)
         for candidate in sets if fitted is None else []:
             self._fit(candidate.names)
@@ -142,8 +141,11 @@ class HypothesisSearch:
 
     def failure_with(self, mechanisms: frozenset[str]) -> str:
         """Why the most probable set with exactly these mechanisms could not be fitted."""
-        sets = [candidate for candidate in self.weighted_sets if frozenset(candidate.mechanisms) == mechanisms]
-        return next((candidate.failure for candidate in sets if candidate.failure), "")
+        return next((candidate.failure for candidate in self._with_mechanisms(mechanisms) if candidate.failure), "")
+
+    def _with_mechanisms(self, mechanisms: frozenset[str]) -> list[WeightedSet]:
+        """Sets with exactly these mechanisms, the most probable first."""
+        return [candidate for candidate in self.weighted_sets if frozenset(candidate.mechanisms) == mechanisms]
 
     def _fit(self, names: frozenset[str]) -> None:
         """Fit a set; one that cannot be fitted keeps the reason."""
@@ -178,10 +180,10 @@ class HypothesisSearch:
         self._refit_subsets(names)
 
     def _refit_subsets(self, names: frozenset[str]) -> None:
-        """Fit subsets again from a fit, where without one of its mechanisms it is a better optimum than theirs.
+        """Fit subsets with one mechanism less again, from the optimum of a set, if that is better than their own.
 
-        Which points are gross errors makes several optima. A set must not be more probable than a subset for no reason
-        but that its fit has found another one: a mechanism that does nothing would be named.
+        The evidence has several local optima, with other points as gross errors. A mechanism with no effect must not
+        seem probable because the fit with it has reached a better one than the fit without it.
         """
         superset = self._sets[names]
         assert superset.refit is not None
@@ -214,7 +216,7 @@ class HypothesisSearch:
                 self._forget_supersets(subset.names)
 
     def _forget_supersets(self, names: frozenset[str]) -> None:
-        """Forget sets that are linear about a former fit of a set; they are weighed anew if it is expanded again."""
+        """Remove supersets whose linear model is about an earlier fit of a set; expanding it again weighs them anew."""
         if self._expanded.pop(names, None) is not None:
             for other in list(self._sets.values()):
                 if names < other.names and other.refit is None and other.inherited_gain is None:
@@ -254,14 +256,11 @@ class HypothesisSearch:
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in fitted.names))
         unscaled = GaussianModel(noise_factor / fitted.marginal.scale, fitted.columns)
         screened = posterior(unscaled, fitted.residual, causes.causes, _search(most=1))
-        values, log_prior = scales()
-        log_unscaled = unscaled.log_marginal(fitted.residual, values, log_prior)
         hypotheses = [hypothesis for hypothesis in _most_probable(screened, singles=False) if hypothesis.causes]
         work = partial(weigh, self.base, causes=causes, screened=unscaled, about=fitted)
         for hypothesis, candidate in zip(hypotheses, in_threads(work, hypotheses), strict=True):
-            gain = candidate.hypothesis.log_evidence - log_unscaled
-            # the evidence without the cause has gross errors of its own, too
-            gain -= fitted.marginal.log_evidence - log_unscaled
+            # both with gross errors of their own
+            gain = candidate.hypothesis.log_evidence - fitted.marginal.log_evidence
             # causes in the order of their effects
             joint = replace(
                 hypothesis,

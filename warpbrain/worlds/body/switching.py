@@ -6,11 +6,9 @@ from dataclasses import replace
 
 from warpbrain.arrays import Floats
 from warpbrain.physics.mechanism import Mechanism
+from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState, States
-
-#: Newton iterations after which a state is taken not to exist: those that exist take 3 to 18.
-_ITERATIONS = 30
 
 
 class SolvedSwitches:
@@ -38,6 +36,7 @@ class SolvedSwitches:
         key, state = repr(mechanism), self._state
         if key not in self._solved_states:
             hypothesis = replace(state.hypothesis, mechanisms=(mechanism,))
-            self._solved_states[key] = self._states.solve(hypothesis, state.u, iterations=_ITERATIONS)
+            # the loads act already: one load step, or the state is taken not to exist
+            self._solved_states[key] = self._states.solve(hypothesis, state.u, iterations=EquilibriumOptions.max_newton)
         solved = self._solved_states[key]
         return self._sensors.answer(solved.u - state.u, solved.reactions - state.reactions)
