@@ -25,3 +25,8 @@ def test_states_close_together_are_not_stretched_far() -> None:
     """A small difference that points the wrong way by rounding must not be made a hundred times as large."""
     known = [(np.zeros(2), np.zeros(3)), (np.array([1e-3, 0.0]), np.ones(3))]
     assert np.abs(extrapolated(known, np.array([1.0, 0.0]))).max() < 1.2
+
+
+def test_states_many_orders_apart_are_no_singular_system() -> None:
+    known = [(np.zeros(2), np.zeros(3)), *((1e9 * np.array([1.0, k]), np.full(3, float(k))) for k in range(3))]
+    assert np.isfinite(extrapolated(known, np.array([1e-9, 0.0]))).all()

@@ -34,9 +34,11 @@ def extrapolated(known: Sequence[tuple[Floats, Floats]], at: Floats) -> Floats:
     if size == 0.0 or not others:
         return value
     between = np.column_stack([one - nearest for one, _ in others]) / size
-    gram = between.T @ between + _STRETCH * np.eye(len(others))
-    shares = np.linalg.solve(gram, between.T @ (away / size))
-    found = value.copy()
+    # by least squares: normal equations are singular where some states are many times as far away as the nearest one
+    stretch = np.sqrt(_STRETCH) * np.eye(len(others))
+    target = np.append(away / size, np.zeros(len(others)))
+    shares = np.linalg.lstsq(np.vstack([between, stretch]), target)[0]
+    expected = value.copy()
     for share, (_, other) in zip(shares.tolist(), others, strict=True):
-        found += share * (other - value)
-    return found
+        expected += share * (other - value)
+    return expected

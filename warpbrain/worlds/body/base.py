@@ -2,7 +2,7 @@
 
 Nuisances that are fitted as if nothing were missing imitate what is missing; fitted together with an arbitrary smooth
 force they do not. Under a large load one Gauss-Newton step from the declared state is not enough. Further steps keep
-its columns, with the residuals of the state that was reached.
+its columns, with the residuals of the state that was reached, as long as each is much shorter than the one before it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ from warpbrain.worlds.body.unknown import body_forces, fields
 from warpbrain.worlds.listener import Listener
 
 #: Gauss-Newton steps at most; the last one moves tissue and field by less than this [standard deviations].
-_STEPS, _CONVERGED = 3, 0.5
+_STEPS, _CONVERGED = 6, 0.5
+#: Part of the step before at most, for the next one to keep its columns.
+_CONTRACTION = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +157,7 @@ class BaseFinder:
         declared = self.states.solve(self._declared())
         self._listener.stage("tissue beside any smooth force")
         state, linear = declared, _LinearModel(self, declared, None)
+        last = np.inf
         for _ in range(_STEPS):
             hypothesis = self._next_hypothesis(linear)
             before, after = (
@@ -166,9 +169,12 @@ class BaseFinder:
                 # realigned recordings have other residuals
                 state = self.states.solve(state.hypothesis, state.u)
                 break
-            if np.abs(after - before).max() < _CONVERGED:
+            length = float(np.abs(after - before).max())
+            if length < _CONVERGED:
                 break
-            linear = linear.with_residual_of(state)
+            contracts = length <= _CONTRACTION * last
+            linear = linear.with_residual_of(state) if contracts else _LinearModel(self, state, None)
+            last = length
         self._listener.stage("the error of the mesh, and the compliance of the body at the sensors")
         errors = self._errors_of_mesh(state)
         if errors is not None:
