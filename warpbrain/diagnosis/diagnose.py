@@ -19,6 +19,7 @@ from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnos
 from warpbrain.diagnosis.sentences import assumptions_of
 from warpbrain.diagnosis.telling_apart import imitations, smallest
 from warpbrain.diagnosis.traits import Traits, traits_of
+from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import Confirmation, after_checks
 from warpbrain.inference.decide import (
@@ -123,8 +124,11 @@ class Diagnosing:
         with self.seconds.of("significance"):
             p_value = confirming.p_of_nothing(nothing)
         with self.seconds.of("fits"):
-            search.fit(alone=p_value > options.alpha)
+            # gross errors hide in the linear model what a fit at a better place lets through
+            search.fit(alone=p_value > max(options.alpha, belief("fits.significance")))
         nothing = search.nothing
+        with self.seconds.of("significance"):
+            p_value = confirming.p_of_nothing(nothing)
         by_posterior = self._decided(search, p_value)
         self.listener.stage("checks")
         with self.seconds.of("checks"):
