@@ -118,3 +118,16 @@ def test_points_of_three_rows_and_of_one_against_covariances_written_out() -> No
     wider = one.with_columns(columns_of_inflation(one, points, found.inflation))
     prior = np.where(gross, np.log(PRIOR.probability), np.log1p(-PRIOR.probability)).sum()
     assert float(wider.log_density(residual)) + prior == pytest.approx(here, abs=1e-8)
+
+
+@pytest.mark.parametrize("prior", [PRIOR, TWO])
+def test_begun_with_gross_errors_of_a_similar_hypothesis_it_ends_at_the_same(prior: Outliers) -> None:
+    random = np.random.default_rng(11)
+    one = model(random)
+    residual = one.draws(1, random)[:, 0]
+    residual[POINTS[1]] += 40.0 * random.normal(size=3)
+    cold = with_gross_errors(one, residual, POINTS, prior)
+    for sound in (cold.inflation, np.where(np.arange(6) == 3, prior.inflation, 1.0)):
+        warm = with_gross_errors(one, residual, POINTS, prior, start=sound)
+        np.testing.assert_array_equal(warm.inflation, cold.inflation)
+        assert warm.log_density == pytest.approx(cold.log_density, abs=1e-9)

@@ -122,10 +122,10 @@ def _place(effect: Effect, scanned: tuple[Effect, ...], weights: Floats) -> tupl
 def _detectability(nothing: WeightedSet, weighted_set: WeightedSet, number: int) -> float:
     """Of the change by a mechanism, from zero to its best size by the trapezium rule, given all other causes."""
     # nuisances as at the base: at the best point tissue explains how large it is, not whether it is detected
-    count = len(nothing.columns.T) - nothing.linear_columns.shape[1]
+    count = nothing.columns.shape[1]
     part = weighted_set.slices[number]
     others = np.delete(weighted_set.columns, np.r_[part], axis=1)[:, count:]
-    columns = np.column_stack([nothing.columns[:, :count], others])
+    columns = np.column_stack([nothing.columns, others])
     model = GaussianModel(nothing.marginal.model.noise_factor, columns, weighted_set.marginal.scale)
     effect, columns_at_best = weighted_set.effects[number], weighted_set.columns[:, part]
     z = weighted_set.coefficients[number][0]

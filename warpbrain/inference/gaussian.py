@@ -37,6 +37,22 @@ class _Noise:
         return np.asarray(np.tril(lower) + np.tril(lower, -1).T)
 
 
+class _Spectrum:
+    """Eigenvalues (q,) of `W^T W`, `W = L^-1 U`, and `W` times its eigenvectors (n, q): the same at all scales."""
+
+    def __init__(self, factor: Floats, whitened_columns: Floats) -> None:
+        self._factor = factor
+        values, vectors = np.linalg.eigh(whitened_columns.T @ whitened_columns)
+        self.values, self.directions = np.maximum(values, 0.0), whitened_columns @ vectors
+
+    @cached_property
+    def dual(self) -> Floats:
+        """`L^-T` times the directions (n, q), with which the inverse of the covariance is made."""
+        from scipy.linalg import solve_triangular
+
+        return np.asarray(solve_triangular(self._factor, self.directions, lower=True, trans="T", check_finite=False))
+
+
 @dataclass(frozen=True, eq=False)
 class GaussianModel:
     """Rows with noise and normal coefficients.
@@ -97,11 +113,7 @@ class GaussianModel:
     @cached_property
     def _low_rank(self) -> tuple[Floats, Floats]:
         """`B` (n, q) and weights (q,) with which `S^-1 = ((L L^T)^-1 - B diag(weights) B^T) / kappa^2`."""
-        from scipy.linalg import solve_triangular
-
-        values, directions = self._spectrum
-        B = solve_triangular(self.noise_factor, directions, lower=True, trans="T", check_finite=False)
-        return np.asarray(B), 1.0 / (self.scale**2 + values)
+        return self._spectrum.dual, 1.0 / (self.scale**2 + self._spectrum.values)
 
     def noise_blocks(self, rows: Ints) -> Floats:
         """Covariance (g, d, d) of the noise of points with the rows (g, d)."""
@@ -128,11 +140,8 @@ class GaussianModel:
         return self._by_noise(self.columns)
 
     @cached_property
-    def _spectrum(self) -> tuple[Floats, Floats]:
-        """Eigenvalues (q,) of `W^T W`, `W = L^-1 U`, and `W` times its eigenvectors (n, q)."""
-        W = self._whitened_columns
-        values, vectors = np.linalg.eigh(W.T @ W)
-        return np.maximum(values, 0.0), W @ vectors
+    def _spectrum(self) -> _Spectrum:
+        return _Spectrum(self.noise_factor, self._whitened_columns)
 
     def _by_noise(self, rows: Floats) -> Floats:
         """`L^-1` of rows (n,) or (n, b)."""
@@ -153,7 +162,7 @@ class GaussianModel:
 
     def standardised_at(self, scales: Sequence[float], rows: Floats) -> Iterator[Floats]:
         """`standardised` rows with each of some factors on the noise: what they have in common is computed once."""
-        values, directions = self._spectrum
+        values, directions = self._spectrum.values, self._spectrum.directions
         white = self._by_noise(rows)
         projected = directions.T @ white
         for scale in scales:
@@ -164,7 +173,7 @@ class GaussianModel:
     @cached_property
     def log_determinant(self) -> float:
         """`ln |S|`."""
-        values, _ = self._spectrum
+        values = self._spectrum.values
         n, k2 = len(self), self.scale**2
         of_noise = 2.0 * float(np.log(np.diag(self.noise_factor)).sum())
         return of_noise + n * float(np.log(k2)) + float(np.log1p(values / k2).sum())

@@ -71,7 +71,12 @@ class GrossErrors:
 
 
 def with_gross_errors(
-    model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers, sweeps: int = 10
+    model: GaussianModel,
+    residual: Floats,
+    points: Sequence[Ints],
+    prior: Outliers,
+    sweeps: int = 10,
+    start: Floats | None = None,
 ) -> GrossErrors:
     """Density of residuals where some points may be gross errors.
 
@@ -86,8 +91,12 @@ def with_gross_errors(
     prior : Outliers
     sweeps : int
         Passes over the points at most. The point whose odds change sides the most goes first.
+    start : (g,) array, optional
+        The most probable inflation of each point under a hypothesis that is nearly the same; all are sound by default.
     """
     search = _Search(model, residual, points, prior)
+    if start is not None and (start > 1.0).any():
+        search.begin_with(np.searchsorted(prior.inflations, start))
     log_prior = prior.log_probabilities
     numbers = np.arange(len(points))
     for _ in range(sweeps * max(len(points), 1)):
@@ -151,12 +160,22 @@ class _Search:
     def change(self, number: int, kind: int) -> None:
         """Give a point another inflation."""
         self.kinds[number] = kind
+        self._prepare(number)
+        self._update()
+
+    def begin_with(self, kinds: Ints) -> None:
+        """Give all points their inflations at once."""
+        self.kinds = kinds.copy()
+        for number in np.flatnonzero(kinds).tolist():
+            self._prepare(number)
+        self._update()
+
+    def _prepare(self, number: int) -> None:
         if number not in self._changed:
             rows = self._points[number]
             noise = self._model.noise_blocks(rows[None])[0]
             columns = self._model.precision_columns(rows)
             self._changed[number] = columns, np.asarray(np.linalg.inv(noise)), float(np.linalg.slogdet(noise)[1])
-        self._update()
 
     def _update(self) -> None:
         """Factor of `Delta_R^-1 + P_0[R, R]`, and its inverse times `P_0[R, :]` and `(P_0 r)_R`."""

@@ -26,8 +26,8 @@ class Marginal:
     log_evidence : float
     scale : float
         The most probable factor on the noise.
-    gross : (g,) bool array
-        Points that are most probably gross errors, at that scale.
+    inflation : (g,) array
+        Most probable factor on the noise of each point at that scale, 1 of sound ones.
     model : GaussianModel
         At that scale; the excess noise of these points is columns after those of the hypothesis.
     excess_columns : int
@@ -36,9 +36,14 @@ class Marginal:
 
     log_evidence: float
     scale: float
-    gross: Bools
+    inflation: Floats
     model: GaussianModel
     excess_columns: int
+
+    @property
+    def gross(self) -> Bools:
+        """Points (g,) that are most probably gross errors."""
+        return self.inflation > 1.0
 
     @cached_property
     def noise(self) -> GaussianModel:
@@ -63,7 +68,13 @@ class Marginal:
         return self.model.columns.shape[1] - self.excess_columns
 
 
-def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], scale: float = 1.0) -> Marginal:
+def marginal(
+    model: GaussianModel,
+    residual: Floats,
+    points: Sequence[Ints],
+    scale: float = 1.0,
+    inflation: Floats | None = None,
+) -> Marginal:
     """Evidence of residuals (n,).
 
     Parameters
@@ -76,13 +87,16 @@ def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], sca
         Rows of each point.
     scale : float
         A factor on the noise near the most probable one, where the sum begins.
+    inflation : (g,) array, optional
+        Of gross errors under a hypothesis that is nearly the same.
     """
     values, log_prior = scales()
     logs = np.full(len(values), -np.inf)
     inflations: dict[int, Floats] = {}
 
     def add_scale(number: int) -> None:
-        at_scale = with_gross_errors(model.with_scale(float(values[number])), residual, points, outliers())
+        scaled = model.with_scale(float(values[number]))
+        at_scale = with_gross_errors(scaled, residual, points, outliers(), start=inflation)
         logs[number], inflations[number] = at_scale.log_density + log_prior[number], at_scale.inflation
 
     first = int(np.argmin(np.abs(np.log(values / scale))))
@@ -100,7 +114,7 @@ def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], sca
     return Marginal(
         float(np.logaddexp.reduce(logs)),
         at_best.scale,
-        inflations[best] > 1.0,
+        inflations[best],
         at_best.with_columns(columns),
         columns.shape[1],
     )

@@ -16,14 +16,15 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.discretisation import Difference
 from warpbrain.inference.beliefs import belief
-from warpbrain.inference.marginal import Marginal, marginal
+from warpbrain.inference.marginal import Marginal
 from warpbrain.simulation.extrapolated import extrapolated
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.effects import Effect, width_of
+from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.mesh_share import MeshShare, mesh_share_of
-from warpbrain.worlds.body.nuisances import registration_sd
+from warpbrain.worlds.body.nuisances import UNKNOWN_MESH, registration_sd
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
 
@@ -46,7 +47,7 @@ class FitSearch:
     base : Base
     mesh_errors : MeshErrors or None
         Without the share of mechanisms; None: the mesh is taken for exact.
-    effects, linear_columns, screened :
+    effects, columns, screened :
         See `warpbrain.worlds.body.fitting.Fitter`.
 
     Attributes
@@ -64,13 +65,13 @@ class FitSearch:
         base: Base,
         mesh_errors: MeshErrors | None,
         effects: tuple[Effect, ...],
-        linear_columns: Floats,
+        columns: Floats,
         screened: Marginal,
     ) -> None:
         self._base, self.mesh_errors, self.effects = base, mesh_errors, effects
         self._marginal, self._noise = screened, screened.noise
         nuisances = base.nuisances
-        self._U = np.column_stack([nuisances.columns, linear_columns])
+        self._U = columns[:, : columns.shape[1] - width_of(effects)]
         self._layout = Layout.of(nuisances, self._U.shape[1], effects)
         # recordings were realigned by a rigid motion already, which keeps its prior cost as coordinates
         self._realigned = np.zeros(self._U.shape[1])
@@ -83,7 +84,7 @@ class FitSearch:
         self._linearised_at = np.full(len(self._layout.nonlinear), np.inf)
         # of the last state of this fit that was followed over time
         self._course: tuple[Floats, ...] = ()
-        self.columns = np.concatenate([self._U, *(effect.columns for effect in effects)], axis=1)
+        self.columns = columns
         self.state, self.converged = base.state, False
         self.z, self.residual, self._best = np.zeros(self.columns.shape[1]), np.zeros(len(self._U)), np.inf
 
@@ -98,8 +99,8 @@ class FitSearch:
                 if number == len(starts) and not np.isfinite(self._best):
                     raise
 
-    def linearise_about(self, subset: Refit, columns: Floats) -> Floats:
-        """Take columns about a fit with the first of the effects, or all, and its share of the mesh's error.
+    def begin_at(self, subset: Refit) -> Floats:
+        """Take the columns for those about a fit with the first of the effects, or all; keep its share of the mesh.
 
         Returns
         -------
@@ -109,8 +110,9 @@ class FitSearch:
         first, coefficients = self._U.shape[1], np.concatenate(subset.coefficients)
         z = np.zeros(len(self.z))
         z[: len(subset.nuisances)] = subset.nuisances
+        z = self._rescaled(z, subset.columns, self.columns)
         z[first : first + len(coefficients)] = coefficients
-        self.columns, self._linearised_at = columns, z
+        self._linearised_at = z
         if subset.mesh_share is not None:
             self._mesh_share = subset.mesh_share.extended(len(self.z) - first)
         return z
@@ -140,7 +142,7 @@ class FitSearch:
                 self._relinearise()
                 if by_differences:
                     self.columns = self._difference_columns()
-            step, current = self._gauss_newton_step(), np.array_equal(self._linearised_at, self.z)
+            step, current = self._gauss_newton_step(by_differences), np.array_equal(self._linearised_at, self.z)
             if not self._line_search(step):
                 if relinearise and not current and np.abs(step).max() >= 2.0 * _SHORT:
                     # columns that were made elsewhere may point uphill
@@ -155,10 +157,17 @@ class FitSearch:
             if self.converged:
                 return
 
-    def update_noise(self, marginal: Marginal) -> bool:
-        """Take the noise and the gross errors of a result; whether they are others than it was fitted with."""
+    def update_noise(self, fit: Refit) -> bool:
+        """Take noise, gross errors and the mesh's unknown error of a result; whether it was fitted with others."""
+        marginal, nuisances = fit.marginal, self._base.nuisances
         same = marginal.scale == self._marginal.scale and np.array_equal(marginal.gross, self._marginal.gross)
         self._marginal, self._noise = marginal, marginal.noise
+        fraction = nuisances.fraction_of(fit.columns)
+        if not np.isclose(fraction, nuisances.fraction_of(self.columns)):
+            same = False
+            self.z = self._rescaled(self.z, self.columns, fit.columns)
+            self._U = nuisances.at_fraction(self._U, fraction)
+            self.columns = nuisances.at_fraction(self.columns, fraction)
         if not same:
             self._best = np.inf
             self._accept_if_better(self.z, self.state, self.residual)
@@ -179,13 +188,12 @@ class FitSearch:
 
     def result(self) -> Refit:
         """The fit at its best point."""
-        base, z = self._base, self.z
         q = self._U.shape[1]
-        linear = self.residual + self.columns @ z
-        evidence = marginal(base.model.of_noise(self.columns), linear, base.points, self._marginal.scale)
+        linear = self.residual + self.columns @ self.z
+        columns, evidence = evidence_of(self._base, self.columns, linear, self._marginal.scale)
+        z = self._rescaled(self.z, self.columns, columns)
         # what is not known of the mesh's share widens the sizes of mechanisms, not their evidence
-        columns = np.column_stack([self.columns, *self._mesh_share_deviation(z[q:])])
-        W = self._noise.whitened(columns)
+        W = self._noise.whitened(np.column_stack([columns, *self._mesh_share_deviation(z[q:])]))
         covariance = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
         # how far the best point would move with it, or if the search had gone on, is uncertainty, too
         shift = (covariance @ (W.T @ self._noise.whitened(linear)))[: len(z)] - z
@@ -198,11 +206,18 @@ class FitSearch:
             tuple(covariance[part, part] + np.outer(shift[part], shift[part]) for part in parts),
             self.residual,
             linear,
-            self.columns,
+            columns,
             evidence,
             self.converged,
             self._mesh_share,
         )
+
+    def _rescaled(self, z: Floats, columns: Floats, others: Floats) -> Floats:
+        """The same point in coordinates of columns with another size of the mesh's unknown error."""
+        nuisances, scaled = self._base.nuisances, z.copy()
+        factor = nuisances.fraction_of(columns) / nuisances.fraction_of(others)
+        scaled[nuisances.part(UNKNOWN_MESH)] *= factor
+        return scaled
 
     def _mesh_share_deviation(self, z: Floats) -> list[Floats]:
         """Columns (n, 1) of what is not known of the mechanisms' share of the mesh's error.
@@ -212,10 +227,15 @@ class FitSearch:
         """
         return [] if self._mesh_share is None else [belief("mesh.share") * self._mesh_share.at(z)[:, None]]
 
-    def _gauss_newton_step(self) -> Floats:
-        white = self._noise.whitened(np.column_stack([self.residual, self.columns]))
-        gradient = white[:, 1:].T @ white[:, 0] - self.z
-        return np.asarray(np.linalg.solve(np.eye(len(self.z)) + white[:, 1:].T @ white[:, 1:], gradient))
+    def _gauss_newton_step(self, field_stays: bool) -> Floats:
+        """The step; without the stiffness field, whose columns are rough where something relaxes, if that stays."""
+        free = np.ones(len(self.z), dtype=bool)
+        free[self._layout.field] = not field_stays
+        white = self._noise.whitened(np.column_stack([self.residual, self.columns[:, free]]))
+        W, step = white[:, 1:], np.zeros(len(self.z))
+        gradient = W.T @ white[:, 0] - self.z[free]
+        step[free] = np.linalg.solve(np.eye(W.shape[1]) + W.T @ W, gradient)
+        return step
 
     def _line_search(self, step: Floats) -> bool:
         """Go along a step, halved until it is downhill; whether any of it was."""

@@ -43,20 +43,20 @@ class Fitter:
     def fit(
         self,
         effects: tuple[Effect, ...],
-        linear_columns: Floats,
+        columns: Floats,
         starts: Sequence[Floats],
         screened: Marginal,
         nearby: SolvedState | None = None,
-        subset: tuple[Refit, Floats] | None = None,
+        subset: Refit | None = None,
     ) -> Refit:
         """Fit one set.
 
         Parameters
         ----------
         effects : tuple of Effect
-            Columns at the state of screening.
-        linear_columns : (n, e) array
-            Columns of causes that act linearly: unknown fields, or no physics.
+        columns : (n, q + e + k) array
+            Of nuisances, of causes that act linearly (unknown fields, or no physics), and of effects, about the base or
+            about `subset`.
         starts : sequence of (q + e + k,) arrays
             Coordinates to begin at, of which the best are taken: the most probable ones about the base, and about the
             fit without any cause. Where points of a surface may belong to one side or the other there are several best
@@ -65,19 +65,19 @@ class Fitter:
             Scale of the noise and gross errors of the set in the linear model.
         nearby : SolvedState, optional
             Nearer to the start than the base.
-        subset : (Refit, (n, q + e + k) array), optional
+        subset : Refit, optional
             A fit with the first of the effects, or with all of them, nearer still, whose share of the mesh's error is
-            kept; and the columns of all about it.
+            kept.
 
         Raises
         ------
         SolveError
             If there is no equilibrium near the start.
         """
-        search = FitSearch(self.base, self.mesh_errors, effects, linear_columns, screened)
+        search = FitSearch(self.base, self.mesh_errors, effects, columns, screened)
         if subset is not None:
-            nearby = subset[0].state
-            starts = [*starts, search.linearise_about(*subset)]
+            nearby = subset.state
+            starts = [*starts, search.begin_at(subset)]
         search.start(starts, nearby or self.base.state)
         if subset is None:
             search.backtrack_to_base()
@@ -87,7 +87,7 @@ class Fitter:
             search.minimise(relinearise=False)
         fit = search.result()
         for _ in range(_ROUNDS):
-            if not search.update_noise(fit.marginal):
+            if not search.update_noise(fit):
                 break
             search.minimise(relinearise=True)
             before, fit = fit, search.result()

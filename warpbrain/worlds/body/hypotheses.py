@@ -18,7 +18,6 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.inference import GaussianModel, Posterior, Search, posterior
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.hypothesis import Hypothesis
-from warpbrain.inference.marginal import marginal
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads
@@ -26,6 +25,7 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import causes_of
 from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit
 from warpbrain.worlds.body.effects import Effects
+from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.fitting import Fitter
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.stopping import next_to_fit
@@ -98,7 +98,7 @@ class HypothesisSearch:
         """Weigh sets about the base: with all points sound, and with those louder that are gross errors of no cause."""
         self._listener.stage("screening")
         base = self.base
-        nothing = marginal(base.model, base.residual, base.points)
+        nothing = evidence_of(base, base.model.columns, base.residual)[1]
         models = [base.model]
         if nothing.gross.any():
             noise_factor = nothing.noise.noise_factor / nothing.scale
@@ -160,11 +160,9 @@ class HypothesisSearch:
         if self.nothing.refit is not None and subset is None:
             starts.append(self._coordinates_about(self.nothing.refit, candidate))
             nearby = self.nothing.refit.state
-        about = None if subset is None or subset.refit is None else (subset.refit, candidate.columns)
+        about = None if subset is None else subset.refit
         try:
-            refit = self._fitter.fit(
-                candidate.effects, candidate.linear_columns, starts, candidate.marginal, nearby, about
-            )
+            refit = self._fitter.fit(candidate.effects, candidate.columns, starts, candidate.marginal, nearby, about)
         except (SolveError, InputError) as error:
             self._sets[names] = replace(candidate, failure=str(error))
             return
@@ -194,10 +192,10 @@ class HypothesisSearch:
             reduced = superset.without(mechanism, self.base)
             if reduced.marginal.log_evidence < subset.marginal.log_evidence + _BETTER:
                 continue
-            begun = superset.refit.without(number), reduced.columns
+            begun = superset.refit.without(number)
             try:
                 refit = self._fitter.fit(
-                    reduced.effects, reduced.linear_columns, [reduced.coordinates], reduced.marginal, subset=begun
+                    reduced.effects, reduced.columns, [reduced.coordinates], reduced.marginal, subset=begun
                 )
             except (SolveError, InputError):
                 continue
@@ -240,6 +238,8 @@ class HypothesisSearch:
     def _coordinates_about(self, nothing: Refit, candidate: WeightedSet) -> Floats:
         """The most probable coordinates of a set in the linear model about the fit without any cause."""
         columns = np.column_stack([nothing.columns, candidate.columns[:, len(nothing.nuisances) :]])
+        nuisances = self.base.nuisances
+        columns = nuisances.at_fraction(columns, nuisances.fraction_of(candidate.columns))
         model = GaussianModel(candidate.marginal.noise.noise_factor, columns)
         return model.coefficients(nothing.linear + candidate.residual - self.base.residual)[0]
 

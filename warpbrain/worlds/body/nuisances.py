@@ -30,6 +30,8 @@ from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
 from warpbrain.worlds.body.states import Hypothesis, States
 
+#: The family of what is not known of the mesh's error.
+UNKNOWN_MESH = "mesh, unknown"
 #: Step of a difference in `theta`.
 _STEP = 1e-3
 
@@ -86,6 +88,17 @@ class Nuisances:
         *others, last = self.families
         scaled = Family(last.name, last.columns * (fraction / self.fraction))
         return replace(self, families=(*others, scaled), fraction=fraction)
+
+    def at_fraction(self, columns: Floats, fraction: float) -> Floats:
+        """Columns (n, q + k) that begin with these nuisances, with another size of that part."""
+        changed = columns.copy()
+        changed[:, self.part(UNKNOWN_MESH)] = self.families[-1].columns * (fraction / self.fraction)
+        return changed
+
+    def fraction_of(self, columns: Floats) -> float:
+        """The size of that part in columns of `at_fraction`; of no columns that of the nuisances."""
+        usual = float(np.linalg.norm(self.families[-1].columns))
+        return self.fraction * (float(np.linalg.norm(columns[:, self.part(UNKNOWN_MESH)])) / usual if usual else 1.0)
 
     def coordinates(self, prior: Gaussian, hypothesis: Hypothesis) -> Floats:
         """Coordinates (q,) of the tissue, by its prior, and of the field of a hypothesis; the others are zero."""
@@ -151,7 +164,7 @@ def nuisances_at(
     if mesh_errors is not None:
         error = mesh_errors.error
         families.append(Family("mesh", Discretisation().deviation * sensors.answer(error.u, error.reactions)[:, None]))
-    families.append(Family("mesh, unknown", _fractional(at, anchors, fraction)))
+    families.append(Family(UNKNOWN_MESH, _fractional(at, anchors, fraction)))
     return Nuisances(tuple(families), anchors, fraction)
 
 

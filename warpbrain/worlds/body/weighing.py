@@ -8,11 +8,11 @@ import numpy as np
 
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.hypothesis import Hypothesis
-from warpbrain.inference.marginal import marginal
 from warpbrain.inference.noise import scales
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses
 from warpbrain.worlds.body.effects import Effect, Effects, width_of
+from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.placing import best_in_cell
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
@@ -59,11 +59,10 @@ def weigh(
     columns = np.column_stack(
         [model_columns[:, :split], *linear, model_columns[:, split:], *(effect.columns for effect in added)]
     )
-    result = marginal(base.model.of_noise(columns), residual, base.points, hypothesis.best.scale)
+    columns, result = evidence_of(base, columns, residual, hypothesis.best.scale)
     return WeightedSet(
         replace(hypothesis, log_evidence=hypothesis.log_evidence + result.log_evidence - log_screened),
         (*acting, *added),
-        np.column_stack([model_columns[:, base.nuisances.columns.shape[1] : split], *linear]),
         residual,
         columns,
         result,
@@ -100,7 +99,7 @@ def with_refined_places(
         columns = candidate.columns.copy()
         columns[:, part] = best.effect.columns
         residual = residual - best.effect.mean
-        refined = marginal(base.model.of_noise(columns), residual, base.points, candidate.marginal.scale)
+        columns, refined = evidence_of(base, columns, residual, candidate.marginal.scale)
         effects[number] = best.effect
         candidate = replace(
             candidate, effects=tuple(effects), residual=residual, columns=columns, marginal=refined

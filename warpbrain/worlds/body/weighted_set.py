@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.inference import GaussianModel, Kind
+from warpbrain.inference import Kind
 from warpbrain.inference.hypothesis import Hypothesis
-from warpbrain.inference.marginal import Marginal, marginal
+from warpbrain.inference.marginal import Marginal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
+from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.refit import Refit
 
 
@@ -24,12 +25,10 @@ class WeightedSet:
     hypothesis : Hypothesis
     effects : tuple of Effect
         Of its mechanisms, in the order of the hypothesis.
-    linear_columns : (n, e) array
-        Columns of its causes that are no mechanisms: unknown fields, and what is no physics.
     residual : (n,) array
         With all coordinates at zero.
     columns : (n, q + e + k) array
-        Of nuisances, `linear_columns` and effects.
+        Of nuisances, of causes that are no mechanisms (unknown fields, and what is no physics), and of effects.
     marginal : Marginal
     refit : Refit or None
     failure : str
@@ -41,7 +40,6 @@ class WeightedSet:
 
     hypothesis: Hypothesis
     effects: tuple[Effect, ...]
-    linear_columns: Floats
     residual: Floats
     columns: Floats
     marginal: Marginal
@@ -93,8 +91,7 @@ class WeightedSet:
         number = self.mechanisms.index(mechanism)
         columns = np.delete(self.columns, self.slices[number], axis=1)
         residual = self.residual + self.effects[number].mean
-        model = GaussianModel(base.model.noise_factor, columns)
-        reduced = marginal(model, residual, base.points, self.marginal.scale)
+        columns, reduced = evidence_of(base, columns, residual, self.marginal.scale)
         at = self.hypothesis.causes.index(mechanism)
         hypothesis = replace(
             self.hypothesis,
@@ -103,4 +100,4 @@ class WeightedSet:
             log_evidence=self.hypothesis.log_evidence - self.marginal.log_evidence + reduced.log_evidence,
         )
         effects = self.effects[:number] + self.effects[number + 1 :]
-        return WeightedSet(hypothesis, effects, self.linear_columns, residual, columns, reduced)
+        return WeightedSet(hypothesis, effects, residual, columns, reduced)
