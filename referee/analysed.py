@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from referee.calibrate import FILE, losses_of, true_of
+from referee.calibrate import FILE, known_of, true_of
 from referee.decision import Posterior, decide
 from referee.diagnoses import NOT_PHYSICS, UNKNOWN, Diagnosis, Ranked, Tried
 from referee.outcomes import Outcome
@@ -44,7 +44,7 @@ def read_analyses(folder: Path, labels: Mapping[str, Mapping[str, Any]]) -> dict
     InputError
         If there is none of any case.
     """
-    losses = losses_of(FILE)
+    losses = known_of(FILE)["losses"]
     found = {}
     for name in labels:
         file = folder / f"{name}.json"

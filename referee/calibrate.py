@@ -17,7 +17,7 @@ from referee.intervals import Share, share
 from referee.labels import open_labels
 from referee.outcomes import Outcome, read_outcomes
 from referee.reliability import reliability
-from referee.temperature import TRAITS, Ballot, Floats, Scale, fit, held_out, intervals, log_loss
+from referee.temperature import TRAITS, Ballot, Floats, Scale, fit, held_out, interval, log_loss
 from warpbrain.errors import InputError
 
 #: Where the tool reads it.
@@ -29,7 +29,7 @@ PRICES, WRONG = (5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0, 80.0), 0.03
 
 
 def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path, write: Path = FILE) -> str:
-    """Fit temperature, weights of sets and the price of a false name, count right names, and write all of it.
+    """Fit the temperature and the price of a false name, count right names, and write all of it; weights of sets stay.
 
     Parameters
     ----------
@@ -60,18 +60,19 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path, wri
             f"{FEWEST} or more"
         )
     chosen = [b for _, b in useful]
-    scale, ends, apart = fit(chosen), intervals(chosen), held_out(chosen)
-    losses, spoken = priced([o for o, _ in useful], chosen, apart, losses_of(write))
-    values = dict(zip(("temperature", *TRAITS), (scale.temperature, *scale.weights), strict=True))
+    known = known_of(write)
+    weights = [known["log_weights"][trait] for trait in TRAITS]
+    scale, ends, apart = fit(chosen, weights), interval(chosen, weights), held_out(chosen, weights)
+    losses, spoken = priced([o for o, _ in useful], chosen, apart, known["losses"])
     told = {
         "source": f"`python -m referee calibrate`, {len(useful)} cases of the set {cases.resolve().parent.name}",
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "temperature": round(scale.temperature, 3),
         # by the rule of succession: that all were right does not make the next one certain
         "most_said": round((spoken.hits + 1) / (spoken.of + 2), 3),
-        "log_weights": {trait: round(weight, 3) for trait, weight in zip(TRAITS, scale.weights, strict=True)},
+        "log_weights": known["log_weights"],
         "losses": losses,
-        "intervals": {name: np.round(ends[:, k], 3).tolist() for k, name in enumerate(values)},
+        "interval": {"temperature": np.round(ends, 3).tolist()},
     }
     write.write_text(json.dumps(told, indent=1) + "\n", encoding="ascii")
     kinds = ", ".join(f"{sum(o.kind == kind for o, _ in useful)} {kind}" for kind in _KINDS)
@@ -79,10 +80,10 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path, wri
         f"{len(outcomes)} cases, {len(missing)} without a diagnosis; fitted to {len(useful)}: {kinds}.",
         f"Left out: {len(outcomes) - len(useful)} whose truth was not among the hypotheses.",
         "",
-        *(f"{name:14}{v:8.2f}   {ends[0, k]:.2f} to {ends[1, k]:.2f}" for k, (name, v) in enumerate(values.items())),
+        f"temperature {scale.temperature:.2f}, {ends[0]:.2f} to {ends[1]:.2f}",
         "",
         f"A false name costs {losses['false name']:g}: names right by what the other four fifths give: {spoken}.",
-        *_before_and_after(chosen, apart),
+        *_before_and_after(chosen, apart, weights),
         f"Written: {write.name}",
     ]
     return "\n".join(lines)
@@ -102,10 +103,9 @@ def true_of(outcome: Outcome, tried: Tried) -> bool:
 _NAMELESS: Mapping[str, tuple[str, ...]] = {"none": (), "outside": (UNKNOWN,), "trap": (NOT_PHYSICS,)}
 
 
-def losses_of(file: Path) -> dict[str, float]:
-    """The table of losses of a calibration; that of the package if there is none yet."""
-    read = json.loads((file if file.exists() else FILE).read_text(encoding="utf-8"))
-    return dict(read["losses"])
+def known_of(file: Path) -> dict[str, Any]:
+    """A calibration that was written before; that of the package if there is none yet."""
+    return dict(json.loads((file if file.exists() else FILE).read_text(encoding="utf-8")))
 
 
 def priced(
@@ -151,10 +151,10 @@ def _spoken(
     return right
 
 
-def _before_and_after(ballots: Sequence[Ballot], apart: Sequence[Floats]) -> list[str]:
-    right = np.concatenate([b.right for b in ballots])
-    plain = [Scale().probabilities(b.hypotheses) for b in ballots]
-    lines = ["", f"mean log loss at a temperature of 1: {log_loss(Scale(), ballots):.3f}; calibration error:"]
+def _before_and_after(ballots: Sequence[Ballot], apart: Sequence[Floats], weights: Sequence[float]) -> list[str]:
+    right, one = np.concatenate([b.right for b in ballots]), Scale(1.0, tuple(weights))
+    plain = [one.probabilities(b.hypotheses) for b in ballots]
+    lines = ["", f"mean log loss at a temperature of 1: {log_loss(one, ballots):.3f}; calibration error:"]
     for name, rows in (("at a temperature of 1", plain), ("by the other four fifths", apart)):
         found: dict[str, Any] = reliability(np.concatenate(rows), right)
         lines.append(f"  {name}: {found['ece']:.3f}")

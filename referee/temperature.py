@@ -1,4 +1,8 @@
-"""Temperature and weights of sets of causes that make the truth most likely."""
+"""The temperature of sets of causes that makes the truth most likely.
+
+Weights of sets are not fitted: how often something is missing in a made set, and how often it is unknown, was chosen by
+who made it, and says nothing about anybody else's recordings.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +19,8 @@ Bools = NDArray[np.bool_]
 
 #: Traits of a set that have a log weight.
 TRAITS = ("nothing", "another", UNKNOWN, NOT_PHYSICS)
-#: Weak normal priors of the logarithm of the temperature, to 1, and of weights, to 0: a calibration set may not tell.
-_SPREADS = np.array([0.7, *[3.0] * len(TRAITS)])
+#: Weak normal prior of the logarithm of the temperature, about 0: a calibration set may not tell.
+_SPREAD = 0.7
 
 
 @dataclass(frozen=True)
@@ -71,52 +75,37 @@ def log_loss(scale: Scale, ballots: Sequence[Ballot]) -> float:
     return float(-np.log(np.maximum(true, 1e-300)).mean())
 
 
-def fit(ballots: Sequence[Ballot]) -> Scale:
-    """The scale of highest likelihood of the truth, with weak priors to a temperature of 1 and weights of 0."""
-    from scipy.optimize import minimize
-    from scipy.special import softmax
+def fit(ballots: Sequence[Ballot], weights: Sequence[float] = Scale().weights) -> Scale:
+    """The scale with the temperature of highest likelihood of the truth, with a weak prior to 1."""
+    from scipy.optimize import minimize_scalar
 
-    most = max(len(b.hypotheses) for b in ballots)
-    log = np.full((len(ballots), most), -np.inf)
-    has, right = np.zeros((*log.shape, len(TRAITS))), np.zeros(log.shape, dtype=bool)
-    for k, ballot in enumerate(ballots):
-        own = np.array([h.log_density for h in ballot.hypotheses])
-        # what is common to all of a case does not matter
-        log[k, : len(own)], has[k, : len(own)] = own - own.max(), traits(ballot.hypotheses)
-        right[k, : len(own)] = ballot.right
-    tried = np.isfinite(log)
+    def scale(logarithm: float) -> Scale:
+        return Scale(float(np.exp(logarithm)), tuple(weights))
 
-    def cost(x: Floats) -> tuple[float, Floats]:
-        temperature = np.exp(x[0])
-        exponent = (log + has @ x[1:]) / temperature
-        p = softmax(exponent, axis=1)
-        true = np.maximum((p * right).sum(axis=1, keepdims=True), 1e-300)
-        by_exponent = p - p * right / true
-        slope = np.array(
-            [
-                -(by_exponent * np.where(tried, exponent, 0.0)).sum(),
-                *np.einsum("ck,ckt->t", by_exponent, has) / temperature,
-            ]
-        )
-        return float(-np.log(true).sum() + 0.5 * ((x / _SPREADS) ** 2).sum()), slope + x / _SPREADS**2
+    def cost(logarithm: float) -> float:
+        return len(ballots) * log_loss(scale(logarithm), ballots) + 0.5 * (logarithm / _SPREAD) ** 2
 
-    bounds = [(-3.0, 5.0), *[(-30.0, 30.0)] * len(TRAITS)]
-    found = minimize(cost, np.zeros(len(_SPREADS)), jac=True, method="L-BFGS-B", bounds=bounds)
-    return Scale(float(np.exp(found.x[0])), tuple(found.x[1:].tolist()))
+    return scale(float(minimize_scalar(cost, bounds=(-3.0, 5.0), method="bounded").x))
 
 
-def held_out(ballots: Sequence[Ballot], folds: int = 5) -> list[Floats]:
+def held_out(ballots: Sequence[Ballot], weights: Sequence[float] = Scale().weights, folds: int = 5) -> list[Floats]:
     """Probabilities of each case by the scale that the other folds give."""
     place = np.random.default_rng(0).permutation(len(ballots)) % folds
-    scales = {fold: fit([b for b, k in zip(ballots, place, strict=True) if k != fold]) for fold in set(place.tolist())}
+    scales = {
+        fold: fit([b for b, k in zip(ballots, place, strict=True) if k != fold], weights)
+        for fold in set(place.tolist())
+    }
     return [scales[fold].probabilities(b.hypotheses) for b, fold in zip(ballots, place.tolist(), strict=True)]
 
 
-def intervals(ballots: Sequence[Ballot], draws: int = 100) -> Floats:
-    """Ends (2, 1 + traits) of 95 % intervals of temperature and weights, by fitting cases drawn with replacement."""
+def interval(
+    ballots: Sequence[Ballot], weights: Sequence[float] = Scale().weights, draws: int = 100
+) -> tuple[float, float]:
+    """Ends of the 95 % interval of the temperature, by fitting cases drawn with replacement."""
     random = np.random.default_rng(1)
-    found = []
-    for _ in range(draws):
-        scale = fit([ballots[k] for k in random.integers(len(ballots), size=len(ballots))])
-        found.append((scale.temperature, *scale.weights))
-    return np.percentile(np.array(found), [2.5, 97.5], axis=0)
+    found = [
+        fit([ballots[k] for k in random.integers(len(ballots), size=len(ballots))], weights).temperature
+        for _ in range(draws)
+    ]
+    low, high = np.percentile(found, [2.5, 97.5]).tolist()
+    return low, high
