@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -68,8 +69,8 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path, wri
         "source": f"`python -m referee calibrate`, {len(useful)} cases of the set {cases.resolve().parent.name}",
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "temperature": round(scale.temperature, 3),
-        # by the rule of succession: that all were right does not make the next one certain
-        "most_said": round((spoken.hits + 1) / (spoken.of + 2), 3),
+        # by the rule of succession: that all were right does not make the next one certain; in whole percent
+        "most_said": math.floor(100 * (spoken.hits + 1) / (spoken.of + 2)) / 100,
         "log_weights": known["log_weights"],
         "losses": losses,
         "interval": {"temperature": np.round(ends, 3).tolist()},

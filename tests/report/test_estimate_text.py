@@ -6,6 +6,7 @@ from synthetic import WHITE, block
 
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.inference.causes import Kind
+from warpbrain.inference.probability import percent
 from warpbrain.report.estimate_text import averaged_lines
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue, LikelyCause
 
@@ -25,7 +26,7 @@ def averaged(nothing: float) -> AveragedTissue:
 def test_what_is_more_probable_than_nothing_is_printed():
     first, causes, _, row = averaged_lines(averaged(0.0))
     assert first.endswith("case says: below 6 %")
-    assert causes == "  what may act: pressure above 94 %"
+    assert causes == f"  what may act: pressure {percent(1.0)}"
     assert row.split()[:3] == ["brain", "shear", "modulus"] and row.split()[-1] == "Pa"
     assert [float(word) for word in row.split()[3:5]] == pytest.approx([2000.0, 200.0])
 
