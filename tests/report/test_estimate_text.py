@@ -25,7 +25,7 @@ def averaged(nothing: float) -> AveragedTissue:
 
 def test_what_is_more_probable_than_nothing_is_printed():
     first, causes, _, row = averaged_lines(averaged(0.0))
-    assert first.endswith("case says: below 6 %")
+    assert first.endswith(f"case says: {percent(0.0)}")
     assert causes == f"  what may act: pressure {percent(1.0)}"
     assert row.split()[:3] == ["brain", "shear", "modulus"] and row.split()[-1] == "Pa"
     assert [float(word) for word in row.split()[3:5]] == pytest.approx([2000.0, 200.0])
