@@ -46,6 +46,8 @@ from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 #: Sets of causes that a diagnosis lists.
 _LISTED = 20
+#: Why a cause was not weighed.
+_INVISIBLE = "nothing that was recorded would tell of it, however large it were"
 #: Size of a patch of the map, in spacings of the scan.
 _PATCH = 0.7
 
@@ -161,7 +163,7 @@ class Diagnosing:
             p_left=checked.p_left,
             named=ranking.named(best, named),
             ranking=ranked,
-            rejected=search.candidates.rejected,
+            rejected=dict(search.candidates.rejected) | dict.fromkeys(search.invisible, _INVISIBLE),
             combinations=_combinations(search),
             map=where,
             when=_onset(search, checked.decision, best),

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.inference import Cause, Kind, Place
+from warpbrain.inference import Cause, GaussianModel, Kind, Place
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.hypothesis import Member
 from warpbrain.worlds.body.base import Base
@@ -54,6 +54,29 @@ class BodyCauses:
         """Expected change of each row (n,)."""
         mean = self.causes[member.cause].places[member.place].mean
         return 0.0 if mean is None else mean
+
+
+def visible(causes: BodyCauses, model: GaussianModel) -> BodyCauses:
+    """Those that would change what was recorded beside noise and nuisances, were they as large as is believed.
+
+    A set with a cause that changes nothing is as probable as without it: many of them would share the probability of
+    what acts, and tell of nothing. Their sizes are believed, but no verdict depends on them.
+
+    Parameters
+    ----------
+    causes : BodyCauses
+    model : GaussianModel
+        Of the rows without them.
+    """
+    least = belief("checks.invisible")
+    return replace(causes, causes=tuple(cause for cause in causes.causes if _length(cause, model) > least))
+
+
+def _length(cause: Cause, model: GaussianModel) -> float:
+    """Of the largest change by one standard deviation of the largest size, in standard deviations of the model."""
+    blocks = [float(np.max(cause.sizes)) * place.columns for place in cause.places]
+    blocks += [place.mean[:, None] for place in cause.places if place.mean is not None]
+    return float(np.linalg.norm(model.standardised(np.concatenate(blocks, axis=1)), axis=0).max(initial=0.0))
 
 
 def scaled(effect: Effect, size: float) -> Effect:

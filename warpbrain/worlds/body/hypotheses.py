@@ -22,7 +22,7 @@ from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.causes import causes_of
+from warpbrain.worlds.body.causes import causes_of, visible
 from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.evidence import evidence_of
@@ -58,6 +58,7 @@ class HypothesisSearch:
     def __init__(self, base: Base, candidates: Candidates, spacing: float, listener: Listener) -> None:
         self.base, self.candidates, self.spacing, self._listener = base, candidates, spacing, listener
         self.causes = causes_of(base, candidates)
+        self._visible = visible(self.causes, base.model)
         self._fitter = Fitter(base)
         self._sets: dict[frozenset[str], WeightedSet] = {}
         # of fitted sets whose supersets were weighed: what makes columns about the fit
@@ -82,12 +83,18 @@ class HypothesisSearch:
         something = [h.log_evidence + h.log_prior for h in hypotheses if h.causes]
         nothing = next(h.log_evidence for h in hypotheses if not h.causes)
         # prior odds that any of them acts
-        odds = np.expm1(np.sum(np.log1p(np.exp([cause.log_prior for cause in self.causes.causes]))))
+        odds = np.expm1(np.sum(np.log1p(np.exp([cause.log_prior for cause in self._visible.causes]))))
         return float(np.logaddexp.reduce(something) - np.log(odds) - nothing) if something else 0.0
 
     def get(self, names: Iterable[str]) -> WeightedSet | None:
         """A set by the names of its causes, if it was weighed."""
         return self._sets.get(frozenset(names))
+
+    @property
+    def invisible(self) -> tuple[str, ...]:
+        """Causes that were not weighed, since nothing that was recorded would tell of them."""
+        weighed = {cause.name for cause in self._visible.causes}
+        return tuple(cause.name for cause in self.causes.causes if cause.name not in weighed)
 
     @property
     def nothing(self) -> WeightedSet:
@@ -104,8 +111,8 @@ class HypothesisSearch:
             noise_factor = nothing.noise.noise_factor / nothing.scale
             models.append(GaussianModel(noise_factor, base.nuisances.columns))
         for model in models:
-            screened = posterior(model, base.residual, self.causes.causes, _search(most=2))
-            work = partial(weigh, base, causes=self.causes, screened=model)
+            screened = posterior(model, base.residual, self._visible.causes, _search(most=2))
+            work = partial(weigh, base, causes=self._visible, screened=model)
             for candidate in in_threads(work, _most_probable(screened)):
                 known = self._sets.get(candidate.names)
                 if known is None or candidate.hypothesis.log_evidence > known.hypothesis.log_evidence:
@@ -254,6 +261,7 @@ class HypothesisSearch:
         self._expanded[fitted.names] = candidates.source
         causes = causes_of(self.base, candidates)
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in fitted.names))
+        causes = visible(causes, fitted.marginal.model)
         unscaled = GaussianModel(noise_factor / fitted.marginal.scale, fitted.columns)
         screened = posterior(unscaled, fitted.residual, causes.causes, _search(most=1))
         hypotheses = [hypothesis for hypothesis in _most_probable(screened, singles=False) if hypothesis.causes]
