@@ -14,6 +14,7 @@ from warpbrain.cases.shipped import SHIPPED, find_case
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh, write_mesh
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
+from warpbrain.recordings.registration import Registration
 from warpbrain.simulation.of_case import model_of
 
 
@@ -52,6 +53,12 @@ def test_everything_is_read(tmp_path):
     )
     # the file itself may be named, too
     assert read_case(tmp_path / "case.toml").name == "block"
+
+
+def test_the_accuracy_of_a_registration_is_in_mm_and_degrees(tmp_path):
+    assert read_case(write_folder(tmp_path / "none")).registration is None
+    head = ('axes = "RAS"', 'axes = "RAS"\nregistration = { mm = 2.5, degrees = 180 }')
+    assert read_case(write_folder(tmp_path / "declared", head)).registration == Registration(0.0025, np.pi)
 
 
 def test_what_may_be_left_out(tmp_path):

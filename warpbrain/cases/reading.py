@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import os
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from warpbrain.physics.composition import CompositionError, require_composable, 
 from warpbrain.problems import Problems
 from warpbrain.recordings.inside import check_points_inside, check_surface_near
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
+from warpbrain.recordings.registration import Registration
 
 
 def read_case(path: str | os.PathLike[str]) -> Case:
@@ -68,6 +70,10 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
         if not any(axis):
             head.problem("gravity_axis", f"expected 3 numbers that are not all zero, found {head.get('gravity_axis')}")
             axis = None
+    registration = None
+    if head.has("registration"):
+        accuracy = head.get("registration")
+        registration = Registration(0.001 * accuracy["mm"], math.radians(accuracy["degrees"]))
 
     mesh_file, found, specimen = read_anatomy(context)
     sets = None if found is None else NodeSets(context, found)
@@ -91,6 +97,7 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
         path=file,
         frame=context.frame,
         gravity_axis=axis,
+        registration=registration,
         mesh=mesh,
         mesh_file=mesh_file,
         specimen=specimen,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 from collections.abc import Callable
 from dataclasses import replace
@@ -88,6 +89,9 @@ def _head(case: Case) -> dict[str, Any]:
     head |= {"units": case.frame.unit, "axes": case.frame.axes}
     if case.gravity_axis is not None:
         head["gravity_axis"] = _plain(case.frame.directions(case.gravity_axis))
+    if case.registration is not None:
+        shift, turn = case.registration.shift, case.registration.turn
+        head["registration"] = {"mm": shift / 0.001, "degrees": math.degrees(turn)}
     return head
 
 

@@ -37,6 +37,16 @@ CASE = Table(
         Key("units", ("text",), "Unit of all lengths in the folder; mm if absent.", choices=tuple(METRES)),
         Key("axes", ("text",), "Axes of all vectors in the folder; RAS if absent.", choices=tuple(AXES)),
         Key("gravity_axis", ("vector",), "Where 'down' was while recording, in the axes; unknown if absent."),
+        Key(
+            "registration",
+            ("table",),
+            "How well recordings are registered to the anatomy, one standard deviation; 1 mm and 1 degree if absent.",
+            keys=(
+                Key("mm", ("number",), "Of each component of the shift, whatever the units.", "mm", True, above=0.0),
+                Key("degrees", ("number",), "Of the turn about each axis.", "degrees", True, above=0.0),
+            ),
+            hint="registration = { mm = 2.0, degrees = 1.0 }",
+        ),
     ),
 )
 
