@@ -13,6 +13,7 @@ from warpbrain.cases.format.tables import CASE, TABLES
 from warpbrain.cases.parts.anatomy import read_anatomy
 from warpbrain.cases.parts.boundaries import check_faces, check_together, read_boundaries
 from warpbrain.cases.parts.context import Context
+from warpbrain.cases.parts.magnitudes import check_magnitudes
 from warpbrain.cases.parts.mechanisms import read_mechanisms
 from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.node_sets import NodeSets
@@ -111,6 +112,8 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     )
     if specimen is None:
         check_together(context, mesh, boundaries)
+    else:
+        check_magnitudes(context, specimen, tissues, poisson, recordings)
     try:
         require_composable(mechanisms, require_left(mechanisms, mesh))
     except CompositionError as error:

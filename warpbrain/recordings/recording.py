@@ -123,7 +123,9 @@ class TestRecording(Recording):
 
     Attributes
     ----------
-    mode : {"axial", "shear", "torsion"}
+    mode : {"axial", "shear", "torsion", "confined", "biaxial"}
+        Confined: axial between lubricated walls that let it widen nowhere. Biaxial: stretched alike along x and y, its
+        thickness along z free; its stress is along x.
     quantities : (str, str)
         ``("displacement", "force")`` [m, N], ``("stretch", "stress")`` [1, Pa nominal] or ``("angle", "torque")``
         [rad, N m].

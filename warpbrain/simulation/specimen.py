@@ -38,6 +38,8 @@ Bools = NDArray[np.bool_]
 
 #: Imposed values from rest to the farther extreme of a test.
 STEPS = 8
+#: Modes whose states are homogeneous whatever the grips are.
+HOMOGENEOUS = ("confined", "biaxial")
 #: Quantities of tests as people read them: the factor from SI and the unit.
 SHOWN = {
     "displacement": (1000.0, "mm"),
@@ -109,6 +111,9 @@ class Rig:
     and one element is exact: a tetrahedron with the specimen's height and volume that stands on the lower platen, held
     against rigid motion and nothing else. (A whole mesh would give the same stress, or buckle.)
 
+    Between the lubricated walls of a confining chamber, and in a sheet that is stretched alike along two axes, the
+    state is homogeneous too: all nodes of that element follow along the axes across z.
+
     Mechanisms act in full before anything is imposed, between platens that stand as far apart as the specimen was
     high: what swells then presses on them.
 
@@ -121,6 +126,8 @@ class Rig:
     options : EquilibriumOptions, optional
     elements : str, optional
         As of `Model`, of glued specimens; by default as `choose_elements` says.
+    mode : str, optional
+        One of `HOMOGENEOUS`, the only one of the rig's tests then.
 
     Attributes
     ----------
@@ -142,14 +149,15 @@ class Rig:
         precision: str = "double",
         options: EquilibriumOptions | None = None,
         elements: str | None = None,
+        mode: str = "",
     ) -> None:
-        self.case = case
+        self.case, self._mode = case, mode
         self._turned: dict[str, Rig] = {}
         self._like_this = (device, precision, options)
         self.specimen = specimen_of(case)
-        glued = self.specimen.grips == "glued"
+        glued = self._glued = self.specimen.grips == "glued" and not mode
         mesh = case.mesh if glued else _homogeneous(case.mesh.volume, self.specimen.size[2])
-        model = _model(case, self.specimen, mesh)
+        model = _model(case, glued, mesh, mode)
         #: Why the elements of a glued specimen were chosen; None if they were asked for.
         self.chosen: str | None = None
         if glued and elements is None:
@@ -158,6 +166,8 @@ class Rig:
         self.system = System(replace(model, elements=elements) if glued and elements else model, device, precision)
         self.solver = EquilibriumSolver(self.system, options)
         self._top = mesh.node_sets["top"]
+        #: Nodes that follow what is imposed.
+        self._led = np.ones(len(mesh.points), dtype=bool) if mode == "biaxial" else self._top
         self._area = mesh.volume / self.specimen.size[2]
         self._shortest = min((t.forgets_in for t in self.system.terms if t.forgets_in is not None), default=None)
 
@@ -169,15 +179,16 @@ class Rig:
     def check(self, recording: TestRecording) -> None:
         """`InputError` if the grips cannot transmit a test, it presses the specimen to nothing, or it has no times."""
         who = f"{self.case.path}: [[recording]] '{recording.name}'"
-        if self.specimen.grips == "lubricated" and recording.mode != "axial":
-            raise InputError(f"{who} mode '{recording.mode}': lubricated grips slide, nothing transmits it")
+        if why := not_transmitted(self.specimen.grips, recording.mode):
+            raise InputError(f"{who} mode '{recording.mode}': {why}")
         if self._shortest is not None and recording.time is None:
             raise InputError(
                 f"{who} file '{recording.file}': no column t, and what has a memory ([[mechanism]] viscoelasticity) "
                 "cannot do without times"
             )
         lowest, height = float(recording.imposed.min()), self.specimen.size[2]
-        if recording.mode == "axial" and recording.quantities[0] == "displacement" and lowest <= -height:
+        pressed = recording.mode in ("axial", "confined")
+        if pressed and recording.quantities[0] == "displacement" and lowest <= -height:
             raise InputError(
                 f"{who}: found a displacement of {1000.0 * lowest:g} mm, expected more than -{1000.0 * height:g} mm, "
                 "the height of the specimen"
@@ -213,12 +224,13 @@ class Rig:
             turned = tuple(mechanism.turned(recording.turn) for mechanism in self.case.mechanisms)
         except InputError as error:
             raise InputError(f"{self.case.path}: [[recording]] '{recording.name}' axis: {error}") from None
-        key = repr(turned)
-        if key == repr(self.case.mechanisms):
+        mode = recording.mode if recording.mode in HOMOGENEOUS else ""
+        key = f"{mode} {turned!r}"
+        if key == f"{self._mode} {self.case.mechanisms!r}":
             return self
         if key not in self._turned:
-            elements = self.system.model.elements if self.specimen.grips == "glued" else None
-            rig = Rig(replace(self.case, mechanisms=turned), *self._like_this, elements)
+            elements = self.system.model.elements if self._glued and not mode else None
+            rig = Rig(replace(self.case, mechanisms=turned), *self._like_this, elements, mode)
             rig.solver.clock = self.solver.clock
             self._turned[key] = rig
         return self._turned[key]
@@ -271,7 +283,7 @@ class Rig:
         return _State(value, response, len(found.history), min_J, found.unstable_iterations)
 
     def _impose(self, recording: TestRecording, value: float) -> None:
-        prescribed = np.where(self._top[:, None], self._platen(recording, value), 0.0)
+        prescribed = np.where(self._led[:, None], self._platen(recording, value), 0.0)
         model = self.system.model
         # what a system is made from does not hold the prescribed values: only its solver asks the model for them
         self.system.model = replace(model, prescribed=prescribed * model.constrained)
@@ -306,7 +318,9 @@ class Rig:
         """Displacement (n, 3) [m] that the upper platen would give to each node."""
         points = self.system.model.mesh.points
         u = np.zeros_like(points)
-        if recording.mode == "axial":
+        if recording.mode == "biaxial":
+            u[:, :2] = (value - 1.0) * points[:, :2]
+        elif recording.mode in ("axial", "confined"):
             u[:, 2] = value if recording.quantities[0] == "displacement" else (value - 1.0) * self.specimen.size[2]
         elif recording.mode == "shear":
             u[:, 0] = value
@@ -318,8 +332,13 @@ class Rig:
     def _response(self, recording: TestRecording, u: Floats, internal: Floats) -> float:
         """With what the upper platen acts on the specimen: a force [N] along z or x, a stress [Pa], or a torque [N m].
 
+        Of a sheet the nominal stress along x, `sum f_x X / V`.
+
         Positive in tension, and along a positive shear or rotation.
         """
+        if recording.mode == "biaxial":
+            mesh = self.system.model.mesh
+            return float(internal[:, 0] @ mesh.points[:, 0]) / mesh.volume
         force = internal[self._top]
         if recording.mode == "torsion":
             x, y = (self.system.model.mesh.points + u)[self._top, :2].T
@@ -429,10 +448,23 @@ def _homogeneous(volume: float, height: float) -> TetMesh:
     return TetMesh(points, np.array([[0, 1, 2, 3]]), node_sets={"bottom": bottom, "top": ~bottom})
 
 
-def _model(case: Case, specimen: Specimen, mesh: TetMesh) -> Model:
-    """The specimen held by its grips, at rest."""
+def not_transmitted(grips: str, mode: str) -> str:
+    """Why grips cannot impose a mode, in words; empty if they can."""
+    if grips == "lubricated" and mode in ("shear", "torsion"):
+        return "lubricated grips slide, nothing transmits it"
+    if grips == "glued" and mode == "biaxial":
+        return "ends that are glued to platens do not widen"
+    return ""
+
+
+def _model(case: Case, glued: bool, mesh: TetMesh, mode: str) -> Model:
+    """The specimen held by its grips, or in one of the homogeneous modes, at rest."""
     top, bottom = mesh.node_sets["top"], mesh.node_sets["bottom"]
-    if specimen.grips == "glued":
+    if mode:
+        constrained = np.ones(mesh.points.shape, dtype=bool)
+        # the free faces of a sheet
+        constrained[top, 2] = mode != "biaxial"
+    elif glued:
         constrained = np.repeat((top | bottom)[:, None], 3, axis=1)
     else:
         # the platens, and what keeps the lower face from moving and turning on its own; the upper one slides sideways,

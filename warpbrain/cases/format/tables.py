@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from warpbrain.cases.format.keys import Key, Table
-from warpbrain.frame import AXES, METRES
+from warpbrain.frame import AXES, METRES, PASCALS
 from warpbrain.physics.laws import FORMULATIONS, LAWS
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 
 ORIGINS = ("measured", "stand-in", "synthetic")
 ROLES = ("fit", "check")
-MODES = ("axial", "shear", "torsion")
+MODES = ("axial", "shear", "torsion", "confined", "biaxial")
 GRIPS = ("glued", "lubricated")
+STRESSES = ("nominal", "cauchy")
 
 #: Groups of the generative model: method and anatomy of the published strain-energy functions.
 PRIOR_GROUPS = tuple(
@@ -238,6 +239,14 @@ RECORDING = Table(
         "force": (Key("boundary", ("text",), "Name of the boundary that acts with it.", needed=True),),
         "test": (
             Key("mode", ("text",), "How the specimen was loaded.", needed=True, choices=MODES),
+            Key(
+                "stress",
+                ("text",),
+                "What the column stress is: force over the area at rest, or over that of an incompressible specimen; "
+                "nominal if absent.",
+                choices=STRESSES,
+            ),
+            Key("unit", ("text",), "Unit of the column stress; Pa if absent.", choices=tuple(PASCALS)),
             Key("specimen", ("text",), "Which one was tested, where tests are of several of one shape."),
             Key("axis", ("vector",), "Direction of the tissue along the machine's axis z; z if absent."),
             Key(

@@ -27,7 +27,7 @@ from warpbrain.simulation.history import corners_of, history_of
 #: the first step of a rest takes: how rows are chosen.
 _STEPS, _ROWS, _FIRST = 4, 60, 0.005
 #: Strain at rest, of each mode.
-REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0}
+REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0, "confined": 1.0, "biaxial": 1.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,7 +237,7 @@ test_of.__test__ = False  # type: ignore[attr-defined]  # not a test of pytest's
 def strain_of(specimen: Specimen, mode: str, quantity: str, imposed: Floats) -> Floats:
     """Stretch or shear of what was imposed."""
     height = specimen.size[2]
-    if mode == "axial":
+    if REST[mode] == 1.0:
         return imposed if quantity == "stretch" else 1.0 + imposed / height
     return imposed / height if mode == "shear" else imposed * radius_of(specimen) / height
 
