@@ -108,6 +108,17 @@ def test_what_is_wrong_is_named(tmp_path, old, new, expected):
     assert any(expected in str(problem) for problem in found), found
 
 
+def test_a_force_controlled_test_is_read_and_written(tmp_path):
+    text = CASE.replace('mode = "axial"', 'mode = "axial"\ncontrol = "force"\nsigma = 0.01')
+    case = read_case(write(tmp_path / "a", text))
+    [test] = case.recordings
+    assert test.controlled[0] == "force" and test.answer[0] == "displacement"
+    # noise of what was read, a displacement in mm
+    assert test.sigma == pytest.approx(1e-5)
+    again = read_case(write_case(tmp_path / "b", case)).recordings[0]
+    assert again.control == "force" and again.sigma == pytest.approx(1e-5)
+
+
 STRESSES = "stretch,stress\n1.0,0.0\n0.9,-400.0\n0.8,-1000.0\n1.25,700.0\n"
 
 

@@ -18,6 +18,7 @@ from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, SolveError
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
 from warpbrain.physics.mechanisms.gravity import Gravity
+from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.specimen import Rig, compare_test, imposed_values, simulate_test
@@ -101,6 +102,44 @@ def test_one_element_says_what_the_whole_mesh_says(device: str) -> None:
     model = Model(mesh, {1: BRAIN}, constrained=constrained, prescribed=prescribed)
     whole = solve_equilibrium(System(model, device), EXACT).internal[top, 2].sum()
     assert at_end(specimen, "axial", (stretch - 1.0) * specimen.size[2], device) == pytest.approx(whole, rel=1e-8)
+
+
+# -- forces that are imposed -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("read", [0.3, 1.0, 1.1])
+@pytest.mark.parametrize("mode", ["axial", "stretch", "confined"])
+def test_what_answers_a_force_inverts_the_closed_form(mode: str, read: float, device: str, verify: Row) -> None:
+    """Stretches at which closed forms have the stresses that are imposed; what was read of them is up to 70 % off."""
+    specimen = replace(DISC, grips="lubricated")
+    l = np.array([0.75, 0.9, 1.05, 1.2])
+    stress = np.array([uniaxial(BRAIN, value) for value in l])
+    if mode == "confined":
+        stress = 1000.0 * (l - 1.0 / l) + BRAIN.volumetric_modulus * np.log(l) / l
+    height, area = specimen.size[2], 0.25 * np.pi * specimen.size[0] ** 2
+    length, force = (height, area) if mode == "axial" else (1.0, 1.0)
+    rest = 0.0 if mode == "axial" else 1.0
+    imposed = rest + read * length * (l - 1.0)
+    test = replace(recorded(mode, imposed, (force * stress).tolist()), control="force", sigma=1e-4)
+    found = simulate_test(case_of(specimen), test, device, options=EXACT, steps=16)
+    expected = rest + length * (l - 1.0)
+    error = float(np.abs(found.predicted - expected).max() / np.abs(expected - rest).max())
+    # between computed states the curve is interpolated
+    verify(f"{mode} test under force, {read} of the motion read", "inverse of the closed form", error, 2e-3)
+    compared = compare_test(test, found)
+    assert compared.unit == ("m" if mode == "axial" else "")
+    assert compared.after.largest == pytest.approx(np.abs(imposed - found.predicted).max())
+    assert compared.before.largest == pytest.approx(np.abs(imposed - rest).max())
+
+
+def test_a_force_that_nothing_answers_is_said(device: str) -> None:
+    pulled = replace(recorded("stretch", [1.02], [1e6]), control="force")
+    with pytest.raises(SolveError, match="no stretch within 4 times what was read answers a stress of 1e"):
+        simulate_test(case_of(replace(DISC, grips="lubricated")), pulled, device)
+    memory = (Viscoelasticity(moduli=(1.0,), times=(3.0,)),)
+    timed = replace(recorded("stretch", [1.0, 1.02], [0.0, 50.0]), control="force", time=np.array([0.0, 1.0]))
+    with pytest.raises(InputError, match="control 'force': a specimen with a memory"):
+        simulate_test(replace(case_of(CUBE), mechanisms=memory), timed, device)
 
 
 # -- confined compression, and a sheet stretched alike along two axes: homogeneous whatever the grips -----------------

@@ -233,6 +233,7 @@ def read_test(
     specimen: str = "",
     stress: str = "nominal",
     unit: str = "Pa",
+    control: str = "displacement",
 ) -> TestRecording | None:
     """Read a laboratory test from ``.csv``.
 
@@ -246,7 +247,7 @@ def read_test(
     problems, name, file, role
         As in `read_points`.
     sigma : float or None
-        Noise of the response, in its unit.
+        Noise of what the specimen answered, in the unit of its column.
     mode : {"axial", "shear", "torsion", "confined", "biaxial"}
     specimen : str
         Which one was tested, of several.
@@ -254,6 +255,8 @@ def read_test(
         What the column ``stress`` is; see `nominal_stress`.
     unit : str
         Of that column, of `PASCALS`.
+    control : {"displacement", "force"}
+        What the machine imposed.
 
     Returns
     -------
@@ -273,20 +276,21 @@ def read_test(
         response = table.numbers(pair[1])
         if pair[1] == "stress":
             response = PASCALS[unit] * nominal_stress(mode, imposed, response, stress)
-            sigma = None if sigma is None else PASCALS[unit] * sigma
     if found:
         return None
+    of_answer = {"stress": PASCALS[unit], "displacement": frame.metres}.get(pair[control != "force"], 1.0)
     return TestRecording(
         name=name,
         file=file,
         role=role,
-        sigma=sigma,
+        sigma=None if sigma is None else of_answer * sigma,
         mode=mode,
         quantities=pair,
         imposed=imposed,
         response=response,
         time=time,
         specimen=specimen,
+        control=control,
     )
 
 

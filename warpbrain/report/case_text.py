@@ -79,8 +79,9 @@ def recording_line(recording: Recording) -> str:
     """One line about a recording."""
     head = f"{recording.name}: {count_of(recording)} "
     role = "" if recording.role == "fit" else "; only checked, never fitted"
-    unit = "mm" if isinstance(recording, PointsRecording | SurfaceRecording) else ""
-    scale = 1000.0 if unit else 1.0
+    lengths = isinstance(recording, PointsRecording | SurfaceRecording)
+    lengths |= isinstance(recording, TestRecording) and recording.answer[0] == "displacement"
+    scale, unit = (1000.0, "mm") if lengths else (1.0, "")
     noise = f"; noise {scale * recording.sigma:g} {unit}".rstrip() if recording.sigma is not None else ""
     if isinstance(recording, PointsRecording):
         sizes = np.linalg.norm(recording.displacement, axis=1)

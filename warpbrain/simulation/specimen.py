@@ -38,6 +38,8 @@ Bools = NDArray[np.bool_]
 
 #: Imposed values from rest to the farther extreme of a test.
 STEPS = 8
+#: How many times as far as was read a specimen is followed for a force that was imposed.
+_FARTHER = 4
 #: Modes whose states are homogeneous whatever the grips are.
 HOMOGENEOUS = ("confined", "biaxial")
 #: Quantities of tests as people read them: the factor from SI and the unit.
@@ -61,7 +63,7 @@ class TestResult:
         The computed curve, `imposed` increasing and with the value at rest among it, or in the order of `time`, in the
         units of the recording's quantities.
     predicted : (n,) array
-        The response at the rows of the recording.
+        The response at the rows of the recording; of a force-controlled test the displacement (stretch, angle).
     residuals : (n,) array
         Recorded less predicted.
     newton : (k,) int array
@@ -181,6 +183,11 @@ class Rig:
         who = f"{self.case.path}: [[recording]] '{recording.name}'"
         if why := not_transmitted(self.specimen.grips, recording.mode):
             raise InputError(f"{who} mode '{recording.mode}': {why}")
+        if recording.force_controlled and self.follows_time(recording):
+            raise InputError(
+                f"{who} control 'force': a specimen with a memory or a ramp is followed under displacements alone; "
+                "`warpbrain diagnose` takes the test, by the stress at what was read"
+            )
         if self._shortest is not None and recording.time is None:
             raise InputError(
                 f"{who} file '{recording.file}': no column t, and what has a memory ([[mechanism]] viscoelasticity) "
@@ -253,7 +260,30 @@ class Rig:
                 states.append(self._state(recording, value, found))
                 if on_state is not None:
                     on_state((len(states) - 1) / sum(map(len, sides)))
+        if recording.force_controlled:
+            states += self._farther(recording, states, rest, steps)
         return _result(recording, sorted(states, key=lambda state: state.imposed))
+
+    def _farther(self, recording: TestRecording, states: Sequence[_State], rest: float, steps: int) -> list[_State]:
+        """States beyond what was read, until all forces that were imposed are answered."""
+        found: list[_State] = []
+        reach = max(float(np.abs(recording.imposed - rest).max()), np.finfo(float).tiny)
+        for sign, force in ((-1.0, float(recording.response.min())), (1.0, float(recording.response.max()))):
+            last = max(states, key=lambda state: sign * state.imposed)
+            u: Floats | None = None
+            for _ in range(_FARTHER * steps):
+                if sign * last.response >= sign * force:
+                    break
+                value = last.imposed + sign * reach / steps
+                state = self._equilibrium(recording, value, last.imposed, u)
+                u, last = state.u, self._state(recording, value, state)
+                found.append(last)
+            else:
+                raise SolveError(
+                    f"test '{recording.name}' ({recording.mode}): no {recording.quantities[0]} within {_FARTHER} times "
+                    f"what was read answers a {recording.quantities[1]} of {force:.4g}"
+                )
+        return found
 
     def _through_time(
         self, recording: TestRecording, rest: float, steps: int, on_state: Callable[[float], None] | None
@@ -360,15 +390,20 @@ def simulate_test(
 
 
 def compare_test(recording: TestRecording, result: TestResult) -> Comparison:
-    """A test beside its simulation; the residuals have one column, and before is a specimen that resists nothing."""
-    unit = SHOWN[recording.quantities[1]][1]
-    before, after = recording.response[:, None], result.residuals[:, None]
+    """A test beside its simulation; the residuals have one column.
+
+    Before is a specimen that resists nothing, or that no force moves.
+    """
+    quantity, recorded = recording.answer
+    unit = "m" if quantity == "displacement" else SHOWN[quantity][1]
+    rest = 1.0 if quantity == "stretch" else 0.0
+    before, after = (recorded - rest)[:, None], result.residuals[:, None]
     return Comparison(
         name=recording.name,
         kind=recording.kind,
         role=recording.role,
         unit=unit,
-        rows=np.arange(len(recording.response)),
+        rows=np.arange(len(recorded)),
         before=Error.of(before, unit),
         after=Error.of(after, unit),
         residuals_before=before,
@@ -399,11 +434,23 @@ def interpolated(imposed: Floats, response: Floats, rows: Floats) -> Floats:
     return np.asarray(PchipInterpolator(imposed, response)(rows), dtype=np.float64)
 
 
+def _inverted(recording: TestRecording, imposed: Floats, response: Floats) -> Floats:
+    """What answers the forces of a test (n,), by a curve that must rise."""
+    if len(imposed) > 1 and not (np.diff(response) > 0.0).all():
+        raise SolveError(
+            f"test '{recording.name}' ({recording.mode}): the {recording.quantities[1]} does not rise with the "
+            f"{recording.quantities[0]}: under a force the specimen is not stable"
+        )
+    return interpolated(response, imposed, recording.response)
+
+
 def _result(recording: TestRecording, states: Sequence[_State], history: History | None = None) -> TestResult:
     """States in the order of their imposed values, or of their times, at the rows of the recording."""
     imposed = np.array([state.imposed for state in states])
     response = np.array([state.response for state in states])
-    if history is None or recording.time is None:
+    if recording.force_controlled:
+        predicted = _inverted(recording, imposed, response)
+    elif history is None or recording.time is None:
         predicted = interpolated(imposed, response, recording.imposed)
     else:
         predicted = history.interpolated(response, recording.time)
@@ -411,7 +458,7 @@ def _result(recording: TestRecording, states: Sequence[_State], history: History
         imposed=imposed,
         response=response,
         predicted=predicted,
-        residuals=recording.response - predicted,
+        residuals=recording.answer[1] - predicted,
         newton=np.array([state.newton for state in states]),
         min_J=np.array([state.min_J for state in states]),
         unstable_iterations=sum(state.unstable_iterations for state in states),

@@ -12,6 +12,7 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
+from warpbrain.worlds.specimen.protocol import protocol_of
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 #: End friction asks for finite elements; what is looked for is not that.
@@ -61,6 +62,24 @@ def test_a_viscous_rod_is_told_by_its_cycles():
     assert values["moduli"].value == pytest.approx(1.5, rel=0.15)
     assert values["times"].value == pytest.approx(12.0, rel=0.2)
     assert found.where is not None and found.where.time is not None
+
+
+def test_a_rod_under_forces_is_read_with_the_noise_of_its_stretch():
+    """Forces are exact, stretches are read with noise; a neo-Hookean rod has nothing missing, an Ogden one has."""
+    for law, named in ((neo_hookean, []), (lambda l: ogden(l, -15.0), ["asymmetry"])):
+        rng = np.random.default_rng(5)
+        tests = []
+        for test in static(law, rng):
+            stress = law(test.imposed)
+            read = test.imposed + 0.001 * rng.normal(size=len(stress))
+            tests.append(replace(test, imposed=read, response=stress, control="force", sigma=0.001))
+        # 0.001 of stretch is so much of stress, by the secant
+        protocol = protocol_of(ROD, tests)
+        for test in protocol.tests:
+            assert test.sigma == pytest.approx(0.001 * test.peak / test.reach)
+        found = diagnosed(tests)
+        assert [one.name for one in found.named] == named
+        assert named or found.verdict == "nothing missing"
 
 
 @pytest.mark.parametrize("poisson", [0.40, 0.45, 0.48])

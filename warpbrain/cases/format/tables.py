@@ -13,6 +13,7 @@ ROLES = ("fit", "check")
 MODES = ("axial", "shear", "torsion", "confined", "biaxial")
 GRIPS = ("glued", "lubricated")
 STRESSES = ("nominal", "cauchy")
+CONTROLS = ("displacement", "force")
 
 #: Groups of the generative model: method and anatomy of the published strain-energy functions.
 PRIOR_GROUPS = tuple(
@@ -247,6 +248,13 @@ RECORDING = Table(
                 choices=STRESSES,
             ),
             Key("unit", ("text",), "Unit of the column stress; Pa if absent.", choices=tuple(PASCALS)),
+            Key(
+                "control",
+                ("text",),
+                "What the machine imposed, a displacement (stretch, angle) or a force (stress, torque); sigma is of "
+                "the other; displacement if absent.",
+                choices=CONTROLS,
+            ),
             Key("specimen", ("text",), "Which one was tested, where tests are of several of one shape."),
             Key("axis", ("vector",), "Direction of the tissue along the machine's axis z; z if absent."),
             Key(

@@ -97,6 +97,7 @@ def _test(context: Context, table: Reading, sets: NodeSets | None, boundaries: s
         specimen=table.get("specimen", ""),
         stress=table.get("stress", "nominal"),
         unit=table.get("unit", "Pa"),
+        control=table.get("control", "displacement"),
     )
     if found is None:
         return None
