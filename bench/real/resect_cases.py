@@ -61,7 +61,7 @@ nodes = "fixed"
 kind = "fixed"
 
 [[boundary]]                   # the dura was closed: the brain cannot leave the skull, and slides along it
-name = "skull"
+name = "surface under the dura"
 nodes = "resect/skull-{tissue}.csv"
 kind = "sliding"
 
