@@ -74,7 +74,7 @@ def displacement(estimate: Estimate) -> Floats:
 
 def experiment(tissue: str, repetitions: int, options: EstimationOptions | None = None) -> dict[str, Any]:
     """One tissue mode."""
-    options = options or EstimationOptions(registration=None)
+    options = options or EstimationOptions(registration=False)
     with (RESULTS / f"phantom_truth_{tissue}.csv").open(encoding="utf-8") as file:
         table = np.array([[float(value) for value in row] for row in list(csv.reader(file))[1:]])
     points, u, case = 0.001 * table[:, :3], 0.001 * table[:, 3:], pressed(tissue)
@@ -148,7 +148,7 @@ def same_mesh(tissue: str) -> dict[str, Any]:
     seen = observed(case, points, moved, 0, sigma=0.0)
     # a prior pulls a little where noise is stated that there is none of: stated small
     recording = replace(seen.recordings[0], sigma=1e-5)  # type: ignore[type-var]
-    options = EstimationOptions(discretisation=None, registration=None)
+    options = EstimationOptions(discretisation=None, registration=False)
     found = Estimation(replace(seen, recordings=(recording,)), None, options, "cpu").run()
     return {
         "tissue": tissue,

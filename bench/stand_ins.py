@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from phantom_truth import RESULTS
 
-from warpbrain.cases.shipped import SHIPPED, find_case
+from warpbrain.cases.shipped import STAND_INS, find_case
 from warpbrain.errors import SolveError
 from warpbrain.estimation.estimate import Estimation
 from warpbrain.estimation.likelihood import Likelihood
@@ -56,7 +56,7 @@ def main() -> None:
     """All of them."""
     done = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else []
     for tissue, noise in WAYS:
-        for name in [name for name in SHIPPED if not name.startswith("phantom")]:
+        for name in STAND_INS:
             if any((d["case"], d["tissue"], d["noise"]) == (name, tissue, noise) for d in done):
                 continue
             done.append(estimated(name, tissue, noise))

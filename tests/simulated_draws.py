@@ -21,7 +21,6 @@ from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.estimate import estimate
 from warpbrain.estimation.forward import Forward, State
 from warpbrain.estimation.options import EstimationOptions
-from warpbrain.estimation.registration import Registration
 from warpbrain.gp.prior import Prior
 from warpbrain.inference.noise import noise_factor, outliers, scales
 from warpbrain.mesh import TetMesh, nodes_of
@@ -29,6 +28,7 @@ from warpbrain.mesh.refinement import refined
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import PointsRecording
+from warpbrain.recordings.registration import Registration
 
 Floats = NDArray[np.float64]
 
@@ -156,12 +156,13 @@ def ranks(setting: Setting, count: int, seed: int = 0) -> Floats:
         recording = record(case.mesh, truths, truth, sigma, registration, rng)
         options = EstimationOptions(
             discretisation=Discretisation() if setting.other_elements else None,
-            registration=registration,
+            registration=setting.registration,
             samples=25,
             seed=number,
         )
+        seen = replace(case, recordings=(recording,), registration=registration)
         try:
-            posterior = estimate(replace(case, recordings=(recording,)), prior(setting.tissues), options, "cpu")
+            posterior = estimate(seen, prior(setting.tissues), options, "cpu")
         except SolveError:
             continue
         found[number] = posterior.probability_below(truth.theta)

@@ -16,6 +16,8 @@ QUANTITIES = {
     "stretch": ("stretch", "stress"),
     "shear": ("displacement", "force"),
     "torsion": ("angle", "torque"),
+    "confined": ("stretch", "stress"),
+    "biaxial": ("stretch", "stress"),
 }
 CUBE = Specimen("block", (5e-3, 5e-3, 5e-3), "glued")
 BRAIN = Material(NeoHookean(1000.0), 0.45)

@@ -44,6 +44,26 @@ WRONG = {
         r"\[case\] gravity_axis: .* not all zero, found \[0, 0, 0\]",
     ),
     "axis": (('"RAS"', '"RAS"\ngravity_axis = "down"'), r"\[case\] gravity_axis: expected 3 finite numbers"),
+    "registration": (
+        ('"RAS"', '"RAS"\nregistration = 2.0'),
+        r"\[case\] registration: expected a table, found 2.0 \(registration = \{ mm = 2.0, degrees = 1.0 \}\)",
+    ),
+    "registration mm": (
+        ('"RAS"', '"RAS"\nregistration = { mm = 0, degrees = 1.0 }'),
+        r"\[case\] registration: mm: found 0, expected a positive number \[mm\]",
+    ),
+    "registration degrees": (
+        ('"RAS"', '"RAS"\nregistration = { mm = 1, degrees = "one" }'),
+        r"\[case\] registration: degrees: expected a finite number \[degrees\], found 'one'",
+    ),
+    "registration half": (
+        ('"RAS"', '"RAS"\nregistration = { mm = 1 }'),
+        r"\[case\] registration: degrees: missing, found \{'mm': 1\}",
+    ),
+    "registration key": (
+        ('"RAS"', '"RAS"\nregistration = { mm = 1, degrees = 1, deg = 2 }'),
+        r"\[case\] registration: deg: unknown key, expected mm, degrees",
+    ),
     "model": (('"neo-hookean"', '"fung"'), r"\[tissue.1\] model: found 'fung', expected one of neo-hookean"),
     "formulation": ((SECOND_LAW, 'mu = 1.0\nformulation = "mixed"'), r"\[tissue.2\] formulation: found 'mixed'"),
     "zero mu": (("mu = 1000.0", "mu = 0"), r"\[tissue.1\]: .*mu = 0"),

@@ -13,6 +13,8 @@ Floats = NDArray[np.float64]
 
 #: Metres of one unit of length.
 METRES = {"m": 1.0, "mm": 1e-3}
+#: Pascals of one unit of stress.
+PASCALS = {"Pa": 1.0, "kPa": 1e3}
 #: Signs that turn a file's axes into RAS (x right, y anterior, z superior); LPS has x left and y posterior.
 AXES = {"RAS": (1.0, 1.0, 1.0), "LPS": (-1.0, -1.0, 1.0)}
 

@@ -10,10 +10,11 @@ from wrong_cases import FORCE, GRAVITY, SECOND_LAW, WRONG
 
 from warpbrain.cases.boundary import Fixed, Forced
 from warpbrain.cases.reading import read_case
-from warpbrain.cases.shipped import SHIPPED, find_case
+from warpbrain.cases.shipped import RESECT, SHIPPED, STAND_INS, find_case
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh, write_mesh
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
+from warpbrain.recordings.registration import Registration
 from warpbrain.simulation.of_case import model_of
 
 
@@ -52,6 +53,12 @@ def test_everything_is_read(tmp_path):
     )
     # the file itself may be named, too
     assert read_case(tmp_path / "case.toml").name == "block"
+
+
+def test_the_accuracy_of_a_registration_is_in_mm_and_degrees(tmp_path):
+    assert read_case(write_folder(tmp_path / "none")).registration is None
+    head = ('axes = "RAS"', 'axes = "RAS"\nregistration = { mm = 2.5, degrees = 180 }')
+    assert read_case(write_folder(tmp_path / "declared", head)).registration == Registration(0.0025, np.pi)
 
 
 def test_what_may_be_left_out(tmp_path):
@@ -285,10 +292,9 @@ def test_a_file_that_is_no_mesh(tmp_path, capfd, name, content):
 @pytest.mark.parametrize("tissue", ["single", "multi"])
 def test_shipped_cases(name, tissue):
     case = find_case(name, tissue)
-    clinical = not name.startswith("phantom")
     assert sorted(case.tissues) == ([1] if tissue == "single" else [1, 2])
-    assert case.origin == ("stand-in" if clinical else "synthetic")
-    assert (case.resection is not None) == clinical
+    assert case.origin == ("stand-in" if name in STAND_INS else "measured" if name in RESECT else "synthetic")
+    assert (case.resection is not None) == (name in STAND_INS)
 
 
 def test_single_tissue_of_a_folder_is_a_file_of_its_own(tmp_path):

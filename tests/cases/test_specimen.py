@@ -84,7 +84,15 @@ def test_a_specimen_is_read_and_written(tmp_path):
         ("radius = 4.0", "radius = -4.0", "[specimen] radius: found -4, expected a positive number [units]"),
         ("radius = 4.0", "size = [1, 2, 3]", "[specimen] size: means nothing with shape 'cylinder'"),
         ("radius = 4.0", "radius = 4000.0", "[specimen] shape: 8000 long and 4.541 thick: too slender"),
-        ('"axial"', '"bending"', "[recording 1] mode: found 'bending', expected one of axial, shear, torsion"),
+        (
+            '"axial"',
+            '"bending"',
+            "[recording 1] mode: found 'bending', expected one of axial, shear, torsion, confined",
+        ),
+        ('"axial"', '"axial"\nunit = "MPa"', "[recording 1] unit: found 'MPa', expected one of Pa, kPa"),
+        ('"axial"', '"axial"\nstress = "true"', "[recording 1] stress: found 'true', expected one of nominal, cauchy"),
+        ('"axial"', '"axial"\nunit = "kPa"', "[recording 1] unit: means nothing of displacement and force"),
+        ("mu = 1000.0", "mu = 10.0e6", "[recording 1] file: the force is 0.00075 times what the declared tissue"),
         (
             'kind = "test"\nmode = "axial"',
             'kind = "points"',
@@ -98,3 +106,53 @@ def test_what_is_wrong_is_named(tmp_path, old, new, expected):
     assert old in CASE
     found = check_case(write(tmp_path, CASE.replace(old, new))).problems
     assert any(expected in str(problem) for problem in found), found
+
+
+def test_a_force_controlled_test_is_read_and_written(tmp_path):
+    text = CASE.replace('mode = "axial"', 'mode = "axial"\ncontrol = "force"\nsigma = 0.01')
+    case = read_case(write(tmp_path / "a", text))
+    [test] = case.recordings
+    assert test.controlled[0] == "force" and test.answer[0] == "displacement"
+    # noise of what was read, a displacement in mm
+    assert test.sigma == pytest.approx(1e-5)
+    again = read_case(write_case(tmp_path / "b", case)).recordings[0]
+    assert again.control == "force" and again.sigma == pytest.approx(1e-5)
+
+
+STRESSES = "stretch,stress\n1.0,0.0\n0.9,-400.0\n0.8,-1000.0\n1.25,700.0\n"
+
+
+@pytest.mark.parametrize("mode", ["axial", "confined"])
+@pytest.mark.parametrize("stress", ["nominal", "cauchy"])
+@pytest.mark.parametrize("unit", ["Pa", "kPa"])
+def test_stresses_become_nominal_ones_in_pascals(tmp_path, mode, stress, unit):
+    mu = {"Pa": "1000.0", "kPa": "1.0e6"}[unit]
+    keys = f'mode = "{mode}"\nstress = "{stress}"\nunit = "{unit}"\nsigma = 5.0'
+    text = CASE.replace('mode = "axial"', keys).replace("mu = 1000.0", f"mu = {mu}")
+    case = read_case(write(tmp_path / "a", text, STRESSES))
+    [test] = case.recordings
+    factor, stretch, values = {"Pa": 1.0, "kPa": 1e3}[unit], test.imposed, np.array([0.0, -400.0, -1000.0, 700.0])
+    # between walls the area stays; else it is that of an incompressible specimen, 1 / stretch of that at rest
+    area = 1.0 / stretch if (stress, mode) == ("cauchy", "axial") else 1.0
+    np.testing.assert_allclose(test.response, factor * values * area)
+    assert test.sigma == factor * 5.0
+    # written as nominal stresses in pascals, without the keys
+    again = read_case(write_case(tmp_path / "b", case)).recordings[0]
+    np.testing.assert_allclose(again.response, test.response, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("unit", "times", "said"),
+    [("Pa", 1e-3, ("the stress is 0.00", 'perhaps unit = "kPa"')), ("kPa", 1.0, ("the stress is 1", 'unit = "Pa"'))],
+)
+def test_a_stress_of_another_order_of_magnitude_is_an_error(tmp_path, unit, times, said):
+    rows = [line.split(",") for line in STRESSES.split()[1:]]
+    table = "stretch,stress\n" + "".join(f"{l},{times * float(s)}\n" for l, s in rows)
+    text = CASE.replace('mode = "axial"', f'mode = "axial"\nunit = "{unit}"')
+    [problem] = check_case(write(tmp_path, text, table)).problems
+    words = (*said, "[recording 1] unit: ", f"(mu = 1000 Pa) answers if it is in {unit}")
+    assert all(word in str(problem) for word in words), str(problem)
+    # a tissue that is ten times stiffer or softer than declared is another tissue, not another unit
+    for mu in ("100.0", "10000.0"):
+        other = text.replace("mu = 1000.0", f"mu = {mu}").replace('unit = "kPa"', 'unit = "Pa"')
+        assert not check_case(write(tmp_path, other, STRESSES)).problems

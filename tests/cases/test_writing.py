@@ -18,7 +18,7 @@ from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 
 EVERYTHING = [
-    ('axes = "RAS"', 'axes = "LPS"\ngravity_axis = [0.5, 1.0, 0.25]'),
+    ('axes = "RAS"', 'axes = "LPS"\ngravity_axis = [0.5, 1.0, 0.25]\nregistration = { mm = 2.5, degrees = 0.7 }'),
     ("mu = 1000.0", 'mu = "prior"\nprior = "hyperelastic/grey matter"'),
     ("mu = 3000.0", 'model = "ogden"\nmu = [100.0, -50.0]\nalpha = [2.0, -4.7]\nformulation = "uncoupled"'),
     (

@@ -6,7 +6,7 @@ import pytest
 from command import run, warpbrain
 from folders import write_folder, write_recorded
 
-from warpbrain.cases.shipped import SHIPPED
+from warpbrain.cases.shipped import RESECT, SHIPPED, STAND_INS
 
 
 def test_the_list_names_every_case_and_says_what_a_stand_in_is():
@@ -14,12 +14,12 @@ def test_the_list_names_every_case_and_says_what_a_stand_in_is():
     assert done.status == 0 and done.err == ""
     head, *lines = done.out.splitlines()
     assert head.split() == ["case", "tissue", "origin", "nodes", "elements", "cm3", "recordings"]
-    rows = {(line.split()[0], line.split()[1]): line.split() for line in lines if line.strip() and line[0] in "0p"}
+    rows = {(line.split()[0], line.split()[1]): line.split() for line in lines if line.strip() and line[0] in "0pr"}
     assert set(rows) == {(name, tissue) for name, variants in SHIPPED.items() for tissue in variants}
     for (name, _), row in rows.items():
-        assert row[2] == ("synthetic" if name.startswith("phantom") else "stand-in")
+        assert row[2] == ("stand-in" if name in STAND_INS else "measured" if name in RESECT else "synthetic")
         assert int(row[3]) > 2000 and int(row[4]) > 10000 and 1000 < float(row[5]) < 1700
-    assert "not the patient's images" in done.out
+    assert "not the patient's images" in done.out and "not these patients' anatomy" in done.out
 
 
 @pytest.mark.parametrize("name", ["0529", "phantom"])

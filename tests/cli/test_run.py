@@ -12,7 +12,7 @@ import pytest
 from command import Ran, run
 from folders import SIDE, block, write_folder
 
-from warpbrain.cases.shipped import SHIPPED
+from warpbrain.cases.shipped import STAND_INS
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh, write_mesh
 
@@ -342,7 +342,7 @@ def test_clinical_case(tmp_path):
 
 
 @pytest.mark.parametrize("tissue", ["single", "multi"])
-@pytest.mark.parametrize("name", [name for name in SHIPPED if not name.startswith("phantom")])
+@pytest.mark.parametrize("name", STAND_INS)
 def test_every_stand_in_runs_and_is_compared(tmp_path, name, tissue):
     ran = run(name, "--tissue", tissue, "--out", tmp_path)
     assert (ran.status, ran.err) == (0, "")

@@ -161,6 +161,10 @@ def test_gravity_has_a_level_in_millimetres_and_a_tilt_in_degrees():
             one("inclusion", ("ratio", 2.6, 0.4, ""), centre=np.array([0.01, -0.02, 0.0]), radius=0.018),
             "It lies about (10, -20, 0) mm, within 18 mm.",
         ),
+        (
+            one("inclusion", ("ratio", 2.6, 0.4, ""), centre=np.array([0.00123, -0.002, 0.0]), radius=0.00052),
+            "It lies about (1.2, -2.0, 0.0) mm, within 0.5 mm.",
+        ),
     ],
 )
 def test_sizes_in_words(found, said):

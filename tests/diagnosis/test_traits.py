@@ -34,7 +34,7 @@ def test_a_force_from_outside_is_found_with_its_size(number: int, small_diagnosi
     found, _ = traits(small_diagnosis, force, number, within=False)
     assert found.outside
     assert np.all(np.abs(found.force - force) < 3.5 * found.force_sd)
-    assert "from outside" in traits_in_words(found)
+    assert "from outside" in traits_in_words(found, 0.06)
 
 
 @pytest.mark.parametrize("number", [0, 7, 13])
@@ -42,7 +42,7 @@ def test_forces_within_have_no_net_force(number: int, small_diagnosis: Diagnosis
     force = np.array([0.02, -0.03, 0.04])
     found, _ = traits(small_diagnosis, force, number, within=True)
     assert np.all(np.abs(found.force) < 3.5 * found.force_sd)
-    assert found.outside == ("from outside" in traits_in_words(found))
+    assert found.outside == ("from outside" in traits_in_words(found, 0.06))
 
 
 def test_forces_that_were_recorded_do_not_hide_displacements(small_diagnosis: Diagnosis) -> None:

@@ -28,7 +28,7 @@ def concealed(monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.slow
 def test_tissue_is_found_from_another_mesh_and_another_code(concealed) -> None:
     """Of one truth and one error of the mesh: noise and points differ, so more than 95 of 100 may cover."""
-    found = concealed.experiment("single", REPETITIONS, EstimationOptions(registration=None, samples=25))
+    found = concealed.experiment("single", REPETITIONS, EstimationOptions(registration=False, samples=25))
     assert found["covered"][0] >= binom.ppf(5e-4, REPETITIONS, 0.95)
     # the mean of the estimates is within their stated error of the truth: that of the mesh is common to all
     away = np.log(found["mean_estimate_Pa"][0] / found["truth_Pa"][0])

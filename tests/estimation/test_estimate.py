@@ -14,14 +14,14 @@ from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.prior_modes import prior_of
-from warpbrain.estimation.registration import Registration
 from warpbrain.gp.prior import Prior
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.laws import Law, MooneyRivlin, NeoHookean, Ogden
 from warpbrain.recordings.recording import PointsRecording
+from warpbrain.recordings.registration import Registration
 
-EXACT = EstimationOptions(discretisation=None, registration=None, samples=25)
-WITH_ERROR_OF_MESH = EstimationOptions(registration=None, samples=25)
+EXACT = EstimationOptions(discretisation=None, registration=False, samples=25)
+WITH_ERROR_OF_MESH = EstimationOptions(registration=False, samples=25)
 TWO = {"grey": GREY, "white": WHITE}
 
 
@@ -162,8 +162,8 @@ def test_a_wrong_registration_is_found_along_with_the_tissue() -> None:
     shift, turn = np.array([0.0004, -0.0003, 0.0002]), np.array([0.0, 0.004, -0.003])
     positions = recording.points + recording.displacement
     moved = recording.displacement + shift + np.cross(turn, positions - positions.mean(axis=0))
-    seen = replace(case, recordings=(replace(recording, displacement=moved),))
-    options = replace(EXACT, registration=Registration(0.001, 0.01))
+    seen = replace(case, recordings=(replace(recording, displacement=moved),), registration=Registration(0.001, 0.01))
+    options = replace(EXACT, registration=True)
     posterior = found(seen, options)
     for (_, value, deviation), expected in zip(posterior.nuisances, [*shift, *turn], strict=True):
         assert abs(value - expected) < 3.0 * deviation < 2e-3

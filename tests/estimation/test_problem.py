@@ -16,11 +16,11 @@ from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.prior_modes import PriorMode
 from warpbrain.estimation.problem import Problem
-from warpbrain.estimation.registration import Registration
 from warpbrain.inference.noise import outliers
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
 from warpbrain.recordings.location import locate
+from warpbrain.recordings.registration import Registration
 
 THETA = np.log([1200.0, 1100.0])
 
@@ -40,7 +40,7 @@ def problem(request: pytest.FixtureRequest) -> Problem:
     mode = PriorMode(
         1.0, Gaussian(np.log([1000.0, 900.0]), np.diag([0.5, 0.6])), np.full(2, -np.inf), np.full(2, np.inf)
     )
-    nuisances = Nuisances(Discretisation(), error, Registration())
+    nuisances = Nuisances(Discretisation(), error, Registration(0.001, 0.0175))
     return Problem(forward, Observations.to_fit(case), mode, Likelihood(), nuisances)
 
 

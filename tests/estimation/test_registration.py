@@ -6,19 +6,25 @@ import numpy as np
 import pytest
 from rigid_motions import moved
 from scipy.spatial.transform import Rotation
+from simulated_draws import prior
 from synthetic import WHITE, beads, block, lid, truth
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
+from warpbrain.estimation.estimate import Estimation
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.likelihood import Likelihood, Noise, Rows
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.prior_modes import PriorMode
 from warpbrain.estimation.problem import Problem
 from warpbrain.estimation.realigned import realigned
-from warpbrain.estimation.registration import Registration, moved_back, moved_back_columns, rigid_columns
+from warpbrain.estimation.registration import moved_back, moved_back_columns, rigid_columns
+from warpbrain.recordings.registration import Registration
+from warpbrain.worlds.body.nuisances import nuisances_at
+from warpbrain.worlds.body.states import States
 
 THETA = np.log([1000.0])
 
@@ -86,16 +92,34 @@ def test_an_exact_rigid_motion_is_recovered(seed: int, surface: bool, verify) ->
     )
 
 
-def test_an_estimate_takes_the_registration_that_a_diagnosis_takes() -> None:
-    from warpbrain.estimation.options import EstimationOptions
-    from warpbrain.worlds.body.nuisances import registration_sd
+@pytest.mark.parametrize("declared", [None, Registration(0.003, 0.02)])
+def test_an_estimate_takes_the_registration_that_a_diagnosis_takes(declared, small_diagnosis, monkeypatch) -> None:
+    base = small_diagnosis.base
+    case = replace(small_diagnosis.case, registration=declared)
+    expected = np.repeat([0.001, np.radians(1.0)] if declared is None else [0.003, 0.02], 3)
 
-    registration = EstimationOptions().registration
-    assert registration is not None
-    np.testing.assert_allclose(registration.deviations, registration_sd())
+    # in a diagnosis: columns over the sensors, and the motion by which recordings were moved
+    states = States(case, "cpu")
+    nuisances = nuisances_at(base.at, states, base.state.hypothesis.theta, base.prior, base.effects, None)
+    columns = nuisances.columns[:, nuisances.part("registration")]
+    np.testing.assert_allclose(columns, base.at.sensors.rigid * expected)
+    states.motion = expected
+    np.testing.assert_allclose(states.motion_coordinates, 1.0)
+
+    # in an estimate: standard deviations of what is estimated along
+    fitted = []
+    monkeypatch.setattr(Estimation, "fit", lambda self, nuisances: fitted.append(nuisances) or 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        Estimation(replace(recorded(np.zeros(6), False), registration=declared), prior(1)).run()
+    np.testing.assert_allclose(np.sqrt(np.diag(fitted[0].prior.covariance)), expected)
 
 
 @pytest.mark.parametrize("values", [(0.0, 0.1), (0.001, -1.0), (np.nan, 0.1)])
 def test_registration_is_positive(values: tuple[float, float]) -> None:
     with pytest.raises(InputError, match="expected a positive number"):
         Registration(*values)
+
+
+def test_an_accuracy_among_options_is_refused() -> None:
+    with pytest.raises(InputError, match="how accurate it is, is said by the case"):
+        EstimationOptions(registration=Registration(0.001, 0.01))  # type: ignore[arg-type]

@@ -8,7 +8,7 @@ import pytest
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import size_in_words, smallest_in_words
 from warpbrain.physics.values import Smallest, Value
-from warpbrain.physics.words import along, measured, number, towards
+from warpbrain.physics.words import along, length, measured, number, place, towards
 
 
 @pytest.mark.parametrize(
@@ -30,6 +30,24 @@ def test_measured(value, sd, unit, said):
 def test_number():
     assert [number(v) for v in (0.0, 1234.5, 0.0123, 9.99)] == ["0", "1234", "0.012", "10.0"]
     assert number(math.inf) == "an unknown number"
+
+
+@pytest.mark.parametrize(
+    ("metres", "said"),
+    [
+        (0.0, "0.00 mm"), (0.0123, "12.30 mm"), (5.2e-4, "0.52 mm"), (9.99e-5, "0.100 mm"), (4.56e-5, "0.046 mm"),
+        (9.9e-6, "9.9 µm"), (-3.21e-7, "-0.32 µm"), (2e-10, "0.00020 µm"),
+    ],
+)  # fmt: skip
+def test_a_length_that_is_not_zero_is_not_said_to_be(metres, said):
+    assert length(metres) == said
+
+
+@pytest.mark.parametrize(
+    ("extent", "said"), [(0.17, "(1, -22, 0) mm"), (0.02, "(1, -22, 0) mm"), (4e-3, "(1.2, -21.9, 0.0) mm")]
+)
+def test_a_place_is_as_fine_as_the_body_is_small(extent, said):
+    assert place((0.00123, -0.02194, -1e-6), extent) == said
 
 
 @pytest.mark.parametrize(

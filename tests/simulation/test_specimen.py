@@ -7,7 +7,7 @@ import felupe
 import numpy as np
 import pytest
 from material_point import LAWS, MATERIALS
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 from testing_machine import BRAIN, CUBE, EXACT, case_of, recorded
 from verification_rows import Row
 
@@ -18,6 +18,7 @@ from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, SolveError
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
 from warpbrain.physics.mechanisms.gravity import Gravity
+from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.specimen import Rig, compare_test, imposed_values, simulate_test
@@ -101,6 +102,108 @@ def test_one_element_says_what_the_whole_mesh_says(device: str) -> None:
     model = Model(mesh, {1: BRAIN}, constrained=constrained, prescribed=prescribed)
     whole = solve_equilibrium(System(model, device), EXACT).internal[top, 2].sum()
     assert at_end(specimen, "axial", (stretch - 1.0) * specimen.size[2], device) == pytest.approx(whole, rel=1e-8)
+
+
+# -- forces that are imposed -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("read", [0.3, 1.0, 1.1])
+@pytest.mark.parametrize("mode", ["axial", "stretch", "confined"])
+def test_what_answers_a_force_inverts_the_closed_form(mode: str, read: float, device: str, verify: Row) -> None:
+    """Stretches at which closed forms have the stresses that are imposed; what was read of them is up to 70 % off."""
+    specimen = replace(DISC, grips="lubricated")
+    l = np.array([0.75, 0.9, 1.05, 1.2])
+    stress = np.array([uniaxial(BRAIN, value) for value in l])
+    if mode == "confined":
+        stress = 1000.0 * (l - 1.0 / l) + BRAIN.volumetric_modulus * np.log(l) / l
+    height, area = specimen.size[2], 0.25 * np.pi * specimen.size[0] ** 2
+    length, force = (height, area) if mode == "axial" else (1.0, 1.0)
+    rest = 0.0 if mode == "axial" else 1.0
+    imposed = rest + read * length * (l - 1.0)
+    test = replace(recorded(mode, imposed, (force * stress).tolist()), control="force", sigma=1e-4)
+    found = simulate_test(case_of(specimen), test, device, options=EXACT, steps=16)
+    expected = rest + length * (l - 1.0)
+    error = float(np.abs(found.predicted - expected).max() / np.abs(expected - rest).max())
+    # between computed states the curve is interpolated
+    verify(f"{mode} test under force, {read} of the motion read", "inverse of the closed form", error, 2e-3)
+    compared = compare_test(test, found)
+    assert compared.unit == ("m" if mode == "axial" else "")
+    assert compared.after.largest == pytest.approx(np.abs(imposed - found.predicted).max())
+    assert compared.before.largest == pytest.approx(np.abs(imposed - rest).max())
+
+
+def test_a_force_that_nothing_answers_is_said(device: str) -> None:
+    pulled = replace(recorded("stretch", [1.02], [1e6]), control="force")
+    with pytest.raises(SolveError, match="no stretch within 4 times what was read answers a stress of 1e"):
+        simulate_test(case_of(replace(DISC, grips="lubricated")), pulled, device)
+    memory = (Viscoelasticity(moduli=(1.0,), times=(3.0,)),)
+    timed = replace(recorded("stretch", [1.0, 1.02], [0.0, 50.0]), control="force", time=np.array([0.0, 1.0]))
+    with pytest.raises(InputError, match="control 'force': a specimen with a memory"):
+        simulate_test(replace(case_of(CUBE), mechanisms=memory), timed, device)
+
+
+# -- confined compression, and a sheet stretched alike along two axes: homogeneous whatever the grips -----------------
+
+
+@pytest.mark.parametrize("grips", ["lubricated", "glued"])
+@pytest.mark.parametrize("formulation", ["coupled", "uncoupled"])
+def test_confined_compression_is_uniaxial_strain(grips: str, formulation: str, device: str, verify: Row) -> None:
+    material = Material(NeoHookean(1000.0), 0.45, formulation)
+    specimen, l = replace(DISC, grips=grips), np.array([0.7, 0.8, 0.9, 1.1])
+    found = simulate_test(case_of(specimen, material), recorded("confined", l), device, options=EXACT, steps=4)
+    l, K = found.imposed, material.volumetric_modulus
+    if formulation == "coupled":
+        expected = 1000.0 * (l - 1.0 / l) + K * np.log(l) / l
+    else:
+        expected = 2.0 / 3.0 * 1000.0 * (l ** (1.0 / 3.0) - l ** (-5.0 / 3.0)) + K * (l - 1.0)
+    error = float(np.abs(found.response - expected).max() / np.abs(expected).max())
+    claim = f"stress of confined compression, {formulation} neo-Hookean, {grips} ends, stretches of 0.7 to 1.1"
+    verify(claim, "closed form of uniaxial strain", error, 1e-12)
+    # displacement and force are the same test
+    height, area = specimen.size[2], 0.25 * np.pi * specimen.size[0] ** 2
+    same = replace(recorded("axial", height * (l - 1.0)), mode="confined")
+    again = simulate_test(case_of(specimen, material), same, device, options=EXACT, steps=4)
+    np.testing.assert_allclose(again.predicted, area * expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("formulation", ["coupled", "uncoupled"])
+def test_a_sheet_stretched_along_two_axes_is_free_across(formulation: str, device: str, verify: Row) -> None:
+    material = Material(NeoHookean(1000.0), 0.45, formulation)
+    specimen = Specimen("block", (8e-3, 6e-3, 1e-3), "lubricated")
+    found = simulate_test(case_of(specimen, material), recorded("biaxial", [0.8, 1.3]), device, options=EXACT)
+    K = material.volumetric_modulus
+
+    def stresses(l: float, t: float) -> tuple[float, float]:
+        """Nominal, along the stretch `l` and across the sheet."""
+        J = l * l * t
+        if formulation == "coupled":
+            return tuple(1000.0 * (s - 1.0 / s) + K * np.log(J) / s for s in (l, t))
+        I1 = 2.0 * l * l + t * t
+        return tuple(1000.0 * J ** (-2.0 / 3.0) * (s - I1 / (3.0 * s)) + K * (J - 1.0) * J / s for s in (l, t))
+
+    expected = [stresses(l, brentq(lambda t, l=l: stresses(l, t)[1], 0.3, 3.0, xtol=1e-15))[0] for l in found.imposed]
+    error = float(np.abs(found.response - expected).max() / np.abs(expected).max())
+    claim = f"stress of an equibiaxial test, {formulation} neo-Hookean, stretches of 0.8 to 1.3"
+    verify(claim, "closed form, its thickness by SciPy's brentq", error, 1e-10)
+
+
+def test_a_sheet_of_incompressible_tissue_is_ogdens(device: str, verify: Row) -> None:
+    material = Material(Ogden((2.0 * 1000.0 / -8.0,), (-8.0,)), 0.4999, "uncoupled")
+    specimen = Specimen("block", (8e-3, 6e-3, 1e-3), "lubricated")
+    found = simulate_test(case_of(specimen, material), recorded("biaxial", [0.9, 1.2]), device, options=EXACT)
+    l = found.imposed
+    expected = 2.0 * 1000.0 / -8.0 * (l**-9.0 - l**15.0)
+    error = float(np.abs(found.response - expected).max() / np.abs(expected).max())
+    # what is left is of a Poisson ratio of 0.4999, not 0.5
+    verify("stress of an equibiaxial test, Ogden, alpha = -8, nu = 0.4999", "Ogden 1972, incompressible", error, 5e-3)
+
+
+def test_what_glued_ends_do_not_let_is_refused(device: str) -> None:
+    with pytest.raises(InputError, match="mode 'biaxial': ends that are glued to platens do not widen"):
+        simulate_test(case_of(CUBE), recorded("biaxial", [1.1]), device)
+    pressed = replace(recorded("axial", [-6e-3]), mode="confined")
+    with pytest.raises(InputError, match="more than -5 mm, the height"):
+        simulate_test(case_of(CUBE), pressed, device)
 
 
 # -- glued --------------------------------------------------------------------------------------------------------

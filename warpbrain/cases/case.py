@@ -19,6 +19,7 @@ from warpbrain.physics.laws import LAWS, Law
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.recordings.recording import Recording
+from warpbrain.recordings.registration import Registration
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,8 @@ class Case:
         Unit and axes of the folder's files, in which they are written again.
     gravity_axis : (float, float, float) or None
         Where 'down' was while recording; None if unknown.
+    registration : Registration or None
+        How well recordings are registered to the anatomy; None if the case does not say.
     mesh : TetMesh
         The imaged anatomy, whole.
     mesh_file : str
@@ -95,6 +98,7 @@ class Case:
     poisson: float
     frame: Frame = field(default_factory=Frame)
     gravity_axis: tuple[float, float, float] | None = None
+    registration: Registration | None = None
     mesh_file: str = "mesh.vtu"
     specimen: Specimen | None = None
     boundaries: tuple[Boundary, ...] = ()

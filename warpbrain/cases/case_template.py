@@ -21,6 +21,7 @@ origin = "measured"            # "measured" | "stand-in" | "synthetic"
 units = "mm"                   # of every length in the files of this folder
 axes = "RAS"                   # of every position in them: x right, y to the front, z up; or "LPS"
 # gravity_axis = [0, -1, 0]    # where 'down' was while recording; this is a patient who lies on the back
+# registration = {{ mm = 1.0, degrees = 1.0 }}  # accuracy of recordings against the anatomy, one standard deviation
 
 [mesh]
 file = "mesh.vtu"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import os
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from warpbrain.cases.format.tables import CASE, TABLES
 from warpbrain.cases.parts.anatomy import read_anatomy
 from warpbrain.cases.parts.boundaries import check_faces, check_together, read_boundaries
 from warpbrain.cases.parts.context import Context
+from warpbrain.cases.parts.magnitudes import check_magnitudes
 from warpbrain.cases.parts.mechanisms import read_mechanisms
 from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.node_sets import NodeSets
@@ -23,6 +25,7 @@ from warpbrain.physics.composition import CompositionError, require_composable, 
 from warpbrain.problems import Problems
 from warpbrain.recordings.inside import check_points_inside, check_surface_near
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
+from warpbrain.recordings.registration import Registration
 
 
 def read_case(path: str | os.PathLike[str]) -> Case:
@@ -68,6 +71,10 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
         if not any(axis):
             head.problem("gravity_axis", f"expected 3 numbers that are not all zero, found {head.get('gravity_axis')}")
             axis = None
+    registration = None
+    if head.has("registration"):
+        accuracy = head.get("registration")
+        registration = Registration(0.001 * accuracy["mm"], math.radians(accuracy["degrees"]))
 
     mesh_file, found, specimen = read_anatomy(context)
     sets = None if found is None else NodeSets(context, found)
@@ -91,6 +98,7 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
         path=file,
         frame=context.frame,
         gravity_axis=axis,
+        registration=registration,
         mesh=mesh,
         mesh_file=mesh_file,
         specimen=specimen,
@@ -104,6 +112,8 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     )
     if specimen is None:
         check_together(context, mesh, boundaries)
+    else:
+        check_magnitudes(context, specimen, tissues, poisson, recordings)
     try:
         require_composable(mechanisms, require_left(mechanisms, mesh))
     except CompositionError as error:

@@ -11,14 +11,17 @@ from warpbrain.errors import InputError
 
 _DATA = Path(__file__).parent / "data"
 
+#: Stand-ins for the paper's clinical cases.
+STAND_INS = ("0529", "0614", "0660", "0685", "0535", "0555", "0603", "0684")
+#: Measured landmarks of patients of the RESECT database, in the template brain: the phantom's mesh.
+RESECT = tuple(f"resect-{number:02d}" for number in range(1, 16))
+
 #: Files of each shipped case by tissue mode, relative to the data folder.
 SHIPPED = {
-    **{
-        name: {"multi": f"{name}/case.toml", "single": f"{name}/case-single.toml"}
-        for name in ("0529", "0614", "0660", "0685", "0535", "0555", "0603", "0684", "phantom")
-    },
+    **{name: {"multi": f"{name}/case.toml", "single": f"{name}/case-single.toml"} for name in (*STAND_INS, "phantom")},
     "phantom-fine": {"multi": "phantom/case-fine.toml", "single": "phantom/case-single-fine.toml"},
     "phantom-loaded": {"multi": "phantom/case-loaded.toml", "single": "phantom/case-single-loaded.toml"},
+    **{name: {"multi": f"phantom/{name}.toml", "single": f"phantom/{name}-single.toml"} for name in RESECT},
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 from collections.abc import Callable
 from dataclasses import replace
@@ -88,6 +89,9 @@ def _head(case: Case) -> dict[str, Any]:
     head |= {"units": case.frame.unit, "axes": case.frame.axes}
     if case.gravity_axis is not None:
         head["gravity_axis"] = _plain(case.frame.directions(case.gravity_axis))
+    if case.registration is not None:
+        shift, turn = case.registration.shift, case.registration.turn
+        head["registration"] = {"mm": shift / 0.001, "degrees": math.degrees(turn)}
     return head
 
 
@@ -166,6 +170,8 @@ def _recording(folder: Path, recording: Recording, frame: Frame) -> dict[str, An
     name = _new_file(folder, "recordings", recording.name, ending)
     table: dict[str, Any] = {"name": recording.name, "kind": recording.kind, "file": name, "role": recording.role}
     length = isinstance(recording, PointsRecording | SurfaceRecording)
+    if isinstance(recording, TestRecording):
+        length = recording.answer[0] == "displacement"
     if recording.sigma is not None:
         table["sigma"] = recording.sigma / (frame.metres if length else 1.0)
     more: dict[type[Recording], Callable[[Any], dict[str, Any]]] = {
@@ -180,6 +186,8 @@ def _recording(folder: Path, recording: Recording, frame: Frame) -> dict[str, An
 
 def _test(recording: TestRecording, frame: Frame) -> dict[str, Any]:
     table: dict[str, Any] = {"mode": recording.mode}
+    if recording.force_controlled:
+        table["control"] = recording.control
     if recording.specimen:
         table["specimen"] = recording.specimen
     if recording.axis != (0.0, 0.0, 1.0):

@@ -6,6 +6,7 @@ import argparse
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from warpbrain.cases.case import Case
     from warpbrain.estimation.options import EstimationOptions
     from warpbrain.estimation.posterior import Posterior
+    from warpbrain.recordings.registration import Registration
     from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
 #: Steps of Gauss-Newton, as printed.
@@ -50,7 +52,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         nargs=2,
         type=float,
         metavar=("MM", "DEG"),
-        help="standard deviations of a rigid error of registration, which is estimated along (default: 1 1)",
+        help="standard deviations of a rigid error of registration, estimated along (default: the case's, else 1 1)",
     )
     add("--no-registration", action="store_true", help="take positions as they were recorded")
     add(
@@ -75,7 +77,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    asked = _options(options)
+    asked, registration = _options(options), _registration(options)
     say: Callable[..., None] = _silent if options.quiet else print
 
     from warpbrain.atomic import output_folder, safe_name
@@ -90,6 +92,8 @@ def _run(options: argparse.Namespace) -> None:
         raise InputError(f"{case.path}: [specimen]: tissue is estimated from a deformed body, not from tests")
     if options.model is not None:
         case = case.with_law(options.model)
+    if registration is not None:
+        case = replace(case, registration=registration)
     out = output_folder(options.out or Path(f"warpbrain-estimate-{safe_name(case.name)}-{options.tissue}"))
     say(case.title)
     if case.origin == "stand-in":
@@ -100,25 +104,30 @@ def _run(options: argparse.Namespace) -> None:
         _estimate(options, asked, case, out, say)
 
 
+def _registration(options: argparse.Namespace) -> Registration | None:
+    """The accuracy that is asked for in the place of the case's."""
+    from warpbrain.recordings.registration import Registration
+
+    if options.registration is None or options.no_registration:
+        return None
+    shift, turn = options.registration
+    if not (shift > 0.0 and turn > 0.0 and math.isfinite(shift + turn)):
+        raise InputError(f"--registration {shift:g} {turn:g}: expected two positive numbers [mm] and [degrees]")
+    return Registration(0.001 * shift, math.radians(turn))
+
+
 def _options(options: argparse.Namespace) -> EstimationOptions:
     """What is asked for; refuses bad numbers before anything is computed."""
     from warpbrain.estimation.discretisation import Discretisation
     from warpbrain.estimation.likelihood import Likelihood
     from warpbrain.estimation.options import EstimationOptions
-    from warpbrain.estimation.registration import Registration
 
-    registration = None if options.no_registration else Registration()
-    if options.registration is not None and not options.no_registration:
-        shift, turn = options.registration
-        if not (shift > 0.0 and turn > 0.0 and math.isfinite(shift + turn)):
-            raise InputError(f"--registration {shift:g} {turn:g}: expected two positive numbers [mm] and [degrees]")
-        registration = Registration(0.001 * shift, math.radians(turn))
     if not options.nu > 0.0:
         raise InputError(f"--nu {options.nu:g}: expected a positive number of degrees of freedom, or inf")
     return EstimationOptions(
         Likelihood(None) if math.isinf(options.nu) else Likelihood(),
         None if options.no_discretisation else Discretisation(),
-        registration,
+        not options.no_registration,
         samples=options.samples,
         seed=options.seed,
     )

@@ -13,7 +13,6 @@ from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.realigned import realigned
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
-from warpbrain.worlds.body.nuisances import registration_sd
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.sensors import sensors_at
 
@@ -44,7 +43,7 @@ def _error(checks: Observations, base: Base, fit: Refit) -> float:
     nuisances, _ = base.for_sensors(sensors)
     # less tissue and field, which the state has, and the motion by which recordings were realigned
     coordinates = nuisances.coordinates(base.prior, fit.state.hypothesis)
-    coordinates[nuisances.part("registration")] = base.states.motion / registration_sd()
+    coordinates[nuisances.part("registration")] = base.states.motion_coordinates
     linear = fit.nuisances[: len(coordinates)] - coordinates
     residual = sensors.residual - nuisances.columns @ linear
     return distance(sensors, residual)

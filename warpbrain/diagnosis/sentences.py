@@ -22,7 +22,7 @@ from warpbrain.inference.decide import (
 from warpbrain.inference.probability import percent
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import size_in_words, smallest_in_words
-from warpbrain.physics.words import measured
+from warpbrain.physics.words import length, measured, number, place
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.not_physics import SENTENCES
 from warpbrain.worlds.body.weighted_set import WeightedSet
@@ -50,7 +50,7 @@ def _named(diagnosis: Diagnosis) -> str:
     text = f"{' '.join([sentences[0], *further])} {_grounds(diagnosis.named, diagnosis.fit)}"
     if diagnosis.verdict == NAMED:
         return text
-    return f"{text} Something else is left, which this does not explain.{traits_in_words(diagnosis.unknown)}"
+    return f"{text} Something else is left, which this does not explain.{_traits(diagnosis)}"
 
 
 def _group(diagnosis: Diagnosis) -> str:
@@ -65,7 +65,7 @@ def _group(diagnosis: Diagnosis) -> str:
 def _unknown(diagnosis: Diagnosis) -> str:
     return (
         f"Something is missing ({_chance(diagnosis)}) that none of the known mechanisms explains: a force without a "
-        f"name fits better than all of them.{traits_in_words(diagnosis.unknown)}"
+        f"name fits better than all of them.{_traits(diagnosis)}"
     )
 
 
@@ -131,36 +131,37 @@ def _clause(kind: str) -> str:
 def _where(ranked: Ranked) -> str:
     if ranked.centre is None:
         return f" Where: {ranked.region}." if ranked.region else ""
-    x, y, z = 1e3 * ranked.centre
-    radius = f", within {1e3 * ranked.radius:.0f} mm" if ranked.radius else ""
-    return f" It lies about ({x:z.0f}, {y:z.0f}, {z:z.0f}) mm{radius}."
+    # to whole millimetres where its size is not known
+    radius = f", within {number(1e3 * ranked.radius, 1)} mm" if ranked.radius else ""
+    return f" It lies about {place(ranked.centre, 10.0 * (ranked.radius or 1.0))}{radius}."
 
 
 def _grounds(named: Sequence[Ranked], fit: Fit) -> str:
-    before = 1e3 * fit.refitted[1]
+    before = length(fit.refitted[1])
     chances = " and ".join(percent(ranked.probability) for ranked in named)
     probable = f"Its probability is {chances}" if len(named) == 1 else f"Their probabilities are {chances}"
     if fit.explained is None:
         return f"{probable}."
-    after = 1e3 * fit.explained[1]
+    after = length(fit.explained[1])
     these = "it" if len(named) == 1 else "them"
-    return (
-        f"{probable}; points that were held out are predicted to {after:.2f} mm with {these}, to {before:.2f} mm "
-        f"without {these}."
-    )
+    return f"{probable}; points that were held out are predicted to {after} with {these}, to {before} without {these}."
 
 
 def _chance(diagnosis: Diagnosis) -> str:
     return f"p = {diagnosis.p_value:.2g}"
 
 
-def traits_in_words(unknown: Traits | None) -> str:
+def _traits(diagnosis: Diagnosis) -> str:
     """What is known of an unknown force, to follow a sentence; empty if nothing is."""
-    if unknown is None:
+    if diagnosis.unknown is None:
         return ""
-    x, y, z = 1e3 * unknown.centre
+    return traits_in_words(diagnosis.unknown, float(np.ptp(diagnosis.case.mesh.points, axis=0).max()))
+
+
+def traits_in_words(unknown: Traits, extent: float) -> str:
+    """What is known of an unknown force in a body of an extent [m], to follow a sentence."""
     size, sd = unknown.size
-    where = f"about ({x:z.0f}, {y:z.0f}, {z:z.0f}) mm"
+    where = f"about {place(unknown.centre, extent)}"
     if unknown.outside:
         sentence = f"It is a force from outside, {where}, of {measured(size, sd, 'N')} in all"
     else:

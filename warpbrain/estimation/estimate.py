@@ -23,6 +23,7 @@ from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.prior_modes import PriorMode, prior_modes, prior_of
 from warpbrain.estimation.problem import Problem
 from warpbrain.estimation.proposal import Proposal
+from warpbrain.estimation.registration import registration_of
 from warpbrain.estimation.target import Target
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
@@ -117,6 +118,7 @@ class Estimation:
         self.listener = listener or Listener()
         self.seconds = Seconds()
         self._device = device
+        self._registration = registration_of(case) if self.options.registration else None
         self._remarks = on_linear_elements(case.poisson, "an estimate")
         # what is wrong with recordings is known before anything is computed
         self.observations = Observations.to_fit(case)
@@ -131,7 +133,7 @@ class Estimation:
     def run(self) -> Posterior:
         """All stages."""
         with self.seconds.of("estimate"):
-            modes = self.fit(Nuisances(registration=self.options.registration))
+            modes = self.fit(Nuisances(registration=self._registration))
         solves = {"estimate": self.forward.solves}
         errors: list[DiscretisationError] = []
         if self.options.discretisation is not None:
@@ -229,7 +231,7 @@ class Estimation:
                 finer = FinerMesh(self.case, best.theta, self._device)
             derivatives = best.linearised.du, best.linearised.dR
             errors.append(finer.error(best.point.state, derivatives))
-            nuisances = Nuisances(believed, errors[-1], self.options.registration)
+            nuisances = Nuisances(believed, errors[-1], self._registration)
             modes = self.fit(nuisances, modes)
             if np.sqrt(2.0 * modes[0].laplace.posterior.negative_log(errors[-1].theta)) <= _SETTLED:
                 break

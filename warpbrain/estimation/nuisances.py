@@ -18,7 +18,7 @@ from warpbrain.estimation.forward import State
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.observations import Residuals
 from warpbrain.estimation.registration import NAMES as REGISTRATION_NAMES
-from warpbrain.estimation.registration import Registration
+from warpbrain.recordings.registration import Registration
 
 
 @dataclass(frozen=True, eq=False)

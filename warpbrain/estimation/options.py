@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from warpbrain.errors import InputError
 from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.likelihood import Likelihood
-from warpbrain.estimation.registration import Registration
 
 
 @dataclass(frozen=True)
@@ -19,8 +18,9 @@ class EstimationOptions:
     likelihood : Likelihood
     discretisation : Discretisation or None
         None: the mesh is taken for exact, and the estimate holds for this mesh only.
-    registration : Registration or None
-        None: positions are taken as they were recorded.
+    registration : bool
+        Whether a rigid error of registration is estimated along, as large as `registration_of` the case; otherwise
+        positions are taken as they were recorded.
     samples : int
         Draws that check Laplace's approximation, an equilibrium each.
     chain : int
@@ -33,13 +33,15 @@ class EstimationOptions:
 
     likelihood: Likelihood = field(default_factory=Likelihood)
     discretisation: Discretisation | None = field(default_factory=Discretisation)
-    registration: Registration | None = field(default_factory=Registration)
+    registration: bool = True
     samples: int = 40
     chain: int = 300
     seed: int = 0
     tolerance: float = 3e-3
 
     def __post_init__(self) -> None:
+        if not isinstance(self.registration, bool):
+            raise InputError("registration: expected True or False: how accurate it is, is said by the case")
         for name, least in (("samples", 25), ("chain", 10), ("seed", 0)):
             if getattr(self, name) < least:
                 raise InputError(f"{name} = {getattr(self, name)}: expected a whole number of at least {least}")

@@ -12,42 +12,21 @@ estimated along with the tissue's parameters, and integrated out of what is said
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.errors import InputError
+from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
+from warpbrain.recordings.registration import Registration
 
 #: Names of the six numbers.
 NAMES = (*(f"shift {axis} [m]" for axis in "xyz"), *(f"turn about {axis} [rad]" for axis in "xyz"))
 
 
-@dataclass(frozen=True)
-class Registration:
-    """How far a registration may be wrong: one standard deviation each, normal.
-
-    Attributes
-    ----------
-    shift : float
-        Of each component of `t` [m].
-    turn : float
-        Of each component of `omega` [rad].
-    """
-
-    shift: float = field(default_factory=lambda: belief("registration.shift"))
-    turn: float = field(default_factory=lambda: belief("registration.turn"))
-
-    def __post_init__(self) -> None:
-        for name, value in (("shift", self.shift), ("turn", self.turn)):
-            if not (math.isfinite(value) and value > 0.0):
-                raise InputError(f"registration: {name} = {value}: expected a positive number")
-
-    @property
-    def deviations(self) -> Floats:
-        """Standard deviations of the six numbers, shape (6,)."""
-        return np.repeat([self.shift, self.turn], 3)
+def registration_of(case: Case) -> Registration:
+    """The accuracy that a case declares, or else the one that is believed (`registration.shift` and `.turn`)."""
+    return case.registration or Registration(belief("registration.shift"), belief("registration.turn"))
 
 
 def moved_back(positions: Floats, motion: Floats, centre: Floats) -> Floats:

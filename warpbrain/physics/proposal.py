@@ -117,7 +117,7 @@ class Tests:
     loads : int
         How many different ones: other modes, or other directions of the tissue.
     tension, compression : bool
-        Whether an axial test pulls, and whether one presses.
+        Whether an axial test pulls, and whether one presses; what is pulled along two axes is pressed along the third.
     """
 
     # not a test of pytest's

@@ -47,6 +47,20 @@ def number(value: float, digits: int = 2) -> str:
     return f"{value:z.{decimals}f}"
 
 
+def length(metres: float) -> str:
+    """A length for people: hundredths of a millimetre, two digits of what is smaller, micrometres below 0.01 mm."""
+    size = 1e3 * metres
+    if size != 0.0 and abs(size) < 0.01:
+        return f"{number(1e3 * size)} µm"
+    return f"{size:z.2f} mm" if abs(size) >= 0.1 or size == 0.0 else f"{number(size)} mm"
+
+
+def place(position: ArrayLike, extent: float) -> str:
+    """A position (3,) [m] in millimetres, to a hundredth of an extent [m] or finer; whole ones from 1 cm up."""
+    decimals = max(0, 1 - math.floor(math.log10(1e3 * extent)))
+    return f"({', '.join(f'{1e3 * float(value):z.{decimals}f}' for value in np.ravel(position))}) mm"
+
+
 def measured(value: float, sd: float, unit: str = "") -> str:
     """A number, its standard deviation and its unit: as many digits as the deviation allows."""
     if unit == "Pa" and abs(value) >= 1000.0:

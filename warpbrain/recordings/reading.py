@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.frame import Frame
+from warpbrain.frame import PASCALS, Frame
 from warpbrain.problems import Problems
 from warpbrain.recordings.markups import is_markup, paired, read_markup
 from warpbrain.recordings.recording import (
@@ -38,6 +38,8 @@ QUANTITIES = {
     "axial": (("displacement", "force"), ("stretch", "stress")),
     "shear": (("displacement", "force"),),
     "torsion": (("angle", "torque"),),
+    "confined": (("displacement", "force"), ("stretch", "stress")),
+    "biaxial": (("stretch", "stress"),),
 }
 
 
@@ -229,6 +231,9 @@ def read_test(
     sigma: float | None,
     mode: str,
     specimen: str = "",
+    stress: str = "nominal",
+    unit: str = "Pa",
+    control: str = "displacement",
 ) -> TestRecording | None:
     """Read a laboratory test from ``.csv``.
 
@@ -242,10 +247,16 @@ def read_test(
     problems, name, file, role
         As in `read_points`.
     sigma : float or None
-        Noise of the response, in its unit.
-    mode : {"axial", "shear", "torsion"}
+        Noise of what the specimen answered, in the unit of its column.
+    mode : {"axial", "shear", "torsion", "confined", "biaxial"}
     specimen : str
         Which one was tested, of several.
+    stress : {"nominal", "cauchy"}
+        What the column ``stress`` is; see `nominal_stress`.
+    unit : str
+        Of that column, of `PASCALS`.
+    control : {"displacement", "force"}
+        What the machine imposed.
 
     Returns
     -------
@@ -263,20 +274,36 @@ def read_test(
         else:
             imposed = table.numbers(pair[0]) * (frame.metres if pair[0] == "displacement" else 1.0)
         response = table.numbers(pair[1])
+        if pair[1] == "stress":
+            response = PASCALS[unit] * nominal_stress(mode, imposed, response, stress)
     if found:
         return None
+    of_answer = {"stress": PASCALS[unit], "displacement": frame.metres}.get(pair[control != "force"], 1.0)
     return TestRecording(
         name=name,
         file=file,
         role=role,
-        sigma=sigma,
+        sigma=None if sigma is None else of_answer * sigma,
         mode=mode,
         quantities=pair,
         imposed=imposed,
         response=response,
         time=time,
         specimen=specimen,
+        control=control,
     )
+
+
+def nominal_stress(mode: str, stretch: Floats, values: Floats, kind: str) -> Floats:
+    """Force over the area at rest of a stress that a test reports.
+
+    A Cauchy stress is a force over the area at that stretch: of an incompressible specimen, as evaluations of tests
+    take it, that at rest over the stretch, so that `P = sigma / lambda`. Between the walls of a confining chamber the
+    area stays.
+    """
+    if kind == "nominal" or mode == "confined":
+        return values
+    return np.asarray(values / stretch)
 
 
 def _csv_points(path: Path, frame: Frame, problems: Problems) -> dict[str, Any] | None:

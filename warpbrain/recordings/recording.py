@@ -123,7 +123,9 @@ class TestRecording(Recording):
 
     Attributes
     ----------
-    mode : {"axial", "shear", "torsion"}
+    mode : {"axial", "shear", "torsion", "confined", "biaxial"}
+        Confined: axial between lubricated walls that let it widen nowhere. Biaxial: stretched alike along x and y, its
+        thickness along z free; its stress is along x.
     quantities : (str, str)
         ``("displacement", "force")`` [m, N], ``("stretch", "stress")`` [1, Pa nominal] or ``("angle", "torque")``
         [rad, N m].
@@ -135,6 +137,8 @@ class TestRecording(Recording):
     axis, sheared : (float, float, float)
         Directions of the tissue along the machine's axis z, and along its x, in which it shears; of any length but
         zero. Of `sheared` what is across the axis counts.
+    control : {"displacement", "force"}
+        What the machine imposed; `sigma` is of what answered.
     """
 
     # not a test of pytest's
@@ -148,6 +152,22 @@ class TestRecording(Recording):
     specimen: str = ""
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     sheared: tuple[float, float, float] | None = None
+    control: str = "displacement"
+
+    @property
+    def force_controlled(self) -> bool:
+        """Whether the machine imposed the force: `response` is what was imposed then, and `imposed` what answered."""
+        return self.control == "force"
+
+    @property
+    def controlled(self) -> tuple[str, Floats]:
+        """What the machine imposed: its quantity, and the values (n,)."""
+        return (self.quantities[1], self.response) if self.force_controlled else (self.quantities[0], self.imposed)
+
+    @property
+    def answer(self) -> tuple[str, Floats]:
+        """What the specimen answered with: its quantity, and the values (n,)."""
+        return (self.quantities[0], self.imposed) if self.force_controlled else (self.quantities[1], self.response)
 
     @property
     def turn(self) -> Floats:

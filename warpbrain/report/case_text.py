@@ -7,6 +7,7 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.checking import Checked
 from warpbrain.mesh import Quality, measure
+from warpbrain.physics.words import length
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording, TestRecording
 from warpbrain.report.summary import SET_TITLES
 
@@ -78,13 +79,14 @@ def recording_line(recording: Recording) -> str:
     """One line about a recording."""
     head = f"{recording.name}: {count_of(recording)} "
     role = "" if recording.role == "fit" else "; only checked, never fitted"
-    unit = "mm" if isinstance(recording, PointsRecording | SurfaceRecording) else ""
-    scale = 1000.0 if unit else 1.0
+    lengths = isinstance(recording, PointsRecording | SurfaceRecording)
+    lengths |= isinstance(recording, TestRecording) and recording.answer[0] == "displacement"
+    scale, unit = (1000.0, "mm") if lengths else (1.0, "")
     noise = f"; noise {scale * recording.sigma:g} {unit}".rstrip() if recording.sigma is not None else ""
     if isinstance(recording, PointsRecording):
-        sizes = 1000.0 * np.linalg.norm(recording.displacement, axis=1)
-        rms = float(np.sqrt(np.mean(sizes**2)))
-        return f"{head}tracked points, moved by {rms:.2f} mm RMS, {sizes.max():.2f} mm at most{noise}{role}"
+        sizes = np.linalg.norm(recording.displacement, axis=1)
+        rms, most = length(float(np.sqrt(np.mean(sizes**2)))), length(float(sizes.max()))
+        return f"{head}tracked points, moved by {rms} RMS, {most} at most{noise}{role}"
     if isinstance(recording, SurfaceRecording):
         return f"{head}points of the moved surface '{recording.nodes}', not paired{noise}{role}"
     if isinstance(recording, ForceRecording):

@@ -17,7 +17,7 @@ from warpbrain.report.files import MILLIMETRES
 from warpbrain.simulation.observation import Observed
 
 #: Units as people read them, by that of a comparison, the factor and the name.
-SHOWN = {"m": (MILLIMETRES, "mm"), "N": (1.0, "N"), "Pa": (1.0, "Pa"), "N m": (1.0, "N m")}
+SHOWN = {"m": (MILLIMETRES, "mm")} | {unit: (1.0, unit) for unit in ("N", "Pa", "N m", "rad", "")}
 
 
 def describe_comparisons(observed: Observed) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from warpbrain.estimation.laplace import Laplace
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.estimation.prediction import INTERVALS, OverallErrors, Prediction
+from warpbrain.estimation.registration import registration_of
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.fingerprints import fingerprints
@@ -245,13 +246,13 @@ def describe_discretisation(posterior: Posterior) -> dict[str, Any] | None:
 
 
 def describe_registration(posterior: Posterior) -> dict[str, Any] | None:
-    options = posterior.options
-    if options.registration is None:
+    if not posterior.options.registration:
         return None
+    declared = registration_of(posterior.case)
     found = posterior.nuisances[-6:]
     return {
-        "prior_shift_mm": MILLIMETRES * options.registration.shift,
-        "prior_turn_degrees": math.degrees(options.registration.turn),
+        "prior_shift_mm": MILLIMETRES * declared.shift,
+        "prior_turn_degrees": math.degrees(declared.turn),
         "shift_mm": [MILLIMETRES * value for _, value, _ in found[:3]],
         "shift_standard_deviation_mm": [MILLIMETRES * deviation for _, _, deviation in found[:3]],
         "turn_degrees": [math.degrees(value) for _, value, _ in found[3:]],

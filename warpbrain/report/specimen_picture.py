@@ -69,8 +69,10 @@ def _draw(axes: Any, test: Tested) -> None:
     axes.locator_params(axis="x", nbins=6)
     axes.set_xlabel("time [s]" if through_time else f"{what} [{unit}]" if unit else what)
     axes.set_ylabel(f"{'nominal ' if answer == 'stress' else ''}{answer} [{answer_unit}]")
-    error = scale * test.comparison.after.root_mean_square
-    heading = f"{recording.name}: {recording.mode}, {recording.role}; RMSE {error:.3g} {answer_unit}"
+    error = f"{scale * test.comparison.after.root_mean_square:.3g} {answer_unit}"
+    if recording.force_controlled:
+        error = f"{factor * test.comparison.after.root_mean_square:.3g} {unit}".rstrip()
+    heading = f"{recording.name}: {recording.mode}, {recording.role}; RMSE {error}"
     axes.set_title(heading, fontsize=10, parse_math=False)
 
 

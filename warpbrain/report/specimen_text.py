@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from warpbrain.atomic import whole_file
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
@@ -148,9 +150,11 @@ def tested_lines(tests: Sequence[Tested]) -> list[str]:
     ]
     for test in tests:
         recording, result, compared = test.recording, test.result, test.comparison
+        scale, unit = SHOWN[recording.answer[0]]
+        before, after = (scale * error.root_mean_square for error in (compared.before, compared.after))
         lines.append(
             f"  {recording.name:<19} {recording.mode:<8} {compared.count:>6}  {recording.role:<5} "
-            f"{compared.before.root_mean_square:>12.4g} {compared.after.root_mean_square:>10.4g}  {compared.unit:<5} "
+            f"{before:>12.4g} {after:>10.4g}  {unit:<5} "
             f"{result.r_squared:>7.3f} {len(result.imposed):>7} {result.newton.sum():>7} {result.min_J.min():>7.3f}"
         )
         if result.unstable_iterations:
@@ -168,10 +172,13 @@ def write_tests(path: Path, tests: Sequence[Tested]) -> None:
         rows.writerow(_COLUMNS)
         for test in tests:
             recording, result = test.recording, test.result
-            factor, unit = SHOWN[recording.quantities[0]]
+            quantity, controlled = recording.controlled
+            factor, unit = SHOWN[quantity]
+            # what answered is in the unit of its errors
+            scale, answer_unit = SHOWN[recording.answer[0]]
             head = [recording.name, recording.mode, recording.role]
             for row in test.comparison.rows.tolist():
                 time = "" if recording.time is None else f"{recording.time[row]:.9g}"
-                values = (recording.response[row], result.predicted[row], result.residuals[row])
-                imposed = [recording.quantities[0], f"{factor * recording.imposed[row]:z.6g}", unit]
-                rows.writerow([*head, row, time, *imposed, *(f"{v:z.6g}" for v in values), test.comparison.unit])
+                values = scale * np.array([recording.answer[1][row], result.predicted[row], result.residuals[row]])
+                imposed = [quantity, f"{factor * controlled[row]:z.6g}", unit]
+                rows.writerow([*head, row, time, *imposed, *(f"{v:z.6g}" for v in values), answer_unit])

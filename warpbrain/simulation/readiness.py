@@ -7,7 +7,7 @@ from warpbrain.errors import InputError
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.held import require_held
 from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.specimen import specimen_of
+from warpbrain.simulation.specimen import not_transmitted, specimen_of
 
 
 def why_not(case: Case) -> str:
@@ -22,6 +22,6 @@ def why_not(case: Case) -> str:
     except InputError as error:
         return str(error).removeprefix(f"{case.path}: ")
     for recording in case.recordings:
-        if isinstance(recording, TestRecording) and recording.mode != "axial" and case.specimen.grips == "lubricated":
-            return f"recording '{recording.name}': lubricated grips transmit no {recording.mode}"
+        if isinstance(recording, TestRecording) and (why := not_transmitted(case.specimen.grips, recording.mode)):
+            return f"recording '{recording.name}' mode '{recording.mode}': {why}"
     return ""

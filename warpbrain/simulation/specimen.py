@@ -38,6 +38,10 @@ Bools = NDArray[np.bool_]
 
 #: Imposed values from rest to the farther extreme of a test.
 STEPS = 8
+#: How many times as far as was read a specimen is followed for a force that was imposed.
+_FARTHER = 4
+#: Modes whose states are homogeneous whatever the grips are.
+HOMOGENEOUS = ("confined", "biaxial")
 #: Quantities of tests as people read them: the factor from SI and the unit.
 SHOWN = {
     "displacement": (1000.0, "mm"),
@@ -59,7 +63,7 @@ class TestResult:
         The computed curve, `imposed` increasing and with the value at rest among it, or in the order of `time`, in the
         units of the recording's quantities.
     predicted : (n,) array
-        The response at the rows of the recording.
+        The response at the rows of the recording; of a force-controlled test the displacement (stretch, angle).
     residuals : (n,) array
         Recorded less predicted.
     newton : (k,) int array
@@ -109,6 +113,9 @@ class Rig:
     and one element is exact: a tetrahedron with the specimen's height and volume that stands on the lower platen, held
     against rigid motion and nothing else. (A whole mesh would give the same stress, or buckle.)
 
+    Between the lubricated walls of a confining chamber, and in a sheet that is stretched alike along two axes, the
+    state is homogeneous too: all nodes of that element follow along the axes across z.
+
     Mechanisms act in full before anything is imposed, between platens that stand as far apart as the specimen was
     high: what swells then presses on them.
 
@@ -121,6 +128,8 @@ class Rig:
     options : EquilibriumOptions, optional
     elements : str, optional
         As of `Model`, of glued specimens; by default as `choose_elements` says.
+    mode : str, optional
+        One of `HOMOGENEOUS`, the only one of the rig's tests then.
 
     Attributes
     ----------
@@ -142,14 +151,15 @@ class Rig:
         precision: str = "double",
         options: EquilibriumOptions | None = None,
         elements: str | None = None,
+        mode: str = "",
     ) -> None:
-        self.case = case
+        self.case, self._mode = case, mode
         self._turned: dict[str, Rig] = {}
         self._like_this = (device, precision, options)
         self.specimen = specimen_of(case)
-        glued = self.specimen.grips == "glued"
+        glued = self._glued = self.specimen.grips == "glued" and not mode
         mesh = case.mesh if glued else _homogeneous(case.mesh.volume, self.specimen.size[2])
-        model = _model(case, self.specimen, mesh)
+        model = _model(case, glued, mesh, mode)
         #: Why the elements of a glued specimen were chosen; None if they were asked for.
         self.chosen: str | None = None
         if glued and elements is None:
@@ -158,6 +168,8 @@ class Rig:
         self.system = System(replace(model, elements=elements) if glued and elements else model, device, precision)
         self.solver = EquilibriumSolver(self.system, options)
         self._top = mesh.node_sets["top"]
+        #: Nodes that follow what is imposed.
+        self._led = np.ones(len(mesh.points), dtype=bool) if mode == "biaxial" else self._top
         self._area = mesh.volume / self.specimen.size[2]
         self._shortest = min((t.forgets_in for t in self.system.terms if t.forgets_in is not None), default=None)
 
@@ -169,15 +181,21 @@ class Rig:
     def check(self, recording: TestRecording) -> None:
         """`InputError` if the grips cannot transmit a test, it presses the specimen to nothing, or it has no times."""
         who = f"{self.case.path}: [[recording]] '{recording.name}'"
-        if self.specimen.grips == "lubricated" and recording.mode != "axial":
-            raise InputError(f"{who} mode '{recording.mode}': lubricated grips slide, nothing transmits it")
+        if why := not_transmitted(self.specimen.grips, recording.mode):
+            raise InputError(f"{who} mode '{recording.mode}': {why}")
+        if recording.force_controlled and self.follows_time(recording):
+            raise InputError(
+                f"{who} control 'force': a specimen with a memory or a ramp is followed under displacements alone; "
+                "`warpbrain diagnose` takes the test, by the stress at what was read"
+            )
         if self._shortest is not None and recording.time is None:
             raise InputError(
                 f"{who} file '{recording.file}': no column t, and what has a memory ([[mechanism]] viscoelasticity) "
                 "cannot do without times"
             )
         lowest, height = float(recording.imposed.min()), self.specimen.size[2]
-        if recording.mode == "axial" and recording.quantities[0] == "displacement" and lowest <= -height:
+        pressed = recording.mode in ("axial", "confined")
+        if pressed and recording.quantities[0] == "displacement" and lowest <= -height:
             raise InputError(
                 f"{who}: found a displacement of {1000.0 * lowest:g} mm, expected more than -{1000.0 * height:g} mm, "
                 "the height of the specimen"
@@ -213,12 +231,13 @@ class Rig:
             turned = tuple(mechanism.turned(recording.turn) for mechanism in self.case.mechanisms)
         except InputError as error:
             raise InputError(f"{self.case.path}: [[recording]] '{recording.name}' axis: {error}") from None
-        key = repr(turned)
-        if key == repr(self.case.mechanisms):
+        mode = recording.mode if recording.mode in HOMOGENEOUS else ""
+        key = f"{mode} {turned!r}"
+        if key == f"{self._mode} {self.case.mechanisms!r}":
             return self
         if key not in self._turned:
-            elements = self.system.model.elements if self.specimen.grips == "glued" else None
-            rig = Rig(replace(self.case, mechanisms=turned), *self._like_this, elements)
+            elements = self.system.model.elements if self._glued and not mode else None
+            rig = Rig(replace(self.case, mechanisms=turned), *self._like_this, elements, mode)
             rig.solver.clock = self.solver.clock
             self._turned[key] = rig
         return self._turned[key]
@@ -241,7 +260,30 @@ class Rig:
                 states.append(self._state(recording, value, found))
                 if on_state is not None:
                     on_state((len(states) - 1) / sum(map(len, sides)))
+        if recording.force_controlled:
+            states += self._farther(recording, states, rest, steps)
         return _result(recording, sorted(states, key=lambda state: state.imposed))
+
+    def _farther(self, recording: TestRecording, states: Sequence[_State], rest: float, steps: int) -> list[_State]:
+        """States beyond what was read, until all forces that were imposed are answered."""
+        found: list[_State] = []
+        reach = max(float(np.abs(recording.imposed - rest).max()), np.finfo(float).tiny)
+        for sign, force in ((-1.0, float(recording.response.min())), (1.0, float(recording.response.max()))):
+            last = max(states, key=lambda state: sign * state.imposed)
+            u: Floats | None = None
+            for _ in range(_FARTHER * steps):
+                if sign * last.response >= sign * force:
+                    break
+                value = last.imposed + sign * reach / steps
+                state = self._equilibrium(recording, value, last.imposed, u)
+                u, last = state.u, self._state(recording, value, state)
+                found.append(last)
+            else:
+                raise SolveError(
+                    f"test '{recording.name}' ({recording.mode}): no {recording.quantities[0]} within {_FARTHER} times "
+                    f"what was read answers a {recording.quantities[1]} of {force:.4g}"
+                )
+        return found
 
     def _through_time(
         self, recording: TestRecording, rest: float, steps: int, on_state: Callable[[float], None] | None
@@ -271,7 +313,7 @@ class Rig:
         return _State(value, response, len(found.history), min_J, found.unstable_iterations)
 
     def _impose(self, recording: TestRecording, value: float) -> None:
-        prescribed = np.where(self._top[:, None], self._platen(recording, value), 0.0)
+        prescribed = np.where(self._led[:, None], self._platen(recording, value), 0.0)
         model = self.system.model
         # what a system is made from does not hold the prescribed values: only its solver asks the model for them
         self.system.model = replace(model, prescribed=prescribed * model.constrained)
@@ -306,7 +348,9 @@ class Rig:
         """Displacement (n, 3) [m] that the upper platen would give to each node."""
         points = self.system.model.mesh.points
         u = np.zeros_like(points)
-        if recording.mode == "axial":
+        if recording.mode == "biaxial":
+            u[:, :2] = (value - 1.0) * points[:, :2]
+        elif recording.mode in ("axial", "confined"):
             u[:, 2] = value if recording.quantities[0] == "displacement" else (value - 1.0) * self.specimen.size[2]
         elif recording.mode == "shear":
             u[:, 0] = value
@@ -318,8 +362,13 @@ class Rig:
     def _response(self, recording: TestRecording, u: Floats, internal: Floats) -> float:
         """With what the upper platen acts on the specimen: a force [N] along z or x, a stress [Pa], or a torque [N m].
 
+        Of a sheet the nominal stress along x, `sum f_x X / V`.
+
         Positive in tension, and along a positive shear or rotation.
         """
+        if recording.mode == "biaxial":
+            mesh = self.system.model.mesh
+            return float(internal[:, 0] @ mesh.points[:, 0]) / mesh.volume
         force = internal[self._top]
         if recording.mode == "torsion":
             x, y = (self.system.model.mesh.points + u)[self._top, :2].T
@@ -341,15 +390,20 @@ def simulate_test(
 
 
 def compare_test(recording: TestRecording, result: TestResult) -> Comparison:
-    """A test beside its simulation; the residuals have one column, and before is a specimen that resists nothing."""
-    unit = SHOWN[recording.quantities[1]][1]
-    before, after = recording.response[:, None], result.residuals[:, None]
+    """A test beside its simulation; the residuals have one column.
+
+    Before is a specimen that resists nothing, or that no force moves.
+    """
+    quantity, recorded = recording.answer
+    unit = "m" if quantity == "displacement" else SHOWN[quantity][1]
+    rest = 1.0 if quantity == "stretch" else 0.0
+    before, after = (recorded - rest)[:, None], result.residuals[:, None]
     return Comparison(
         name=recording.name,
         kind=recording.kind,
         role=recording.role,
         unit=unit,
-        rows=np.arange(len(recording.response)),
+        rows=np.arange(len(recorded)),
         before=Error.of(before, unit),
         after=Error.of(after, unit),
         residuals_before=before,
@@ -380,11 +434,23 @@ def interpolated(imposed: Floats, response: Floats, rows: Floats) -> Floats:
     return np.asarray(PchipInterpolator(imposed, response)(rows), dtype=np.float64)
 
 
+def _inverted(recording: TestRecording, imposed: Floats, response: Floats) -> Floats:
+    """What answers the forces of a test (n,), by a curve that must rise."""
+    if len(imposed) > 1 and not (np.diff(response) > 0.0).all():
+        raise SolveError(
+            f"test '{recording.name}' ({recording.mode}): the {recording.quantities[1]} does not rise with the "
+            f"{recording.quantities[0]}: under a force the specimen is not stable"
+        )
+    return interpolated(response, imposed, recording.response)
+
+
 def _result(recording: TestRecording, states: Sequence[_State], history: History | None = None) -> TestResult:
     """States in the order of their imposed values, or of their times, at the rows of the recording."""
     imposed = np.array([state.imposed for state in states])
     response = np.array([state.response for state in states])
-    if history is None or recording.time is None:
+    if recording.force_controlled:
+        predicted = _inverted(recording, imposed, response)
+    elif history is None or recording.time is None:
         predicted = interpolated(imposed, response, recording.imposed)
     else:
         predicted = history.interpolated(response, recording.time)
@@ -392,7 +458,7 @@ def _result(recording: TestRecording, states: Sequence[_State], history: History
         imposed=imposed,
         response=response,
         predicted=predicted,
-        residuals=recording.response - predicted,
+        residuals=recording.answer[1] - predicted,
         newton=np.array([state.newton for state in states]),
         min_J=np.array([state.min_J for state in states]),
         unstable_iterations=sum(state.unstable_iterations for state in states),
@@ -429,10 +495,23 @@ def _homogeneous(volume: float, height: float) -> TetMesh:
     return TetMesh(points, np.array([[0, 1, 2, 3]]), node_sets={"bottom": bottom, "top": ~bottom})
 
 
-def _model(case: Case, specimen: Specimen, mesh: TetMesh) -> Model:
-    """The specimen held by its grips, at rest."""
+def not_transmitted(grips: str, mode: str) -> str:
+    """Why grips cannot impose a mode, in words; empty if they can."""
+    if grips == "lubricated" and mode in ("shear", "torsion"):
+        return "lubricated grips slide, nothing transmits it"
+    if grips == "glued" and mode == "biaxial":
+        return "ends that are glued to platens do not widen"
+    return ""
+
+
+def _model(case: Case, glued: bool, mesh: TetMesh, mode: str) -> Model:
+    """The specimen held by its grips, or in one of the homogeneous modes, at rest."""
     top, bottom = mesh.node_sets["top"], mesh.node_sets["bottom"]
-    if specimen.grips == "glued":
+    if mode:
+        constrained = np.ones(mesh.points.shape, dtype=bool)
+        # the free faces of a sheet
+        constrained[top, 2] = mode != "biaxial"
+    elif glued:
         constrained = np.repeat((top | bottom)[:, None], 3, axis=1)
     else:
         # the platens, and what keeps the lower face from moving and turning on its own; the upper one slides sideways,

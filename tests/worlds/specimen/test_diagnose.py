@@ -4,13 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rods import ROD, cycle, neo_hookean, noisy, ogden, rod_test, viscous
+from rods import MU, ROD, cycle, neo_hookean, noisy, ogden, rod_test, viscous
+from scipy.optimize import brentq
 from testing_machine import case_of, recorded
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
+from warpbrain.worlds.specimen.protocol import protocol_of
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 #: End friction asks for finite elements; what is looked for is not that.
@@ -60,6 +62,50 @@ def test_a_viscous_rod_is_told_by_its_cycles():
     assert values["moduli"].value == pytest.approx(1.5, rel=0.15)
     assert values["times"].value == pytest.approx(12.0, rel=0.2)
     assert found.where is not None and found.where.time is not None
+
+
+def test_a_rod_under_forces_is_read_with_the_noise_of_its_stretch():
+    """Forces are exact, stretches are read with noise; a neo-Hookean rod has nothing missing, an Ogden one has."""
+    for law, named in ((neo_hookean, []), (lambda l: ogden(l, -15.0), ["asymmetry"])):
+        rng = np.random.default_rng(5)
+        tests = []
+        for test in static(law, rng):
+            stress = law(test.imposed)
+            read = test.imposed + 0.001 * rng.normal(size=len(stress))
+            tests.append(replace(test, imposed=read, response=stress, control="force", sigma=0.001))
+        # 0.001 of stretch is so much of stress, by the secant
+        protocol = protocol_of(ROD, tests)
+        for test in protocol.tests:
+            assert test.sigma == pytest.approx(0.001 * test.peak / test.reach)
+        found = diagnosed(tests)
+        assert [one.name for one in found.named] == named
+        assert named or found.verdict == "nothing missing"
+
+
+@pytest.mark.parametrize("poisson", [0.40, 0.45, 0.48])
+def test_confined_compression_tells_how_compressible_a_rod_is(poisson):
+    """Made by closed forms of the coupled neo-Hookean law; 0.45 is declared."""
+    rng = np.random.default_rng(2)
+    lam = 2.0 * MU * poisson / (1.0 - 2.0 * poisson)
+
+    def stress(l: float, t: float) -> float:
+        return MU * (l - 1.0 / l) + lam * np.log(l * t * t) / l
+
+    def free(l: float) -> float:
+        return stress(l, brentq(lambda t: MU * (t - 1.0 / t) + lam * np.log(l * t * t) / t, 0.5, 2.0))
+
+    tests = static(lambda l: np.array([free(value) for value in l]), rng)
+    l = np.linspace(1.0, 0.93, 25)
+    tests.append(replace(rod_test("chamber", l, noisy(stress(l, 1.0), rng)), mode="confined"))
+    found = diagnosed(tests, (*KINDS, "compressibility"))
+    if poisson == 0.45:
+        assert found.verdict == "nothing missing"
+        return
+    assert found.verdict == "named" and [one.name for one in found.named] == ["compressibility"]
+    [value] = found.named[0].values
+    assert abs(value.value - poisson) < 3.0 * value.sd < 0.03
+    alone = diagnosed(tests[:2], (*KINDS, "compressibility"))
+    assert "confined compression" in alone.rejected["compressibility"]
 
 
 def test_a_drifting_zero_is_no_physics():

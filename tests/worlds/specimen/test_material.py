@@ -56,6 +56,33 @@ def test_states_are_those_of_the_rig(law, formulation):
     np.testing.assert_allclose(found, result.response, rtol=1e-5, atol=1e-4)
 
 
+@pytest.mark.parametrize("mode", ["confined", "biaxial"])
+@pytest.mark.parametrize("law", [NeoHookean(1000.0), Ogden((-100.0,), (-20.0,))])
+@pytest.mark.parametrize("direction", [None, (1.0, 0.0, 1.0)])
+def test_states_of_homogeneous_modes_are_those_of_the_rig(mode, law, direction):
+    case = case_of(PLATE)
+    tissue = replace(case.tissues[1], law=law, model=law.name)
+    fibres = () if direction is None else (Fibres(direction=direction, stiffness=400.0, exponent=2.0),)
+    # between walls oblique fibres are held; a sheet is sheared by them
+    if direction is not None and mode == "biaxial":
+        fibres = (replace(fibres[0], direction=(1.0, 0.0, 0.0)),)
+    case = replace(case, tissues={1: tissue}, mechanisms=fibres)
+    result = simulate_test(case, recorded(mode, STRETCH), "cpu", options=EXACT, steps=4)
+    found = HomogeneousMaterial.of_case(case, ()).stress(mode, result.imposed, None)
+    np.testing.assert_allclose(found, result.response, rtol=1e-5, atol=0.01)
+
+
+@pytest.mark.parametrize("mode", ["confined", "biaxial"])
+def test_a_viscous_history_of_a_homogeneous_mode_is_that_of_the_rig(mode):
+    time = np.linspace(0.0, 20.0, 161)
+    stretch = 1.0 + 0.12 * np.sin(2.0 * np.pi * time / 20.0)
+    case = replace(case_of(PLATE), mechanisms=(Viscoelasticity(moduli=(1.5, 0.5), times=(3.0, 30.0)),))
+    result = simulate_test(case, replace(recorded(mode, stretch), time=time), "cpu", steps=8)
+    found = HomogeneousMaterial.of_case(case, ()).stress(mode, stretch, time)
+    # the rig's midpoint rule errs by its steps
+    np.testing.assert_allclose(found, result.predicted, atol=0.01 * np.abs(found).max())
+
+
 @pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)])
 def test_states_with_fibres_are_those_of_the_rig(direction):
     fibres = Fibres(direction=direction, stiffness=400.0, exponent=2.0)

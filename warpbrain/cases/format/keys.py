@@ -19,6 +19,7 @@ KINDS = {
     "vector": "3 finite numbers",
     "numbers": "a list of finite numbers",
     "pairs": "[time, factor] pairs of finite numbers",
+    "table": "a table",
 }
 
 
@@ -43,6 +44,8 @@ class Key:
         Limits of a number, themselves not allowed.
     hint : str
         What to do where it is missing or out of its limits.
+    keys : tuple of Key
+        Of a table.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Key:
     above: float = -math.inf
     below: float = math.inf
     hint: str = ""
+    keys: tuple[Key, ...] = ()
 
     def expected(self) -> str:
         """What the value should be, in words."""
@@ -76,9 +80,21 @@ class Key:
                 return f"expected {self.expected()}, found {short(value)}"
             if self.name == "name" and not (value.strip() and value.isprintable() and len(value) <= LONGEST_NAME):
                 return f"expected 1 to {LONGEST_NAME} printable characters, found {short(value)}"
+        elif isinstance(value, dict):
+            return self._fault_of_table(value)
         elif not isinstance(value, list) and not self.above < value < self.below:
             return f"found {value:g}, expected {self._limits()}"
         return ""
+
+    def _fault_of_table(self, value: dict[str, Any]) -> str:
+        keys = {key.name: key for key in self.keys}
+        for name, inner in value.items():
+            if name not in keys:
+                return f"{name}: unknown key, expected {', '.join(keys)}"
+            if fault := keys[name].fault(inner):
+                return f"{name}: {fault}"
+        missing = [key.name for key in self.keys if key.needed and key.name not in value]
+        return f"{missing[0]}: missing, found {short(value)}" if missing else ""
 
     def _limits(self) -> str:
         unit = f" [{self.unit}]" if self.unit else ""
@@ -93,6 +109,8 @@ _ALSO = {("file", "text"), ("numbers", "vector"), ("pairs", "empty"), ("numbers"
 
 def kind_of(value: Any) -> str | None:
     """The kind of `KINDS` that a value of TOML is, ``"empty"`` for a list of nothing, None if it is none."""
+    if isinstance(value, dict):
+        return "table"
     if isinstance(value, str):
         return "text"
     if finite(value):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from warpbrain.cases.format.keys import Key, Table
@@ -72,19 +73,25 @@ def _table(table: Table) -> dict[str, Any]:
     return {"type": "array", "items": schema, "description": table.doc} if table.several else schema
 
 
+def _object(keys: Iterable[Key]) -> dict[str, Any]:
+    listed = tuple(keys)
+    properties = {key.name: _key(key) for key in listed}
+    required = [key.name for key in listed if key.needed]
+    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
+
+
 def _variant(table: Table, name: str) -> dict[str, Any]:
-    keys = table.keys_of(name)
-    properties = {key.name: _key(key) for key in keys.values()}
-    required = [key.name for key in keys.values() if key.needed]
+    schema = _object(table.keys_of(name).values())
+    properties, required = schema["properties"], schema["required"]
     if table.by is not None:
         properties[table.by.name]["enum"] = [name]
         if name != table.default and table.by.name not in required:
             required.append(table.by.name)
-    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
+    return schema
 
 
 def _key(key: Key) -> dict[str, Any]:
-    kinds: list[dict[str, Any]] = [dict(_KINDS[kind]) for kind in key.kinds]
+    kinds: list[dict[str, Any]] = [_object(key.keys) if kind == "table" else dict(_KINDS[kind]) for kind in key.kinds]
     for kind in kinds:
         if kind["type"] == "string" and key.choices:
             kind["enum"] = list(key.choices)

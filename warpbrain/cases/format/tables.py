@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from warpbrain.cases.format.keys import Key, Table
-from warpbrain.frame import AXES, METRES
+from warpbrain.frame import AXES, METRES, PASCALS
 from warpbrain.physics.laws import FORMULATIONS, LAWS
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 
 ORIGINS = ("measured", "stand-in", "synthetic")
 ROLES = ("fit", "check")
-MODES = ("axial", "shear", "torsion")
+MODES = ("axial", "shear", "torsion", "confined", "biaxial")
 GRIPS = ("glued", "lubricated")
+STRESSES = ("nominal", "cauchy")
+CONTROLS = ("displacement", "force")
 
 #: Groups of the generative model: method and anatomy of the published strain-energy functions.
 PRIOR_GROUPS = tuple(
@@ -37,6 +39,16 @@ CASE = Table(
         Key("units", ("text",), "Unit of all lengths in the folder; mm if absent.", choices=tuple(METRES)),
         Key("axes", ("text",), "Axes of all vectors in the folder; RAS if absent.", choices=tuple(AXES)),
         Key("gravity_axis", ("vector",), "Where 'down' was while recording, in the axes; unknown if absent."),
+        Key(
+            "registration",
+            ("table",),
+            "How well recordings are registered to the anatomy, one standard deviation; 1 mm and 1 degree if absent.",
+            keys=(
+                Key("mm", ("number",), "Of each component of the shift, whatever the units.", "mm", True, above=0.0),
+                Key("degrees", ("number",), "Of the turn about each axis.", "degrees", True, above=0.0),
+            ),
+            hint="registration = { mm = 2.0, degrees = 1.0 }",
+        ),
     ),
 )
 
@@ -228,6 +240,21 @@ RECORDING = Table(
         "force": (Key("boundary", ("text",), "Name of the boundary that acts with it.", needed=True),),
         "test": (
             Key("mode", ("text",), "How the specimen was loaded.", needed=True, choices=MODES),
+            Key(
+                "stress",
+                ("text",),
+                "What the column stress is: force over the area at rest, or over that of an incompressible specimen; "
+                "nominal if absent.",
+                choices=STRESSES,
+            ),
+            Key("unit", ("text",), "Unit of the column stress; Pa if absent.", choices=tuple(PASCALS)),
+            Key(
+                "control",
+                ("text",),
+                "What the machine imposed, a displacement (stretch, angle) or a force (stress, torque); sigma is of "
+                "the other; displacement if absent.",
+                choices=CONTROLS,
+            ),
             Key("specimen", ("text",), "Which one was tested, where tests are of several of one shape."),
             Key("axis", ("vector",), "Direction of the tissue along the machine's axis z; z if absent."),
             Key(

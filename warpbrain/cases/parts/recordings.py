@@ -91,8 +91,20 @@ def _test(context: Context, table: Reading, sets: NodeSets | None, boundaries: s
     except InputError as error:
         table.problem("axis" if sheared is None else "sheared", str(error))
         return None
-    found = read_test(**common, mode=table.get("mode"), specimen=table.get("specimen", ""))
-    return None if found is None else replace(found, axis=axis, sheared=sheared)
+    found = read_test(
+        **common,
+        mode=table.get("mode"),
+        specimen=table.get("specimen", ""),
+        stress=table.get("stress", "nominal"),
+        unit=table.get("unit", "Pa"),
+        control=table.get("control", "displacement"),
+    )
+    if found is None:
+        return None
+    for key in ("stress", "unit"):
+        if table.named(key) and found.quantities[1] != "stress":
+            table.problem(key, f"means nothing of {' and '.join(found.quantities)}", "it says what a column stress is")
+    return replace(found, axis=axis, sheared=sheared)
 
 
 def _direction(context: Context, table: Reading, key: str) -> tuple[float, float, float] | None:

@@ -84,7 +84,7 @@ class Asymmetry(Mechanism):
     @classmethod
     def check_tests(cls, tests: Tests) -> None:
         """See `warpbrain.physics.mechanism.Mechanism`."""
-        sheared = bool(tests.modes - {"axial"})
+        sheared = bool(tests.modes & {"shear", "torsion"})
         if tests.tension + tests.compression + sheared < 2:
             raise NotTestableError(f"needs {' and '.join(cls.needs)}")
 

@@ -57,7 +57,8 @@ class Compressibility(Mechanism):
     @classmethod
     def check_tests(cls, tests: Tests) -> None:
         """See `warpbrain.physics.mechanism.Mechanism`."""
-        raise NotTestableError("needs the lateral stretch or the volume to be recorded")
+        if "confined" not in tests.modes or tests.loads < 2:
+            raise NotTestableError("needs confined compression and another test, so that the volume changes in one")
 
     def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
         """See `warpbrain.physics.mechanism.Substituting`."""

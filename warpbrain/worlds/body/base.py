@@ -16,6 +16,7 @@ import numpy as np
 from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.registration import registration_of
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
@@ -25,7 +26,7 @@ from warpbrain.threads import beside
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
-from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume, registration_sd
+from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume
 from warpbrain.worlds.body.sensing import noise_of
 from warpbrain.worlds.body.sensors import Sensors, rows_of_points, tracked_points
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
@@ -219,7 +220,8 @@ class BaseFinder:
         model = model.with_columns(columns_of_inflation(model, linear.points, inflation))
         xi, _ = model.coefficients(linear.residual)
         count = columns.shape[1]
-        self.states.realign((xi[registration] + factor * xi[count - 6 : count]) * registration_sd())
+        deviations = registration_of(self.states.case).deviations
+        self.states.realign((xi[registration] + factor * xi[count - 6 : count]) * deviations)
         farthest = belief("tissue.farthest_base")
         tissue = np.clip(xi[nuisances.part("tissue")], -farthest, farthest)
         field = np.clip(xi[nuisances.part("stiffness field")], -farthest, farthest)
@@ -272,7 +274,7 @@ class _LinearModel:
     def _residual_at_mean(self, state: SolvedState) -> Floats:
         """Residual of the linear model about a state with its tissue, field and motion at their prior mean."""
         z = self.nuisances.coordinates(self._finder.prior, state.hypothesis)
-        z[self.nuisances.part("registration")] = self._finder.states.motion / registration_sd()
+        z[self.nuisances.part("registration")] = self._finder.states.motion_coordinates
         return np.asarray(state.sensors.residual + self.nuisances.columns @ z)
 
     def with_residual_of(self, state: SolvedState) -> _LinearModel:

@@ -24,7 +24,7 @@ from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.mesh_share import MeshShare, mesh_share_of
-from warpbrain.worlds.body.nuisances import UNKNOWN_MESH, registration_sd
+from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
 
@@ -75,7 +75,7 @@ class FitSearch:
         self._layout = Layout.of(nuisances, self._U.shape[1], effects)
         # recordings were realigned by a rigid motion already, which keeps its prior cost as coordinates
         self._realigned = np.zeros(self._U.shape[1])
-        self._realigned[nuisances.part("registration")] = base.states.motion / registration_sd()
+        self._realigned[nuisances.part("registration")] = base.states.motion_coordinates
         # nonlinear coordinates and displacements of states of this fit
         self._solved: list[tuple[Floats, Floats]] = []
         self._mesh_share: MeshShare | None = None

@@ -15,6 +15,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.registration import registration_of
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
@@ -34,11 +35,6 @@ from warpbrain.worlds.body.states import Hypothesis, States
 UNKNOWN_MESH = "mesh, unknown"
 #: Step of a difference in `theta`.
 _STEP = 1e-3
-
-
-def registration_sd() -> Floats:
-    """Standard deviations (6,) of a rigid error of registration: shift [m] and turn [rad]."""
-    return np.repeat([belief("registration.shift"), belief("registration.turn")], 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +155,7 @@ def nuisances_at(
         Family("Poisson ratio", _law_columns(effects, [other_volume(states)])),
         Family("shape of the law", _law_columns(effects, _other_shape(states))),
         Family("known loads", _known_loads(at)),
-        Family("registration", sensors.rigid * registration_sd()),
+        Family("registration", sensors.rigid * registration_of(states.case).deviations),
     ]
     if mesh_errors is not None:
         error = mesh_errors.error

@@ -16,6 +16,7 @@ from warpbrain.estimation.discretisation import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.realigned import realigned
+from warpbrain.estimation.registration import registration_of
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.composition import CompositionError
 from warpbrain.physics.mechanism import Mechanism
@@ -119,6 +120,11 @@ class States:
         self.motion = motion
         case = realigned(self.case, motion, self.centre)
         self.observations = tuple(Observations.to_fit(case, None if np.isinf(time) else time) for time in self.times)
+
+    @property
+    def motion_coordinates(self) -> Floats:
+        """That motion in standard deviations (6,) of the accuracy of the registration."""
+        return self.motion / registration_of(self.case).deviations
 
     def case_of(self, hypothesis: Hypothesis) -> Case:
         """The case as a user would write it for a hypothesis, without the stiffness field."""

@@ -14,6 +14,7 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import node_areas
+from warpbrain.physics.words import number
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import spread_points
@@ -79,12 +80,12 @@ def _unit_stresses(corners: Floats) -> Floats:
     gradients = np.linalg.inv(edges).transpose(0, 2, 1)
     shapes = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1) * volumes[:, None, None]
     forces = np.zeros((len(_PAIRS), *shapes.shape))
-    for number, (i, j) in enumerate(_PAIRS):
+    for pair, (i, j) in enumerate(_PAIRS):
         # all of the same Frobenius norm, for isotropy
-        forces[number, :, :, i] += np.sqrt(0.5) * shapes[:, :, j]
-        forces[number, :, :, j] += np.sqrt(0.5) * shapes[:, :, i]
+        forces[pair, :, :, i] += np.sqrt(0.5) * shapes[:, :, j]
+        forces[pair, :, :, j] += np.sqrt(0.5) * shapes[:, :, i]
         if i == j:
-            forces[number] *= np.sqrt(0.5)
+            forces[pair] *= np.sqrt(0.5)
     return forces
 
 
@@ -99,11 +100,13 @@ def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Floats]
     forces : sequence of (n, k) arrays
         `body_forces` of these lengths.
     """
-    names = [f"body force, {1e3 * length:.0f} mm" for length in lengths]
-    columns_by_name = dict(zip(names, forces, strict=True))
-    for length in lengths:
-        columns_by_name[f"eigenstress, {1e3 * length:.0f} mm"] = eigenstresses(at, length)
-        columns_by_name[f"traction, {1e3 * length:.0f} mm"] = tractions(at, length)
+    columns_by_name = {}
+    for length, columns in zip(lengths, forces, strict=True):
+        # in bodies of any size
+        size = f"{number(1e3 * length)} mm"
+        columns_by_name[f"body force, {size}"] = columns
+        columns_by_name[f"eigenstress, {size}"] = eigenstresses(at, length)
+        columns_by_name[f"traction, {size}"] = tractions(at, length)
     return {name: columns for name, columns in columns_by_name.items() if columns.shape[1]}
 
 

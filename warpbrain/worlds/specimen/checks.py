@@ -142,7 +142,7 @@ def _coordinates(protocol: Protocol) -> Floats:
     rows = []
     for test in protocol.tests:
         strain, zero = (test.strain - test.rest) / test.reach, np.zeros(len(test.strain))
-        stretch, shear = (strain, zero) if test.mode == "axial" else (zero, strain)
+        stretch, shear = (strain, zero) if test.rest == 1.0 else (zero, strain)
         since = zero if test.time is None else np.log1p(test.time - test.time[0]) / 5.0
         rows.append(np.column_stack([stretch, shear, test.path / max(float(test.path[-1]), 1e-12), since]))
     return np.concatenate(rows)

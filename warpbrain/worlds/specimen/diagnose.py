@@ -16,7 +16,7 @@ from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, 
 from warpbrain.physics.values import Measurement, Value
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.seconds import Seconds
-from warpbrain.simulation.specimen import specimen_of
+from warpbrain.simulation.specimen import not_transmitted, specimen_of
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.specimen.actions import Effect
@@ -107,8 +107,8 @@ class DiagnosingSpecimen:
             )
         for one in recordings:
             who = f"{path}: [[recording]] '{one.name}'"
-            if specimen.grips == "lubricated" and one.mode != "axial":
-                raise InputError(f"{who} mode '{one.mode}': lubricated grips slide, nothing transmits it")
+            if why := not_transmitted(specimen.grips, one.mode):
+                raise InputError(f"{who} mode '{one.mode}': {why}")
             if not np.abs(one.response).any():
                 raise InputError(f"{who} file '{one.file}': every response is 0")
 

@@ -17,7 +17,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import SolveError
 from warpbrain.recordings.recording import TestRecording
-from warpbrain.simulation.specimen import Rig
+from warpbrain.simulation.specimen import HOMOGENEOUS, Rig
 from warpbrain.worlds.specimen.material import HomogeneousMaterial, NoStateError
 from warpbrain.worlds.specimen.protocol import REST, Protocol, radius_of, strain_of, stress_unit
 
@@ -75,6 +75,8 @@ class GluedEnds:
 
     def _curve(self, mode: str, material: HomogeneousMaterial) -> Curve:
         rest = REST[mode]
+        if mode in HOMOGENEOUS:
+            return Curve(np.array([rest]), np.ones(1))
         most = _STRETCH if mode == "axial" else _SHEAR
         strains = np.concatenate([test.strain for test in self.protocol.tests if test.mode == mode]) - rest
         low, high = max(float(strains.min()), -most), min(float(strains.max()), most)

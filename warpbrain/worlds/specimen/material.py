@@ -149,9 +149,48 @@ class HomogeneousMaterial:
         total = sum(w * r**2 * self.shear(rim * r, time) for r, w in zip(radii, weights, strict=True))
         return np.asarray(3.0 * total)
 
+    def confined(self, stretch: Floats, time: Floats | None) -> Floats:
+        """Nominal stress [Pa] along z of states that are as wide as at rest."""
+        one, g = np.ones_like(stretch), np.zeros_like(stretch)
+        found = _slope(lambda h: self.energy(one, one, stretch + h, g))
+        if time is not None and self.times:
+            found = found + stretch * self._held(self._isochoric(one, one, stretch, g)[2], time)
+        return found
+
+    def biaxial(self, stretch: Floats, time: Floats | None) -> Floats:
+        """Nominal stress [Pa] along x of states that are stretched alike along x and y, with free faces along z.
+
+        Raises
+        ------
+        NoStateError
+            If these faces find no equilibrium.
+        """
+        g, thickness = np.zeros_like(stretch), stretch ** (-2.0 * self.poisson / (1.0 - self.poisson))
+        remembers, h = time is not None and bool(self.times), _STEP
+        with np.errstate(all="ignore"):
+            for _ in range(_NEWTON):
+                down, middle, up = (self.energy(stretch, stretch, thickness + move, g) for move in (-h, 0.0, h))
+                residual, slope = (up - down) / (2.0 * h), (up - 2.0 * middle + down) / h**2
+                if time is not None and remembers:
+                    S = self._isochoric(stretch, stretch, thickness, g)[2]
+                    residual = residual + thickness * self._held(S, time)
+                    slope = slope + _BRANCH_SLOPE * self._mu * sum(self.moduli)
+                step = np.clip(residual / slope, -0.2 * thickness.min(), 0.2 * thickness.min())
+                thickness = thickness - step
+                if not np.isfinite(step).all() or np.abs(step).max() < _TOLERANCE:
+                    break
+        if not np.isfinite(step).all() or np.abs(step).max() > 1e3 * _TOLERANCE:
+            raise NoStateError("faces across a sheet find no equilibrium")
+        found = _slope(lambda h: self.energy(stretch + h, stretch, thickness, g))
+        if time is not None and remembers:
+            found = found + stretch * self._held(self._isochoric(stretch, stretch, thickness, g)[0], time)
+        return found
+
     def stress(self, mode: str, strain: Floats, time: Floats | None) -> Floats:
         """Nominal stress [Pa] of a chain of one mode."""
-        return {"axial": self.axial, "shear": self.shear, "torsion": self.torsion}[mode](strain, time)
+        by_mode = {"axial": self.axial, "shear": self.shear, "torsion": self.torsion}
+        by_mode |= {"confined": self.confined, "biaxial": self.biaxial}
+        return by_mode[mode](strain, time)
 
     def _held(self, S: Floats, time: Floats) -> Floats:
         """What all branches hold (n,) of stresses (n,)."""

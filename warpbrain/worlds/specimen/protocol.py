@@ -27,7 +27,7 @@ from warpbrain.simulation.history import corners_of, history_of
 #: the first step of a rest takes: how rows are chosen.
 _STEPS, _ROWS, _FIRST = 4, 60, 0.005
 #: Strain at rest, of each mode.
-REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0}
+REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0, "confined": 1.0, "biaxial": 1.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +219,7 @@ def test_of(specimen: Specimen, recording: TestRecording) -> Test:
         stress=stress,
         time=recording.time,
         strain_path=np.zeros(len(strain)),
-        sigma=unit * recording.sigma if recording.sigma is not None else roughness(stress),
+        sigma=_reading(specimen, recording, strain, stress),
         unit=unit,
         peak=float(np.abs(stress).max()),
         reach=max(float(away.max()), 1e-12),
@@ -234,10 +234,28 @@ def test_of(specimen: Specimen, recording: TestRecording) -> Test:
 test_of.__test__ = False  # type: ignore[attr-defined]  # not a test of pytest's
 
 
+def _reading(specimen: Specimen, recording: TestRecording, strain: Floats, stress: Floats) -> float:
+    """Noise of a reading [Pa]: as declared, or as rough as the record is.
+
+    Where the force was imposed the strain was read, and its noise is that of a stress by the secant to the largest one:
+    the stress at a strain is compared, whatever the machine imposed.
+    """
+    if not recording.force_controlled:
+        return stress_unit(specimen, recording) * recording.sigma if recording.sigma is not None else roughness(stress)
+    rest = REST[recording.mode]
+    stiffness = float(np.abs(stress).max()) / max(float(np.abs(strain - rest).max()), 1e-12)
+    if recording.sigma is None:
+        return stiffness * roughness(strain)
+    # strains are linear in what was read
+    quantity = recording.quantities[0]
+    one, none = (strain_of(specimen, recording.mode, quantity, np.array([value])) for value in (recording.sigma, 0.0))
+    return stiffness * abs(float((one - none)[0]))
+
+
 def strain_of(specimen: Specimen, mode: str, quantity: str, imposed: Floats) -> Floats:
     """Stretch or shear of what was imposed."""
     height = specimen.size[2]
-    if mode == "axial":
+    if REST[mode] == 1.0:
         return imposed if quantity == "stretch" else 1.0 + imposed / height
     return imposed / height if mode == "shear" else imposed * radius_of(specimen) / height
 

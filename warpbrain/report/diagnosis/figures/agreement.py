@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from warpbrain.physics.words import length
 from warpbrain.report.diagnosis.figures.drawing import COLOURS, MARKERS, TEXT, inlined, panels
 from warpbrain.report.diagnosis.saved import STATES, Rows
-from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.generative.page import BLACK
 
 
@@ -42,9 +42,9 @@ def agreement_figure(summary: dict[str, Any], rows: Rows) -> str:
         panel.set_aspect("equal")
         for axis in (panel.xaxis, panel.yaxis):
             axis.set_major_locator(MaxNLocator(5))
-        rmse = MILLIMETRES * summary["fit"]["rmse_m"][state]
-        errors.append(f"{STATES[state]} {rmse:.2f} mm")
-        panel.set_title(f"{STATES[state]}\nRMSE {rmse:.2f} mm", fontsize=TEXT)
+        rmse = length(summary["fit"]["rmse_m"][state])
+        errors.append(f"{STATES[state]} {rmse}")
+        panel.set_title(f"{STATES[state]}\nRMSE {rmse}", fontsize=TEXT)
         panel.set_xlabel("computed [mm]", fontsize=TEXT)
     axes[0].set_ylabel("observed [mm]", fontsize=TEXT)
     caption = (

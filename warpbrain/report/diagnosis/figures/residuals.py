@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.physics.words import number
+from warpbrain.physics.words import length, number
 from warpbrain.report.diagnosis.figures.drawing import COLOURS, TEXT, inlined, panels
 from warpbrain.report.diagnosis.figures.slices import centre_of, draw_slice, frame_slice, millimetres
 from warpbrain.report.diagnosis.saved import STATES, Anatomy, Rows
@@ -45,9 +45,9 @@ def residuals_figure(summary: dict[str, Any], anatomy: Anatomy, rows: Rows) -> s
         )  # fmt: skip
         panel.plot(*start[counted].T, ".", color=BLACK, markersize=2.0, zorder=6)
         panel.plot(*start[vectors.aside].T, "x", color=BLACK, markersize=6.0, zorder=6)
-        rmse = MILLIMETRES * summary["fit"]["rmse_m"][state]
-        errors.append(f"{STATES[state]} {rmse:.2f} mm")
-        panel.set_title(f"{STATES[state]}\nRMSE {rmse:.2f} mm", fontsize=TEXT + 1)
+        rmse = length(summary["fit"]["rmse_m"][state])
+        errors.append(f"{STATES[state]} {rmse}")
+        panel.set_title(f"{STATES[state]}\nRMSE {rmse}", fontsize=TEXT + 1)
         frame_slice(panel, anatomy, view)
     key = _round(MILLIMETRES * large)
     _key(axes[-1], anatomy, key, enlarged)

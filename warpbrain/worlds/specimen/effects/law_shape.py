@@ -25,7 +25,11 @@ _MOST = 8.0
 
 
 def first_invariant(mode: str, strain: Floats) -> Floats:
-    """`I1 - 3` of incompressible states at stretches or shears (of torsion: at the rim)."""
+    """`I1 - 3` of incompressible states at stretches or shears (torsion: at the rim); confined: `J^(-2/3) I1 - 3`."""
+    if mode == "confined":
+        return strain ** (4.0 / 3.0) + 2.0 * strain ** (-2.0 / 3.0) - 3.0
+    if mode == "biaxial":
+        return 2.0 * strain**2 + strain**-4 - 3.0
     return strain**2 + 2.0 / strain - 3.0 if mode == "axial" else strain**2
 
 
@@ -35,12 +39,20 @@ def invariant_rows(protocol: Protocol) -> Floats:
 
 
 def excess_rows(rows: Baseline) -> Floats:
-    """Stress (n,) of `I2` less that of `I1` [Pa]: `(1 - l^-3) - (l - l^-2)` at one shear modulus, none in shear."""
-    found = [
-        1.0 - test.strain**-3 - test.strain + test.strain**-2 if test.mode == "axial" else np.zeros(len(test.strain))
-        for test in rows.protocol.tests
-    ]
-    return rows.mu * np.concatenate(found) * rows.glued
+    """Stress (n,) of `I2` less that of `I1` [Pa] at one shear modulus; confined: of the changes of shape."""
+    return rows.mu * np.concatenate([_excess(test.mode, test.strain) for test in rows.protocol.tests]) * rows.glued
+
+
+def _excess(mode: str, l: Floats) -> Floats:
+    """Slopes of `I2 / 2` less those of `I1 / 2`, along the machine's axis (biaxial: along one of two)."""
+    if mode == "axial":
+        return 1.0 - l**-3 - l + l**-2
+    if mode == "biaxial":
+        return l**3 - l**-3 - l + l**-5
+    if mode == "confined":
+        return 2.0 / 3.0 * (l ** (-1.0 / 3.0) - l ** (-7.0 / 3.0) - l ** (1.0 / 3.0) + l ** (-5.0 / 3.0))
+    # in shear both invariants are one
+    return np.zeros(len(l))
 
 
 def stiffening(case: Case, protocol: Protocol) -> Effect:
@@ -57,8 +69,8 @@ def stiffening(case: Case, protocol: Protocol) -> Effect:
 
 def second_invariant(case: Case, protocol: Protocol) -> Effect:
     """A share of any size."""
-    if not any(test.mode == "axial" for test in protocol.tests if test.fitted):
-        raise NotTestableError("needs an axial test: in shear both invariants are one")
+    if not any(test.rest == 1.0 for test in protocol.tests if test.fitted):
+        raise NotTestableError("needs an axial, confined or biaxial test: in shear both invariants are one")
 
     def act(share: float, rows: Baseline) -> Action:
         return Action(scaled=share * excess_rows(rows))

@@ -17,17 +17,20 @@ from warpbrain.worlds.specimen.protocol import Protocol, Test
 
 #: Rates that differ less than this are one rate, relative; a share of the duration at rest that counts as a hold.
 _RATES, _HOLD = 1.5, 0.1
+#: Modes of which the sign of the strain means something to a law that does not know volume.
+_PULLED = ("axial", "biaxial")
 
 
 def effects(case: Case, protocol: Protocol) -> tuple[dict[str, Effect], dict[str, str]]:
     """Mechanisms by name, and why others are not looked for."""
     tests = [protocol.tests[k] for k in protocol.to_fit]
-    axial = [test for test in tests if test.mode == "axial"]
+    # of the tissue's own change of shape: to be pulled along two axes is to be pressed along the third
+    sides = [(test.strain - 1.0) * (1.0 if test.mode == "axial" else -1.0) for test in tests if test.mode in _PULLED]
     shown = Tests(
         frozenset(test.mode for test in tests),
         len({(test.mode, np.round(test.turn, 6).tobytes()) for test in tests}),
-        any(test.strain.max() > 1.01 for test in axial),
-        any(test.strain.min() < 0.99 for test in axial),
+        any(side.max() > 0.01 for side in sides),
+        any(side.min() < -0.01 for side in sides),
     )
     situation = _situation(case, 2 if tells_time(protocol) else 1)
     found: dict[str, Effect] = {}
