@@ -12,7 +12,7 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.boundary import Boundary, Fixed
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
-from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.realigned import realigned
