@@ -30,6 +30,7 @@ def describe_common(
         "verdict": found.verdict,
         "sentence": sentence,
         "p_value": found.p_value,
+        "p_left": found.p_left,
         "mechanism": names[0] if names else None,
         "probability": best.probability if best else (found.ranking[0].probability if found.ranking else None),
         "parameters": describe_values(best.values) if best else {},

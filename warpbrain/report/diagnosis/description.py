@@ -25,7 +25,6 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
     particular = {
         "hypotheses": [_combination(one) for one in found.combinations],
         "by_posterior": {"verdict": found.by_posterior.verdict, "causes": list(found.by_posterior.causes)},
-        "p_left": found.p_left,
         "where": _where(found, best),
         "mechanisms": [_named(one, found.case.gravity_axis) for one in found.named],
         "unknown": _unknown(found.unknown),

@@ -23,7 +23,6 @@ from warpbrain.report.diagnosis.tables import (
     next_table,
     rejected_table,
     smallest_table,
-    stages_table,
     table,
     text,
 )
@@ -72,9 +71,7 @@ def page_of(saved: Saved) -> str:
         _verdict(summary),
         _before_and_after(saved),
         _view(saved),
-        _section(
-            "Candidates", candidates_figure(summary), _CANDIDATES, candidates_table(summary), stages_table(summary)
-        ),
+        _section("Candidates", candidates_figure(summary), _CANDIDATES, candidates_table(summary)),
         _where(saved),
         _apart(summary),
         _section("What to measure next", _next(summary)),

@@ -21,10 +21,8 @@ _STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained"
 def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptions, device: str) -> dict[str, Any]:
     """Everything that is known of a diagnosis; stresses in Pa, other units beside the values."""
     where = found.where
-    named = [_ranked(one) for one in found.named]
     particular = {
-        "named": named,
-        "mechanisms": named,
+        "mechanisms": [_ranked(one) for one in found.named],
         "where": None
         if where is None
         else {"test": where.test, "mode": where.mode, "segment": where.segment, "strain": list(where.strain)},
@@ -32,7 +30,6 @@ def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptio
         "ranking": [_ranked(one) for one in found.ranking]
         + [_rejected(name, why) for name, why in found.rejected.items()],
         "combinations": [asdict(one) for one in found.combinations],
-        "stages": _stages(found),
         "before_checks": {"verdict": found.by_posterior.verdict, "causes": list(found.by_posterior.causes)},
         "smallest_detectable": {
             name: {"size": one.size, "unit": one.unit, "parameter": one.name} for name, one in found.smallest.items()
@@ -65,20 +62,6 @@ def _rejected(name: str, why: str) -> dict[str, Any]:
     nothing = dict.fromkeys(("log_evidence", "heldout_rmse_change_pa", "detectability"))
     return {"mechanism": name, "physics": True, "probability": 0.0, **nothing, "estimate": {}, "region": "",
             "rejected_because": why}  # fmt: skip
-
-
-def _stages(found: SpecimenDiagnosis) -> list[dict[str, Any]]:
-    """What is left of the base, with the sets of causes that would explain it, and of the fit with what was added."""
-    candidates = [{"mechanism": " and ".join(one.causes) or "nothing", **asdict(one)} for one in found.combinations]
-    added = " and ".join(found.assumed) or None
-    stages = [
-        {"with": [], "p_value": found.p_value, "noise_scale": found.scale, "candidates": candidates, "added": added,
-         "why_not": " ".join(found.doubts)}
-    ]  # fmt: skip
-    if found.p_left is not None:
-        stages.append({"with": list(found.assumed), "p_value": found.p_left, "noise_scale": None, "candidates": [],
-                       "added": None, "why_not": ""})  # fmt: skip
-    return stages
 
 
 def _fit(found: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:

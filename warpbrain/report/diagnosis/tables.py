@@ -75,24 +75,6 @@ def rejected_table(summary: dict[str, Any]) -> str:
     return table(("not tried", "why"), rows) if rows else ""
 
 
-def stages_table(summary: dict[str, Any]) -> str:
-    """One mechanism after the other, as they were added to a specimen; empty of a body."""
-    rows = []
-    for stage in summary.get("stages", ()):
-        best = stage["candidates"][0] if stage["candidates"] else None
-        rows.append(
-            [
-                text(" and ".join(stage["with"]) or "nothing added"),
-                f"{stage['p_value']:.2g}",
-                "" if best is None else f"{text(best['mechanism'])} ({percent(best['probability'])})",
-                text(stage["added"] or ""),
-                text(stage["why_not"]),
-            ]
-        )
-    head = ("with", "p, nothing is left", "most probable", "added", "why not")
-    return table(head, rows, numbers=(1,), caption="One after the other") if rows else ""
-
-
 def fit_table(summary: dict[str, Any]) -> str:
     """Errors of each state, at what was fitted, held out, and only checked."""
     unit, fit = unit_of(summary), summary["fit"]
