@@ -47,6 +47,8 @@ class Rows:
         Of which recordings the noise is known.
     points : tuple of int arrays
         Rows of each point that may be a gross error, those of a recording together; forces have none.
+    times : (n,) array, optional
+        When [s]; all at the end unless given.
     """
 
     positions: Floats
@@ -55,6 +57,7 @@ class Rows:
     recordings: Ints
     declared: Bools
     points: tuple[Ints, ...]
+    times: Floats | None = None
 
     @classmethod
     def of(cls, observations: Observations, parts: tuple[Residuals, ...]) -> Rows:
@@ -80,8 +83,9 @@ class Rows:
         )
 
     def covariance(self, sigma: Floats) -> Floats:
-        """Of the noise at a scale of 1, (n, n), with standard deviations (n,): all was recorded at the end."""
-        return noise_covariance(self.positions, self.directions, np.full(len(sigma), np.inf), sigma)
+        """Of the noise at a scale of 1, (n, n), with standard deviations (n,)."""
+        times = np.full(len(sigma), np.inf) if self.times is None else self.times
+        return noise_covariance(self.positions, self.directions, times, sigma)
 
 
 @dataclass(frozen=True, eq=False)

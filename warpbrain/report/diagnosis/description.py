@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
-from warpbrain.arrays import Floats
+from warpbrain.diagnosis.held_out import distance
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Combination, Diagnosis, Ranked
@@ -16,7 +14,6 @@ from warpbrain.diagnosis.traits import Traits
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import smallest_in_words
 from warpbrain.report.diagnosis.common import describe_common, describe_values
-from warpbrain.worlds.body.sensors import Sensors
 
 
 def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:
@@ -152,16 +149,8 @@ def _rejected(kind: str, why: str) -> dict[str, Any]:
     }
 
 
-def noise_distance(noise: Floats, sensors: Sensors) -> float | None:
-    """Root mean square [m] of the distance in space that noise (n,) [m] alone leaves at a recorded point."""
-    rows = sensors.is_displacement
-    if not rows.any():
-        return None
-    return float(np.sqrt(np.sum(noise[rows] ** 2) / len(np.unique(sensors.groups[rows]))))
-
-
 def _fit(found: Diagnosis) -> dict[str, Any]:
-    fit = found.fit
+    fit, noise, sensors = found.fit, found.base.noise, found.base.at.sensors
     rows = {"declared": fit.declared, "refitted": fit.refitted, "explained": fit.explained}
     check = dict(zip(rows, fit.check, strict=False)) if fit.check else None
     improvement = fit.improvement
@@ -170,10 +159,8 @@ def _fit(found: Diagnosis) -> dict[str, Any]:
         "heldout_rmse_m": {name: None if pair is None else pair[1] for name, pair in rows.items()},
         "check_rmse_m": check,
         "ceiling_heldout_rmse_m": fit.ceiling,
-        "noise_m": float(found.base.noise[found.base.at.sensors.is_displacement].mean())
-        if found.base.at.sensors.is_displacement.any()
-        else None,
-        "noise_rmse_m": noise_distance(found.base.noise, found.base.at.sensors),
+        "noise_m": float(noise[sensors.is_displacement].mean()) if sensors.is_displacement.any() else None,
+        "noise_rmse_m": distance(sensors, noise) if sensors.is_displacement.any() else None,
         "improvement": None
         if improvement is None
         else {"part": improvement[0], "interval_95": [improvement[1], improvement[2]]},
