@@ -20,8 +20,7 @@ from warpbrain.physics.laws import NeoHookean
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.report.diagnosis.files import write_explained
-from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines
-from warpbrain.report.diagnosis.specimen_curves import write_curves
+from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines, write_curves
 from warpbrain.report.files import write_summary
 from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.worlds.listener import Listener

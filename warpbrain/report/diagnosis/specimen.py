@@ -1,12 +1,16 @@
-"""A diagnosis of a specimen as JSON and as lines of text: the keys of `diagnosis.json`, stresses for lengths."""
+"""A diagnosis of a specimen as JSON, with stresses for lengths, as lines of text and as curves."""
 
 from __future__ import annotations
 
 import math
 import textwrap
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from warpbrain.atomic import whole_file
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.probability import percent
 from warpbrain.report.diagnosis.common import describe_common, describe_values
@@ -127,3 +131,21 @@ def specimen_diagnosis_lines(found: SpecimenDiagnosis) -> list[str]:
         lines += ["", "  what to measure next (expected log Bayes factor between the two most probable sets):"]
         lines += [f"    {one.expected_nats:8.1f}  {one.what}" for one in found.next_measurement[:4]]
     return lines
+
+
+def write_curves(path: Path, found: SpecimenDiagnosis) -> None:
+    """Write one row for each that was compared; times [s] are empty where there are none, stresses are nominal [Pa]."""
+    names = list(found.stresses)
+    simulated_names = [f"{name.replace(' ', '_')}_pa" for name in names]
+    header = ["test", "mode", "role", "time_s", "strain", "recorded_pa", *simulated_names]
+    lines = [",".join(header)]
+    for test, rows in zip(found.protocol.tests, found.protocol.rows, strict=True):
+        label = '"' + test.name.replace('"', '""') + '"'
+        simulated = np.column_stack([found.stresses[name][rows] for name in names])
+        for k in range(len(test.strain)):
+            time = "" if test.time is None else f"{test.time[k]:.9g}"
+            numbers = [f"{test.strain[k]:.9g}", f"{test.stress[k]:.9g}"]
+            numbers += ["" if np.isnan(value) else f"{value:.9g}" for value in simulated[k]]
+            lines.append(",".join([label, test.mode, "fit" if test.fitted else "check", time, *numbers]))
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
