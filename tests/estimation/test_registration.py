@@ -17,8 +17,7 @@ from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.prior_modes import PriorMode
 from warpbrain.estimation.problem import Problem
-from warpbrain.estimation.realigned import realigned
-from warpbrain.estimation.registration import Registration, moved_back, moved_back_columns, rigid_columns
+from warpbrain.estimation.registration import Registration, moved_back, moved_back_columns, realigned, rigid_columns
 
 THETA = np.log([1000.0])
 

@@ -10,7 +10,7 @@ from warpbrain.diagnosis.held_out import distance
 from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.observations import Observations
-from warpbrain.estimation.realigned import realigned
+from warpbrain.estimation.registration import realigned
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
 from warpbrain.worlds.body.nuisances import registration_sd

@@ -15,7 +15,7 @@ from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
-from warpbrain.estimation.realigned import realigned
+from warpbrain.estimation.registration import realigned
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.composition import CompositionError
 from warpbrain.physics.mechanism import Mechanism
