@@ -13,13 +13,13 @@ import numpy as np
 from warpbrain.atomic import whole_file
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.probability import percent
-from warpbrain.report.diagnosis.common import describe_common, describe_values
+from warpbrain.report.diagnosis.common import describe_cause, describe_common, describe_decision, describe_values
+from warpbrain.report.diagnosis.saved import STATES
 from warpbrain.worlds.specimen.diagnose import SpecimenOptions
 from warpbrain.worlds.specimen.result import Ranked, SpecimenDiagnosis
 from warpbrain.worlds.specimen.sentences import sentence_of
 
 _WIDTH = 110
-_STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what was added"}
 
 
 def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptions, device: str) -> dict[str, Any]:
@@ -32,9 +32,9 @@ def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptio
         else {"test": where.test, "mode": where.mode, "segment": where.segment, "strain": list(where.strain)},
         "when": None if where is None or where.time is None else {"seconds": list(where.time)},
         "ranking": [_ranked(one) for one in found.ranking]
-        + [_rejected(name, why) for name, why in found.rejected.items()],
+        + [describe_cause(name, why, heldout_rmse_change_pa=None) for name, why in found.rejected.items()],
         "combinations": [asdict(one) for one in found.combinations],
-        "before_checks": {"verdict": found.by_posterior.verdict, "causes": list(found.by_posterior.causes)},
+        "before_checks": describe_decision(found.by_posterior),
         "smallest_detectable": {
             name: {"size": one.size, "unit": one.unit, "parameter": one.name} for name, one in found.smallest.items()
         },
@@ -51,25 +51,21 @@ def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptio
 
 def _ranked(one: Ranked) -> dict[str, Any]:
     stands = math.isfinite(one.log_evidence)
-    return _rejected(one.name, "" if stands else "no fit with it stands") | {
-        "physics": one.kind is Kind.PHYSICS,
-        "log_evidence": one.log_evidence if stands else None,
-        "probability": one.probability,
-        "heldout_rmse_change_pa": one.change,
-        "detectability": one.detectability,
-        "estimate": describe_values(one.values),
-        "region": one.region,
-    }
-
-
-def _rejected(name: str, why: str) -> dict[str, Any]:
-    nothing = dict.fromkeys(("log_evidence", "heldout_rmse_change_pa", "detectability"))
-    return {"mechanism": name, "physics": True, "probability": 0.0, **nothing, "estimate": {}, "region": "",
-            "rejected_because": why}  # fmt: skip
+    return describe_cause(
+        one.name,
+        "" if stands else "no fit with it stands",
+        physics=one.kind is Kind.PHYSICS,
+        log_evidence=one.log_evidence if stands else None,
+        probability=one.probability,
+        heldout_rmse_change_pa=one.change,
+        detectability=one.detectability,
+        estimate=describe_values(one.values),
+        region=one.region,
+    )
 
 
 def _fit(found: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
-    scores = {name: found.scores.get(name) for name in _STATES}
+    scores = {name: found.scores.get(name) for name in STATES}
     gain = found.improvement
     return {
         "rmse_pa": {name: one.fitted if one else None for name, one in scores.items()},
@@ -121,7 +117,7 @@ def specimen_diagnosis_lines(found: SpecimenDiagnosis) -> list[str]:
         lines += ["", "  not tried:"]
         lines += [f"    {name}: {why}" for name, why in found.rejected.items()]
     lines += ["", "  RMSE of all rows [Pa]          fitted   held out   check"]
-    for key, name in _STATES.items():
+    for key, name in STATES.items():
         score = found.scores.get(key)
         if score is not None:
             held = " " * 10 if score.heldout is None else f"{score.heldout:10.4g}"
