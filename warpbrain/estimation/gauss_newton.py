@@ -122,7 +122,7 @@ class GaussNewton:
         """Downhill with one noise to where a step is no longer worth it."""
         from scipy.optimize import least_squares
 
-        descent = _Descent(self.problem, point, linearised, tolerance, self._record)
+        descent = _Descent(self, point, linearised, tolerance)
         with contextlib.suppress(_ConvergedError):
             least_squares(
                 descent.residuals, np.zeros_like(descent.low), descent.jacobian, (descent.low, descent.high),
@@ -132,7 +132,8 @@ class GaussNewton:
         # farther away it is rounding of the objective, or nothing better lies this way
         return descent.point, descent.linearised, descent.decrement <= 10.0 * tolerance
 
-    def _record(self, objective: float, decrement: float, share: float, newton: int) -> None:
+    def record(self, objective: float, decrement: float, share: float, newton: int) -> None:
+        """Take notice of a step; see `GaussNewtonStep`."""
         self._history.append(GaussNewtonStep(len(self._history) + 1, objective, decrement, share, newton))
         if self._on_step is not None:
             self._on_step(self._history[-1])
@@ -149,16 +150,10 @@ class _Descent:
     estimated along, since the first step goes no farther than one unit.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        point: Point,
-        linearised: Linearised,
-        tolerance: float,
-        record: Callable[[float, float, float, int], None],
-    ) -> None:
-        self.problem, self.point, self.linearised, self.decrement = problem, point, linearised, np.inf
-        self._tolerance, self._record = tolerance, record
+    def __init__(self, search: GaussNewton, point: Point, linearised: Linearised, tolerance: float) -> None:
+        self.problem = problem = search.problem
+        self.point, self.linearised, self.decrement = point, linearised, np.inf
+        self._search, self._tolerance = search, tolerance
         self._origin, along = point.coordinates, problem.nuisances.prior.standard_deviations
         self._scale = np.concatenate([problem.parameters.reach, 10.0 * along])
         open_ends = np.full(len(along), np.inf)
@@ -196,9 +191,8 @@ class _Descent:
         if self._better is not None:
             objective, (self.point, self.linearised) = self.point.objective, self._better
             before, J = self._last
-            self._record(
-                objective, self.decrement, float(np.linalg.norm(J @ (z - before))) / self.decrement, self._newton
-            )
+            share = float(np.linalg.norm(J @ (z - before))) / self.decrement
+            self._search.record(objective, self.decrement, share, self._newton)
             self._newton = 0
         white = self.point.noise.standardised(self.linearised.jacobian)
         J = np.concatenate([white, self._whitening]) * self._scale
