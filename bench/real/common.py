@@ -17,10 +17,10 @@ from warpbrain.cases.reading import read_case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.cases.writing import write_case
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.report.diagnosis.files import write_explained
-from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines
-from warpbrain.report.diagnosis.specimen_curves import write_curves
+from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines, write_curves
 from warpbrain.report.files import write_summary
 from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.worlds.listener import Listener
@@ -114,23 +114,11 @@ def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosi
 
 def row(found: SpecimenDiagnosis, said: dict[str, Any]) -> dict[str, Any]:
     """What the docs say of a case: no curve, no row of the data."""
-    keys = (
-        "verdict",
-        "sentence",
-        "p_value",
-        "mechanism",
-        "named",
-        "combinations",
-        "group",
-        "doubts",
-        "where",
-        "when",
-        "fit",
-    )
+    keys = ("verdict", "sentence", "p_value", "mechanism", "combinations", "group", "doubts", "where", "when", "fit")
     by_test: dict[str, Any] = {}
     for each, rows in zip(found.protocol.tests, found.protocol.rows, strict=True):
         errors = {
-            name: float(np.sqrt(np.mean((each.stress - stress[rows]) ** 2)))
+            name: root_mean_square(each.stress - stress[rows])
             for name, stress in found.stresses.items()
             if not np.isnan(stress[rows]).any()
         }
@@ -142,6 +130,7 @@ def row(found: SpecimenDiagnosis, said: dict[str, Any]) -> dict[str, Any]:
         }
     return {
         **{key: said[key] for key in keys},
+        "named": said["mechanisms"],
         "not_tried": {
             one["mechanism"]: one["rejected_because"] for one in said["ranking"] if one["log_evidence"] is None
         },

@@ -9,7 +9,7 @@ from sinking_block import NOISE, OPTIONS
 from warpbrain.diagnosis.checking import check_errors
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.diagnosis.result import EXPLAINED, REFITTED
-from warpbrain.estimation.realigned import realigned
+from warpbrain.estimation.registration import realigned
 
 
 def test_what_is_named_leaves_noise(small_diagnosis):

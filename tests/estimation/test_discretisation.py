@@ -7,7 +7,8 @@ import pytest
 from synthetic import GREY, WHITE, block, truth, with_laws
 
 from warpbrain.errors import InputError
-from warpbrain.estimation.discretisation import NAMES, Discretisation, DiscretisationError, FinerMesh
+from warpbrain.estimation.discretisation import NAMES, Discretisation, DiscretisationError, discretisation_error
+from warpbrain.estimation.finer_mesh import FinerMesh
 from warpbrain.estimation.forward import Forward
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.laws import NeoHookean
@@ -20,7 +21,7 @@ def error_at(case, theta: np.ndarray) -> DiscretisationError:
     forward = Forward(case, theta, "cpu")
     state = forward.solve(theta)
     derivatives = forward.differentiate(state)
-    return FinerMesh(case, theta, "cpu").error(state, (derivatives.u, derivatives.reactions))
+    return discretisation_error(FinerMesh("cpu"), forward, state, (derivatives.u, derivatives.reactions))
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,8 @@ from synthetic import SIDE, WHITE, block, truth
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
-from warpbrain.estimation.discretisation import DiscretisationError, FinerMesh
+from warpbrain.estimation.discretisation import DiscretisationError, discretisation_error
+from warpbrain.estimation.finer_mesh import FinerMesh
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.mesh.refinement import refined
@@ -53,7 +54,7 @@ def error_of_mesh(case: Case) -> DiscretisationError:
     forward = Forward(case, THETA, "cpu")
     state = forward.solve(THETA)
     found = forward.differentiate(state)
-    return FinerMesh(case, THETA, "cpu").error(state, (found.u, found.reactions))
+    return discretisation_error(FinerMesh("cpu"), forward, state, (found.u, found.reactions))
 
 
 def test_every_mechanism_that_an_estimate_can_have_is_here() -> None:

@@ -8,7 +8,8 @@ from scipy.stats import multivariate_normal
 from synthetic import GREY, WHITE, beads, block, lid, scale, truth
 
 from warpbrain.errors import InputError
-from warpbrain.estimation.discretisation import NAMES, Discretisation, FinerMesh
+from warpbrain.estimation.discretisation import NAMES, Discretisation, discretisation_error
+from warpbrain.estimation.finer_mesh import FinerMesh
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.likelihood import Likelihood, Noise, Rows
@@ -36,7 +37,7 @@ def problem(request: pytest.FixtureRequest) -> Problem:
     forward = Forward(case, THETA, "cpu")
     state = forward.solve(THETA)
     derivatives = forward.differentiate(state)
-    error = FinerMesh(case, THETA, "cpu").error(state, (derivatives.u, derivatives.reactions))
+    error = discretisation_error(FinerMesh("cpu"), forward, state, (derivatives.u, derivatives.reactions))
     mode = PriorMode(
         1.0, Gaussian(np.log([1000.0, 900.0]), np.diag([0.5, 0.6])), np.full(2, -np.inf), np.full(2, np.inf)
     )

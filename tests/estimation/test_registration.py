@@ -20,8 +20,7 @@ from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.prior_modes import PriorMode
 from warpbrain.estimation.problem import Problem
-from warpbrain.estimation.realigned import realigned
-from warpbrain.estimation.registration import moved_back, moved_back_columns, rigid_columns
+from warpbrain.estimation.registration import moved_back, moved_back_columns, realigned, rigid_columns
 from warpbrain.recordings.registration import Registration
 from warpbrain.worlds.body.nuisances import nuisances_at
 from warpbrain.worlds.body.states import States

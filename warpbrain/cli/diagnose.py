@@ -110,10 +110,9 @@ class _Way(NamedTuple):
 
 def _of_a_body() -> _Way:
     from warpbrain.diagnosis.diagnose import Diagnosing
-    from warpbrain.report.diagnosis.covariance import write_covariance
     from warpbrain.report.diagnosis.description import describe_diagnosis
     from warpbrain.report.diagnosis.files import write_map
-    from warpbrain.report.diagnosis.points import write_points
+    from warpbrain.report.diagnosis.points import write_covariance, write_points
     from warpbrain.report.diagnosis.text import diagnosis_lines
 
     tables: dict[str, Callable[[Path, Any], None]]
@@ -122,8 +121,7 @@ def _of_a_body() -> _Way:
 
 
 def _of_a_specimen() -> _Way:
-    from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines
-    from warpbrain.report.diagnosis.specimen_curves import write_curves
+    from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines, write_curves
     from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 
     return _Way(

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from warpbrain.recordings.registration import Registration
     from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
+#: Nodes up to which it is said unasked what else may act: its cost grows faster than that of an estimate.
+_LARGEST = 20_000
 #: Steps of Gauss-Newton, as printed.
 _HEADER = "  step    objective   to go [sd]    taken   Newton"
 
@@ -65,8 +67,9 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     add("--no-discretisation", action="store_true", help="take the mesh for exact")
     add(
         "--causes",
-        action="store_true",
-        help="also say how probable it is that nothing acts but what the case says, and tissue averaged over what may",
+        action=argparse.BooleanOptionalAction,
+        help="whether to say how probable it is that nothing acts but what the case says, and tissue averaged over "
+        f"what may (default: on meshes of up to {_LARGEST} nodes)",
     )
     add("--samples", type=int, default=40, metavar="N", help="equilibria that check the posterior (default: 40)")
     add("--seed", type=int, default=0, metavar="S", help="of these draws (default: 0)")
@@ -164,7 +167,11 @@ def _estimate(
         posterior = Estimation(case, model, asked, options.device, listener).run()
     finally:
         progress.clear()
-    averaged = _averaged(posterior, options.device, on_stage) if options.causes else None
+    averaged = None
+    if options.causes or (options.causes is None and len(case.mesh.points) <= _LARGEST):
+        averaged = _averaged(posterior, options.device, on_stage)
+    elif options.causes is None:
+        say("", f"what else may act is left out on more than {_LARGEST} nodes; --causes computes it", sep="\n")
     say("", *estimate_lines(posterior, averaged), sep="\n")
     write_predictions(out / "predictions.csv", posterior)
     estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)

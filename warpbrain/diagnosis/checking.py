@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.held_out import distance
 from warpbrain.errors import SolveError
-from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.observations import Observations
-from warpbrain.estimation.realigned import realigned
+from warpbrain.estimation.registration import realigned
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
 from warpbrain.worlds.body.refit import Refit

@@ -30,15 +30,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.forward import ROUGH, Forward, State
-from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.finer_mesh import Difference, FinerMesh
+from warpbrain.estimation.forward import Forward, State
 from warpbrain.inference.beliefs import belief
 from warpbrain.recordings.agreement import root_mean_square
-from warpbrain.simulation.finer import FinerCase, GivenForces, restricted
-from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.sensitivity import Sensitivities
 
 #: Of the range of `b` in which the error of the stiffness is finite: beyond, `a` goes on along its tangent.
 _WHOLE = 0.8
@@ -89,44 +85,6 @@ class Discretisation:
 
 
 @dataclass(frozen=True, eq=False)
-class Difference:
-    """The error of a mesh.
-
-    Attributes
-    ----------
-    u, reactions : (n, 3) array
-        Of the state on elements of half the size less the state, at the nodes of the mesh [m] and [N].
-    theta : (p,) array
-        Where it was computed.
-    """
-
-    u: Floats
-    reactions: Floats
-    theta: Floats
-
-    @property
-    def size(self) -> float:
-        """Root mean square over the nodes [m]."""
-        return root_mean_square(self.u)
-
-    def less(self, other: Difference) -> Difference:
-        """By how much it is more than another."""
-        return Difference(self.u - other.u, self.reactions - other.reactions, self.theta)
-
-    def plus(self, other: Difference) -> Difference:
-        """Both together."""
-        return Difference(self.u + other.u, self.reactions + other.reactions, self.theta)
-
-    def times(self, factor: float) -> Difference:
-        """So many times as large."""
-        return Difference(factor * self.u, factor * self.reactions, self.theta)
-
-
-#: Displacement, reactions (n, 3) and their derivatives (p, n, 3).
-Sensitive = tuple[Floats, Floats, Floats, Floats]
-
-
-@dataclass(frozen=True, eq=False)
 class Change(Difference):
     """The error of a mesh to first order in the parameters.
 
@@ -138,12 +96,6 @@ class Change(Difference):
 
     du: Floats
     dR: Floats
-
-    @classmethod
-    def between(cls, theta: Floats, first: Sensitive, second: Sensitive) -> Change:
-        """From the first state to the second."""
-        u, reactions, du, dR = (after - before for before, after in zip(first, second, strict=True))
-        return cls(u, reactions, theta, du, dR)
 
     def at(self, theta: Floats) -> tuple[Floats, Floats]:
         """Displacement and reactions (n, 3) with other parameters (p,)."""
@@ -216,66 +168,37 @@ class DiscretisationError:
         return np.concatenate([np.ones((len(self.positions), 1)), self.positions], axis=1)
 
 
-class FinerMesh:
-    """A case on elements of half the size.
+def discretisation_error(
+    finer: FinerMesh, forward: Forward, state: State, derivatives: tuple[Floats, Floats]
+) -> DiscretisationError:
+    """The error of a state, to first order in the parameters.
 
     Parameters
     ----------
-    case : Case
-    theta : (p,) array
-        Parameters to begin with.
-    device : str, optional
+    finer : FinerMesh
+    forward : Forward
+    state : State
+    derivatives : pair of (p, n, 3) arrays
+        Of its displacement and its reactions by the parameters.
+
+    Raises
+    ------
+    SolveError
+        If there is no stable equilibrium on the finer mesh.
     """
-
-    def __init__(self, case: Case, theta: Floats, device: str | None = None) -> None:
-        known = Parameters.of(case).applied(case, theta)
-        finer = FinerCase(known)
-        self._prolong = finer.prolongation
-        away = case.remaining[0].points - case.remaining[0].points.mean(axis=0)
-        self._positions = away / root_mean_square(away)
-        shared = [load for load in finer.model(model_of(known)[0]).loads if isinstance(load, GivenForces)]
-        self._forward = Forward(finer.case, theta, device, shared)
-        #: The last error on the finer mesh, with which the next state there is predicted.
-        self._last: Floats | float = 0.0
-
-    @property
-    def solves(self) -> int:
-        """Equilibria on this mesh."""
-        return self._forward.solves
-
-    def error(self, state: State, derivatives: tuple[Floats, Floats]) -> DiscretisationError:
-        """The error of a state.
-
-        Parameters
-        ----------
-        state : State
-        derivatives : pair of (p, n, 3) arrays
-            Of its displacement and its reactions by the parameters.
-
-        Raises
-        ------
-        SolveError
-            If there is no stable equilibrium on the finer mesh.
-        """
-        start = self._prolong @ state.u
-        try:
-            finer = self._forward.solve_from(state.theta, (start + self._last, None), ROUGH)
-            by_theta = self._forward.differentiate(finer)
-        except SolveError as error:
-            raise SolveError(
-                f"the error of the mesh is not known: on elements of half the size {error}; it can be left out, and "
-                "then the estimate holds for this mesh only"
-            ) from None
-        self._last = finer.u - start
-        own = (state.u, state.reactions, *derivatives)
-        change = Change.between(state.theta, own, self._restricted(finer, by_theta))
-        there = state.u + change.u
-        part = float(np.vdot(change.u, there)) / max(float(np.vdot(there, there)), 1e-300)
-        return DiscretisationError(change, self._positions, part)
-
-    def _restricted(self, finer: State, derivatives: Sensitivities) -> Sensitive:
-        """A state of the finer mesh at the nodes of the mesh that there was."""
-        pairs = zip(derivatives.u, derivatives.reactions, strict=True)
-        both = [restricted(self._prolong, du, dR) for du, dR in pairs]
-        du, dR = (np.array([one[k] for one in both]) for k in range(2))
-        return *restricted(self._prolong, finer.u, finer.reactions), du, dR
+    theta, parameters = state.theta, forward.parameters
+    case = parameters.applied(forward.case, theta)
+    try:
+        error = finer.difference(case, theta, forward.system, state.u, state.reactions)
+        du, dR = finer.derivatives(theta, parameters.materials)
+    except SolveError as failure:
+        raise SolveError(
+            f"the error of the mesh is not known: on elements of half the size {failure}; it can be left out, and "
+            "then the estimate holds for this mesh only"
+        ) from None
+    change = Change(error.u, error.reactions, theta, du - derivatives[0], dR - derivatives[1])
+    there = state.u + change.u
+    part = float(np.vdot(change.u, there)) / max(float(np.vdot(there, there)), 1e-300)
+    points = case.remaining[0].points
+    away = points - points.mean(axis=0)
+    return DiscretisationError(change, away / root_mean_square(away), part)

@@ -10,7 +10,8 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
 from warpbrain.estimation.chain import Chain, run_chain
-from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, FinerMesh
+from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, discretisation_error
+from warpbrain.estimation.finer_mesh import FinerMesh
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gauss_newton import GaussNewton, require_explained
 from warpbrain.estimation.importance import Importance, importance_sampling
@@ -223,14 +224,12 @@ class Estimation:
         solves: dict[str, int],
     ) -> tuple[Estimate, ...]:
         before = self.forward.solves
-        finer: FinerMesh | None = None
+        finer = FinerMesh(self._device)
         for _ in range(_MOST_ERRORS):
             self.listener.stage("error of the mesh: one equilibrium on elements of half the size")
             best = modes[0]
-            if finer is None:
-                finer = FinerMesh(self.case, best.theta, self._device)
             derivatives = best.linearised.du, best.linearised.dR
-            errors.append(finer.error(best.point.state, derivatives))
+            errors.append(discretisation_error(finer, self.forward, best.point.state, derivatives))
             nuisances = Nuisances(believed, errors[-1], self._registration)
             modes = self.fit(nuisances, modes)
             if np.sqrt(2.0 * modes[0].laplace.posterior.negative_log(errors[-1].theta)) <= _SETTLED:
@@ -243,7 +242,7 @@ class Estimation:
                 f"the mesh is coarse: on elements of half the size displacements change by {100.0 * part:.0f} %; what "
                 "is left of its error may be larger than the intervals"
             )
-        solves["on elements of half the size"] = 0 if finer is None else finer.solves
+        solves["on elements of half the size"] = finer.solves
         solves["estimate with the error of the mesh"] = self.forward.solves - before
         return modes
 

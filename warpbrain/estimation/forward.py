@@ -9,7 +9,6 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
 from warpbrain.estimation.parameters import Parameters
-from warpbrain.physics.load import Load
 from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.model import Model
@@ -56,8 +55,6 @@ class Forward:
     theta : (p,) array
         Parameters to begin with; any that are stable.
     device : str, optional
-    loads : sequence of Load
-        Beside those of the case.
     elements : str
         See `Model`.
 
@@ -72,13 +69,12 @@ class Forward:
         case: Case,
         theta: Floats,
         device: str | None = None,
-        loads: Sequence[Load] = (),
         elements: str = "tet4",
     ) -> None:
         self.parameters = Parameters.of(case)
-        self._mechanisms = case.mechanisms
+        self.case = case
         plain, _ = plain_model_of(self.parameters.applied(case, theta))
-        self._plain = replace(plain, loads=[*plain.loads, *loads], elements=elements)
+        self._plain = replace(plain, elements=elements)
         self.system = System(self._model(theta), device)
         self._last: State | None = None
         self.solves = 0
@@ -129,4 +125,4 @@ class Forward:
 
     def _model(self, theta: Floats) -> Model:
         plain = replace(self._plain, materials=self.parameters.materials(theta))
-        return with_mechanisms(plain, self._mechanisms)
+        return with_mechanisms(plain, self.case.mechanisms)

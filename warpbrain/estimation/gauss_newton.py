@@ -1,17 +1,16 @@
-"""The most probable parameters: damped Gauss-Newton on likelihood and prior, solving equilibrium from the last state.
+"""The most probable parameters: least squares on likelihood and prior, solving equilibrium from the last state.
 
-Each iteration differentiates the equilibrium (`warpbrain.simulation.sensitivity`), takes the step of weighted least
-squares with what the last one taught of the curvature, and starts the next equilibrium where the derivatives say it
-will be. A step is halved until the objective falls. Parameters at an end of their range stay there while the objective
-pushes them out.
+SciPy's least squares (`scipy.optimize.least_squares`) takes damped steps of Gauss and Newton within the range of
+parameters. Each equilibrium is begun where the derivatives of the last better one (`warpbrain.simulation.sensitivity`)
+say it will be. A step to where there is none is shortened.
 
 Far from the estimate most of a residual is no noise yet. So the noise is first taken to be as large as the residuals
-say; then noise and estimate are found in turn, see `likelihood`.
+say, again and again; then noise and estimate are found in turn, see `likelihood`.
 """
 
 from __future__ import annotations
 
-import itertools
+import contextlib
 import math
 from collections.abc import Callable
 
@@ -20,7 +19,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import State
-from warpbrain.estimation.likelihood import Noise
+from warpbrain.estimation.likelihood import IndependentNoise, Noise
 from warpbrain.estimation.modes import Estimate, GaussNewtonStep
 from warpbrain.estimation.problem import Linearised, Point, Problem
 
@@ -28,10 +27,10 @@ from warpbrain.estimation.problem import Linearised, Point, Problem
 _STIFFER = 4
 #: There is no estimate if fewer rows than this share are something else.
 _FEWEST_EXPLAINED = 0.1
-#: Tolerance while noise is not known yet, and how often it is found again.
-_ROUGHLY, _ROUNDS = 0.1, 8
-#: Iterations at most with each noise, and the change of every parameter below which there is no other.
-_ITERATIONS, _LEAST_STEP = 30, 1e-7
+#: Tolerance while noise is not known yet, how often it is found again, and until it changes by less than this part.
+_ROUGHLY, _ROUNDS, _SETTLED = 0.1, 8, 0.1
+#: Equilibria at most with each noise, and changes, relative, of coordinates and objective that are none.
+_ITERATIONS, _LEAST_STEP, _ROUNDING = 60, 1e-7, 1e-12
 
 
 class GaussNewton:
@@ -78,20 +77,19 @@ class GaussNewton:
         values = problem.nuisances.prior.mean if nuisances is None else nuisances
         self._history = []
         if start is None:
-            point, linearised = self._first(values)
-            point, linearised, _ = self._descend(point, linearised, _ROUGHLY)
+            point, linearised = self._roughly(*self._first(values))
         else:
             point = problem.at(start, values)
             linearised = problem.linearise(point)
         for number in range(_ROUNDS):
             last = point.noise
             point = problem.with_likely_noise(point, linearised)
-            linearised = problem.linearise(point, (linearised.du, linearised.dR))
             settled = isinstance(last, Noise) and point.known_noise.is_near(last)
             tolerance = self.tolerance if number else max(_ROUGHLY, self.tolerance)
             point, linearised, converged = self._descend(point, linearised, tolerance)
             if settled:
                 break
+        linearised = problem.linearise(point, (linearised.du, linearised.dR))
         return Estimate(problem, point, linearised, converged, tuple(self._history))
 
     def _first(self, values: Floats) -> tuple[Point, Linearised]:
@@ -109,83 +107,107 @@ class GaussNewton:
                 why = str(error)
         raise SolveError(f"in the middle of the prior, and up to {math.exp(_STIFFER):.0f} times stiffer: {why}")
 
+    def _roughly(self, point: Point, linearised: Linearised) -> tuple[Point, Linearised]:
+        """Downhill with noise as large as what is left each time."""
+        for _ in range(_ROUNDS):
+            last = point.noise
+            point, linearised, _ = self._descend(point, linearised, _ROUGHLY)
+            point = self.problem.at(point.state, point.nuisances)
+            assert isinstance(last, IndependentNoise) and isinstance(point.noise, IndependentNoise)
+            if np.abs(np.log(point.noise.sigma / last.sigma)).max() < _SETTLED:
+                break
+        return point, linearised
+
     def _descend(self, point: Point, linearised: Linearised, tolerance: float) -> tuple[Point, Linearised, bool]:
         """Downhill with one noise to where a step is no longer worth it."""
-        hessian = linearised.hessian
-        for iteration in itertools.count():
-            step = self._step(point, linearised, hessian)
-            decrement = float(np.sqrt(step @ hessian @ step))
-            if decrement <= tolerance or np.abs(step).max() <= _LEAST_STEP:
-                return point, linearised, True
-            if iteration == _ITERATIONS:
-                return point, linearised, False
-            reached, share, newton = self._search(point, linearised, step)
-            record = GaussNewtonStep(len(self._history) + 1, point.objective, decrement, share, newton)
-            self._history.append(record)
-            if self._on_step is not None:
-                self._on_step(record)
-            if reached is None:
-                # what is left is rounding of the objective, or nothing better lies this way
-                return point, linearised, decrement <= 10.0 * tolerance
-            taken = reached[0].coordinates - point.coordinates
-            hessian = _secant(reached[1].hessian, taken, reached[1].gradient - linearised.gradient)
-            point, linearised = reached
-        raise AssertionError("unreachable")
+        from scipy.optimize import least_squares
 
-    def _step(self, point: Point, linearised: Linearised, whole: Floats) -> Floats:
-        """The step of Gauss-Newton with a Hessian among the parameters that are free to move."""
-        theta, gradient, mode = point.state.theta, linearised.gradient, self.problem.mode
-        moving = np.ones(len(gradient), dtype=bool)
-        p = len(theta)
-        moving[:p] = ~((theta <= mode.low) & (gradient[:p] > 0.0))
-        moving[:p] &= ~((theta >= mode.high) & (gradient[:p] < 0.0))
-        step = np.zeros(len(gradient))
-        hessian = whole[np.ix_(moving, moving)]
-        # shifts are metres, turns radians and moduli logarithms: one size for all
-        size = np.sqrt(np.diag(hessian))
-        step[moving] = np.linalg.solve(hessian / np.outer(size, size), -gradient[moving] / size) / size
-        return step
+        descent = _Descent(self, point, linearised, tolerance)
+        with contextlib.suppress(_ConvergedError):
+            least_squares(
+                descent.residuals, np.zeros_like(descent.low), descent.jacobian, (descent.low, descent.high),
+                method="dogbox" if np.isfinite([descent.low, descent.high]).any() else "trf",
+                ftol=_ROUNDING, xtol=_LEAST_STEP, gtol=None, max_nfev=_ITERATIONS,
+            )  # fmt: skip
+        # farther away it is rounding of the objective, or nothing better lies this way
+        return descent.point, descent.linearised, descent.decrement <= 10.0 * tolerance
 
-    def _search(
-        self, point: Point, linearised: Linearised, step: Floats
-    ) -> tuple[tuple[Point, Linearised] | None, float, int]:
-        """Halve the step until there is a stable equilibrium of a lower objective; None and 0 if there never is."""
-        problem, mode = self.problem, self.problem.mode
-        p = len(problem.parameters)
-        slope = float(linearised.gradient @ step)
-        share = min(1.0, 1.0 / max(float(np.max(np.abs(step[:p]) / problem.parameters.reach)), 1e-300))
-        newton = 0
-        for _ in range(12):
-            theta = np.clip(point.state.theta + share * step[:p], mode.low, mode.high)
-            # where derivatives say the state will be
-            predicted = point.state.u + np.tensordot(theta - point.state.theta, linearised.du, axes=1)
-            try:
-                problem.parameters.require_possible(theta)
-                state = problem.forward.solve_from(theta, (predicted, point.state.u))
-                newton += state.newton_iterations
-                trial = problem.at(state, point.nuisances + share * step[p:], point.noise)
-                if trial.objective < point.objective + 1e-4 * share * slope:
-                    return (trial, problem.linearise(trial)), share, newton
-            except (InputError, SolveError):
-                # an unstable law, no equilibrium, or one that is unstable: nearer to the last point there is none
-                pass
-            share *= 0.5
-        return None, 0.0, newton
+    def record(self, objective: float, decrement: float, share: float, newton: int) -> None:
+        """Take notice of a step; see `GaussNewtonStep`."""
+        self._history.append(GaussNewtonStep(len(self._history) + 1, objective, decrement, share, newton))
+        if self._on_step is not None:
+            self._on_step(self._history[-1])
 
 
-def _secant(hessian: Floats, step: Floats, change: Floats) -> Floats:
-    """A Hessian that knows by how much the gradient changed along the last step (the update of BFGS).
+class _ConvergedError(Exception):
+    """The next step is shorter than the tolerance."""
 
-    Gauss and Newton's leaves out what large residuals times second derivatives add, which makes it converge slowly
-    where much of what was recorded is not explained.
+
+class _Descent:
+    """What least squares asks for: rows and prior in standard deviations, and their derivatives.
+
+    Coordinates are steps from the start in units of the reach of a parameter, and of ten standard deviations of what is
+    estimated along, since the first step goes no farther than one unit.
     """
-    along = float(change @ step)
-    bent = hessian @ step
-    expected = float(step @ bent)
-    # a change of a tenth or of ten times what was expected is not of a neighbourhood that a parabola describes
-    if not 0.1 * expected < along < 10.0 * expected:
-        return hessian
-    return hessian - np.outer(bent, bent) / expected + np.outer(change, change) / along
+
+    def __init__(self, search: GaussNewton, point: Point, linearised: Linearised, tolerance: float) -> None:
+        self.problem = problem = search.problem
+        self.point, self.linearised, self.decrement = point, linearised, np.inf
+        self._search, self._tolerance = search, tolerance
+        self._origin, along = point.coordinates, problem.nuisances.prior.standard_deviations
+        self._scale = np.concatenate([problem.parameters.reach, 10.0 * along])
+        open_ends = np.full(len(along), np.inf)
+        low, high = np.append(problem.mode.low, -open_ends), np.append(problem.mode.high, open_ends)
+        self.low = np.minimum((low - self._origin) / self._scale, 0.0)
+        self.high = np.maximum((high - self._origin) / self._scale, 0.0)
+        self._whitening = np.linalg.inv(problem.prior.factor)
+        self._better: tuple[Point, Linearised] | None = None
+        self._newton = 0
+        self._last = np.zeros_like(self.low), np.zeros((0, len(self.low)))
+
+    def residuals(self, z: Floats) -> Floats:
+        """At coordinates (k,): (n + k,), not finite where there is no stable equilibrium."""
+        if not z.any():
+            return self._standardised(self.point)
+        problem, here = self.problem, self.point.state
+        x = self._origin + self._scale * z
+        theta, nuisances = np.split(x, [len(problem.parameters)])
+        # where derivatives say the state will be
+        predicted = here.u + np.tensordot(theta - here.theta, self.linearised.du, axes=1)
+        try:
+            problem.parameters.require_possible(theta)
+            state = problem.forward.solve_from(theta, (predicted, here.u))
+            self._newton += state.newton_iterations
+            point = problem.at(state, nuisances, self.point.noise)
+            if point.objective < self.point.objective:
+                self._better = point, problem.linearise(point)
+            return self._standardised(point)
+        except (InputError, SolveError):
+            # an unstable law, no equilibrium, or one that is unstable: nearer to the last point there is none
+            return np.full(len(here.theta) + len(self.point.residual) + len(nuisances), np.nan)
+
+    def jacobian(self, z: Floats) -> Floats:
+        """Of the last point that was better, (n + k, k); `_ConvergedError` if no further step is worth it."""
+        if self._better is not None:
+            objective, (self.point, self.linearised) = self.point.objective, self._better
+            before, J = self._last
+            share = float(np.linalg.norm(J @ (z - before))) / self.decrement
+            self._search.record(objective, self.decrement, share, self._newton)
+            self._newton = 0
+        white = self.point.noise.standardised(self.linearised.jacobian)
+        J = np.concatenate([white, self._whitening]) * self._scale
+        residuals = self._standardised(self.point)
+        gradient = J.T @ residuals
+        moving = ~((z <= self.low) & (gradient > 0.0) | (z >= self.high) & (gradient < 0.0))
+        self.decrement = float(np.linalg.norm(np.linalg.qr(J[:, moving])[0].T @ residuals))
+        if self.decrement <= self._tolerance:
+            raise _ConvergedError
+        self._last = z.copy(), J
+        return J
+
+    def _standardised(self, point: Point) -> Floats:
+        white = point.noise.standardised(point.residual)
+        return np.concatenate([white, self._whitening @ (point.coordinates - self.problem.prior.mean)])
 
 
 def require_explained(estimate: Estimate) -> None:

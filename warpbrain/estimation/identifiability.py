@@ -121,26 +121,25 @@ def _parts(parameters: Sequence[Parameter], row: Floats, unit: Floats) -> Parts:
 
 def combination(parts: Parts) -> str:
     """A combination of parameters in words."""
-    if len(parts) == 1:
-        return f"the {_noun(parts[0][0])}"
-    tissues = enumerated([parameter.tissue for parameter, _ in parts])
-    if _are_opposite(parts):
-        return f"the ratio of the shear moduli of {tissues}"
-    if _are_alike(parts):
-        return f"the geometric mean of the shear moduli of {tissues}"
-    return f"the combination {_sum(parts)}"
+    return _in_words(parts, "the {}", "the geometric mean of the shear moduli of {}", "the combination {}")
 
 
 def change(parts: Parts) -> str:
     """A change of parameters, in words."""
+    return _in_words(
+        parts, "a change of the {}", "a change of the shear moduli of {} by one factor", "a change along {}"
+    )
+
+
+def _in_words(parts: Parts, single: str, alike: str, other: str) -> str:
     if len(parts) == 1:
-        return f"a change of the {_noun(parts[0][0])}"
+        return single.format(_noun(parts[0][0]))
     tissues = enumerated([parameter.tissue for parameter, _ in parts])
     if _are_alike(parts):
-        return f"a change of the shear moduli of {tissues} by one factor"
+        return alike.format(tissues)
     if _are_opposite(parts):
-        return f"a change of the ratio of the shear moduli of {tissues}"
-    return f"a change along {_sum(parts)}"
+        return single.format(f"ratio of the shear moduli of {tissues}")
+    return other.format(_sum(parts))
 
 
 def _are_alike(parts: Parts) -> bool:

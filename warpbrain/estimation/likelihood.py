@@ -24,6 +24,7 @@ from warpbrain.estimation.observations import Observations, Residuals
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import Outliers, with_gross_errors
 from warpbrain.inference.noise import log_scale_density, noise_covariance, outliers, scales
+from warpbrain.recordings.agreement import root_mean_square
 
 #: An undeclared noise is no smaller [m] or [N]: below this it is rounding of the computation.
 LEAST_SIGMA = 1e-9
@@ -47,6 +48,8 @@ class Rows:
         Of which recordings the noise is known.
     points : tuple of int arrays
         Rows of each point that may be a gross error, those of a recording together; forces have none.
+    times : (n,) array, optional
+        When [s]; all at the end unless given.
     """
 
     positions: Floats
@@ -55,6 +58,7 @@ class Rows:
     recordings: Ints
     declared: Bools
     points: tuple[Ints, ...]
+    times: Floats | None = None
 
     @classmethod
     def of(cls, observations: Observations, parts: tuple[Residuals, ...]) -> Rows:
@@ -80,33 +84,33 @@ class Rows:
         )
 
     def covariance(self, sigma: Floats) -> Floats:
-        """Of the noise at a scale of 1, (n, n), with standard deviations (n,): all was recorded at the end."""
-        return noise_covariance(self.positions, self.directions, np.full(len(sigma), np.inf), sigma)
+        """Of the noise at a scale of 1, (n, n), with standard deviations (n,)."""
+        times = np.full(len(sigma), np.inf) if self.times is None else self.times
+        return noise_covariance(self.positions, self.directions, times, sigma)
 
 
 @dataclass(frozen=True, eq=False)
-class EmpiricalNoise:
-    """Independent noise as large as the residuals of each recording are, for the way to the estimate."""
+class IndependentNoise:
+    """Independent noise with standard deviations (n,), for the way to the estimate."""
 
-    rows: Rows
+    sigma: Floats
 
-    def sigma(self, residual: Floats) -> Floats:
-        """Standard deviation (n,) of each number."""
-        sigma = self.rows.sigma.copy()
-        for number, declared in enumerate(self.rows.declared.tolist()):
-            own = self.rows.recordings == number
-            size = math.sqrt(float(np.mean((residual[own] / sigma[own]) ** 2)))
-            sigma[own] *= max(size, 1.0 if declared else LEAST_SIGMA)
-        return sigma
+    @classmethod
+    def as_large_as(cls, rows: Rows, residual: Floats) -> IndependentNoise:
+        """As large as the residuals (n,) of each recording are, but no less than declared."""
+        sigma = rows.sigma.copy()
+        for number, declared in enumerate(rows.declared.tolist()):
+            own = rows.recordings == number
+            sigma[own] *= max(root_mean_square(residual[own] / sigma[own]), 1.0 if declared else LEAST_SIGMA)
+        return cls(sigma)
 
     def negative_log(self, residual: Floats) -> float:
         """`-ln p` of residuals (n,)."""
-        sigma = self.sigma(residual)
-        return float(np.sum(np.log(sigma) + 0.5 * (residual / sigma) ** 2))
+        return float(np.sum(np.log(self.sigma) + 0.5 * self.standardised(residual) ** 2))
 
-    def standardised(self, residual: Floats, numbers: Floats) -> Floats:
-        """Numbers (n, ...) in units of the noise that the residuals (n,) have."""
-        return np.asarray((numbers.T / self.sigma(residual)).T)
+    def standardised(self, numbers: Floats) -> Floats:
+        """Numbers (n, ...) in units of the noise."""
+        return np.asarray((numbers.T / self.sigma).T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,9 +166,9 @@ class Noise:
         """`-ln p` of residuals (n,), with that of the noise itself."""
         n = len(residual)
         volume = float(np.log(np.diag(self.factor)).sum()) + n * math.log(math.sqrt(2.0 * math.pi) * self.scale)
-        return 0.5 * float(np.sum(self.standardised(residual, residual) ** 2)) + volume - self.log_prior
+        return 0.5 * float(np.sum(self.standardised(residual) ** 2)) + volume - self.log_prior
 
-    def standardised(self, _residual: Floats, numbers: Floats) -> Floats:
+    def standardised(self, numbers: Floats) -> Floats:
         """Numbers (n, ...) in coordinates in which noise is independent and of unit variance."""
         from scipy.linalg import solve_triangular
 

@@ -12,7 +12,7 @@ from warpbrain.cases.case import Case
 from warpbrain.estimation.likelihood import Noise, Rows
 from warpbrain.estimation.modes import Estimate
 from warpbrain.estimation.observations import Observation, Observations, Residuals
-from warpbrain.estimation.realigned import realigned
+from warpbrain.estimation.registration import realigned
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import with_gross_errors
 from warpbrain.recordings.agreement import by_unit

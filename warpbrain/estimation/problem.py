@@ -10,7 +10,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.estimation.forward import Forward, State
 from warpbrain.estimation.gaussian import Gaussian
-from warpbrain.estimation.likelihood import EmpiricalNoise, Likelihood, Noise, Rows
+from warpbrain.estimation.likelihood import IndependentNoise, Likelihood, Noise, Rows
 from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations, Residuals
 from warpbrain.estimation.parameters import Parameters
@@ -29,7 +29,7 @@ class Point:
         With a rigid motion of what was recorded taken off.
     residual : (n,) array
         All of them, one after the other.
-    noise : Noise or EmpiricalNoise
+    noise : Noise or IndependentNoise
     misfit : float
         `-ln` of the likelihood and of the nuisances' density.
     objective : float
@@ -40,7 +40,7 @@ class Point:
     nuisances: Floats
     parts: tuple[Residuals, ...]
     residual: Floats
-    noise: Noise | EmpiricalNoise
+    noise: Noise | IndependentNoise
     misfit: float
     objective: float
 
@@ -113,12 +113,12 @@ class Problem:
         both = self.mode.gaussian, self.nuisances.prior
         return Gaussian(np.concatenate([one.mean for one in both]), block_diag(*(one.covariance for one in both)))
 
-    def at(self, state: State, nuisances: Floats, noise: Noise | EmpiricalNoise | None = None) -> Point:
+    def at(self, state: State, nuisances: Floats, noise: Noise | IndependentNoise | None = None) -> Point:
         """The objective at a state; noise that is as large as the residuals are, unless it is known."""
         motion = self.nuisances.motion(nuisances)
         parts = self.observations.at(*self.nuisances.observed(state, nuisances), motion=motion)
         residual = np.concatenate([part.values.ravel() for part in parts])
-        known = EmpiricalNoise(Rows.of(self.observations, parts)) if noise is None else noise
+        known = IndependentNoise.as_large_as(Rows.of(self.observations, parts), residual) if noise is None else noise
         misfit = known.negative_log(residual) + self.nuisances.prior.negative_log(nuisances)
         objective = misfit + self.mode.gaussian.negative_log(state.theta)
         return Point(state, nuisances, parts, residual, known, misfit, objective)
@@ -189,6 +189,6 @@ class Problem:
 
 def _weighted(point: Point, jacobian: Floats) -> tuple[Floats, Floats]:
     """Gradient (k,) of `-ln p` and its Hessian (k, k) to first order in the residuals."""
-    both = point.noise.standardised(point.residual, np.column_stack([jacobian, point.residual]))
+    both = point.noise.standardised(np.column_stack([jacobian, point.residual]))
     J, r = both[:, :-1], both[:, -1]
     return J.T @ r, J.T @ J

@@ -12,12 +12,14 @@ estimated along with the tissue's parameters, and integrated out of what is said
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
+from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 from warpbrain.recordings.registration import Registration
 
 #: Names of the six numbers.
@@ -53,6 +55,32 @@ def moved_back_columns(positions: Floats, motion: Floats, centre: Floats) -> Flo
 def rigid_columns(positions: Floats, centre: Floats) -> Floats:
     """Derivatives (n, 3, 6) of moved positions (n, 3) by shift and turn, at no motion."""
     return -moved_back_columns(positions, np.zeros(6), centre)
+
+
+def realigned(case: Case, motion: Floats, centre: Floats) -> Case:
+    """The case as if its recordings had not been moved, so that points of a surface are compared with the right faces.
+
+    Parameters
+    ----------
+    case : Case
+    motion : (6,) array
+        Shift [m] and turn [rad].
+    centre : (3,) array
+        Of the turn [m].
+    """
+    if not motion.any():
+        return case
+    return replace(case, recordings=tuple(realigned_recording(one, motion, centre) for one in case.recordings))
+
+
+def realigned_recording(recording: Recording, motion: Floats, centre: Floats) -> Recording:
+    """The same of one recording: forces are as they were."""
+    if isinstance(recording, PointsRecording):
+        positions = recording.points + recording.displacement
+        return replace(recording, displacement=moved_back(positions, motion, centre) - recording.points)
+    if isinstance(recording, SurfaceRecording):
+        return replace(recording, points=moved_back(recording.points, motion, centre))
+    return recording
 
 
 def _crossed(vectors: Floats) -> Floats:

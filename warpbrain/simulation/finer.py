@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,8 +16,9 @@ from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, nodes_of
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Removing
-from warpbrain.simulation.model import Model
-from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.assumed import with_mechanisms
+from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.of_case import plain_model_of
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -77,15 +80,22 @@ class FinerCase:
         density[loaded] = forces[loaded] / share(self._coarse)[loaded, None]
         return np.asarray(share(mesh)[:, None] * (self.prolongation @ density))
 
-    def model(self, model: Model) -> Model:
-        """The finer model of what `model_of` makes of the case, with the same elements."""
-        finer, _ = model_of(self.case)
+    def model(self, model: Model, materials: Mapping[int, Material] | None = None) -> Model:
+        """The finer model of what `model_of` makes of the case, with the same elements; of other materials if given."""
+        plain = self._plain
         shared = [
             GivenForces(forces=self.spread(load.nodal_forces(model.mesh)), ramp=load.ramp)
             for load in model.loads
             if isinstance(load, NodalForce)
         ]
-        return replace(finer, loads=[*finer.loads, *shared], elements=model.elements)
+        known = plain.materials if materials is None else materials
+        loaded = replace(plain, materials=known, loads=[*plain.loads, *shared], elements=model.elements)
+        return with_mechanisms(loaded, self.case.mechanisms)
+
+    @cached_property
+    def _plain(self) -> Model:
+        """Without mechanisms."""
+        return plain_model_of(self.case)[0]
 
 
 def prolongation(ends: NDArray[np.integer], count: int) -> Any:

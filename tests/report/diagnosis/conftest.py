@@ -5,11 +5,10 @@ from pathlib import Path
 import pytest
 from sinking_block import OPTIONS
 
-from warpbrain.report.diagnosis.covariance import write_covariance
 from warpbrain.report.diagnosis.description import describe_diagnosis
 from warpbrain.report.diagnosis.files import write_map
 from warpbrain.report.diagnosis.html import write_page
-from warpbrain.report.diagnosis.points import write_points
+from warpbrain.report.diagnosis.points import write_covariance, write_points
 from warpbrain.report.files import write_summary
 
 

@@ -9,9 +9,10 @@ import pytest
 from sinking_block import OPTIONS
 
 from referee.diagnoses import read_diagnosis
+from warpbrain.diagnosis.held_out import distance
 from warpbrain.inference import Kind
 from warpbrain.inference.decide import VERDICTS, Decision
-from warpbrain.report.diagnosis.description import describe_diagnosis, noise_distance
+from warpbrain.report.diagnosis.description import describe_diagnosis
 from warpbrain.report.files import write_summary
 
 KEYS = {
@@ -95,4 +96,4 @@ def test_the_noise_is_a_distance_where_errors_are(small_diagnosis):
     drawn = noise * np.random.default_rng(3).standard_normal((4000, len(sensors)))
     rows = sensors.is_displacement
     squares = [(drawn[:, rows & (sensors.groups == point)] ** 2).sum(axis=1) for point in set(sensors.groups[rows])]
-    assert noise_distance(noise, sensors) == pytest.approx(np.sqrt(np.mean(squares)), rel=0.01)
+    assert distance(sensors, noise) == pytest.approx(np.sqrt(np.mean(squares)), rel=0.01)

@@ -15,8 +15,7 @@ from warpbrain.errors import InputError
 from warpbrain.inference.decide import VERDICTS
 from warpbrain.report.diagnosis.html import page_of, write_page
 from warpbrain.report.diagnosis.saved import read_saved
-from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis
-from warpbrain.report.diagnosis.specimen_curves import write_curves
+from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, write_curves
 from warpbrain.report.files import write_summary
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
 
@@ -45,6 +44,8 @@ def test_it_is_one_file_without_a_network(diagnosed):
 def test_the_verdict_is_on_top(diagnosed):
     page = (diagnosed / "report.html").read_text(encoding="utf-8")
     body = page[page.index("<main>") :]
+    for words in ("any smooth force without a name", "patterns that mean nothing", "what noise alone leaves"):
+        assert words in body
     places = [body.index(text) for text in ('class="badge">named<', "Before and after", "In three dimensions")]
     assert places == sorted(places)
     headings = re.findall(r"<h2>(.*?)</h2>", body)
@@ -57,7 +58,7 @@ def test_the_verdict_is_on_top(diagnosed):
 def test_every_picture_says_what_it_shows(diagnosed):
     page = (diagnosed / "report.html").read_text(encoding="utf-8")
     alternatives = re.findall(r'<img src="data:image/png;base64,[^"]*" width="\d+" alt="([^"]*)"', page)
-    assert len(alternatives) == page.count("<img") == 6 and all(len(text) > 20 for text in alternatives)
+    assert len(alternatives) == page.count("<img") == 4 and all(len(text) > 20 for text in alternatives)
 
 
 @pytest.mark.parametrize("verdict", [v for v in VERDICTS if v != "named"])
@@ -91,8 +92,6 @@ def test_a_specimen_has_curves_in_the_place_of_an_anatomy(folder):
     }  # fmt: skip
     where = {"test": "press", "mode": "compression", "segment": "loading", "strain": [0.8, 0.9]}
     said = change(folder, fit=fit, where=where, when={"seconds": [1.0, 2.0]}, smallest_detectable={})
-    said["stages"] = [{"with": [], "p_value": 0.001, "candidates": [{"mechanism": "fibres", "probability": 0.93}],
-                       "added": "fibres", "why_not": ""}]  # fmt: skip
     for key in ("map", "confusion"):
         del said[key]
     for one in said["ranking"]:
@@ -105,7 +104,6 @@ def test_a_specimen_has_curves_in_the_place_of_an_anatomy(folder):
     (folder / "curves.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     page = page_of(read_saved(folder))
     assert "450 → 70 Pa" in page and "It shows most in press (compression), loading" in page
-    assert "nothing added" in page and "fibres (93 %)" in page
     assert "fibres: a pattern that means nothing does as well with p = 0.01" in page
     assert "pull 80" in page and "Recorded and computed stress of 2 tests" in page
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from warpbrain.inference.decide import Decision
 from warpbrain.physics.values import Value
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
@@ -30,6 +31,7 @@ def describe_common(
         "verdict": found.verdict,
         "sentence": sentence,
         "p_value": found.p_value,
+        "p_left": found.p_left,
         "mechanism": names[0] if names else None,
         "probability": best.probability if best else (found.ranking[0].probability if found.ranking else None),
         "parameters": describe_values(best.values) if best else {},
@@ -46,6 +48,17 @@ def describe_common(
         "device": device,
         "versions": machine(),
     }
+
+
+def describe_cause(name: str, why: str = "", **known: Any) -> dict[str, Any]:
+    """One row of a ranking; of a cause that was not tried, and why, nothing else is known."""
+    nothing = {"mechanism": name, "physics": True, "log_evidence": None, "probability": 0.0, "detectability": None}
+    return nothing | {"estimate": {}, "region": "", "rejected_because": why} | known
+
+
+def describe_decision(decision: Decision) -> dict[str, Any]:
+    """A verdict with its causes."""
+    return {"verdict": decision.verdict, "causes": list(decision.causes)}
 
 
 def describe_values(values: Sequence[Value]) -> dict[str, Any]:

@@ -5,27 +5,23 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
-from warpbrain.arrays import Floats
+from warpbrain.diagnosis.held_out import distance
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.options import DiagnosisOptions
-from warpbrain.diagnosis.result import Combination, Diagnosis, Ranked
+from warpbrain.diagnosis.result import Diagnosis, Ranked
 from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence
 from warpbrain.diagnosis.traits import Traits
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import smallest_in_words
-from warpbrain.report.diagnosis.common import describe_common, describe_values
-from warpbrain.worlds.body.sensors import Sensors
+from warpbrain.report.diagnosis.common import describe_cause, describe_common, describe_decision, describe_values
 
 
 def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:
     """Everything that is known of a diagnosis, lengths in metres and other units beside the values."""
     best = found.named[0] if found.named else None
     particular = {
-        "hypotheses": [_combination(one) for one in found.combinations],
-        "by_posterior": {"verdict": found.by_posterior.verdict, "causes": list(found.by_posterior.causes)},
-        "p_left": found.p_left,
+        "hypotheses": [asdict(one) | {"kinds": [kind.value for kind in one.kinds]} for one in found.combinations],
+        "by_posterior": describe_decision(found.by_posterior),
         "where": _where(found, best),
         "mechanisms": [_named(one, found.case.gravity_axis) for one in found.named],
         "unknown": _unknown(found.unknown),
@@ -59,25 +55,13 @@ def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str)
     return describe_common(found, found.sentence, names, asked, device, particular)
 
 
-def _combination(one: Combination) -> dict[str, Any]:
-    return {
-        "causes": list(one.causes),
-        "kinds": [kind.value for kind in one.kinds],
-        "log_evidence": one.log_evidence,
-        "log_prior": one.log_prior,
-        "probability": one.probability,
-        "fitted": one.fitted,
-        "gross_errors": one.gross_errors,
-    }
-
-
 def _named(one: Ranked, gravity_axis: tuple[float, float, float] | None) -> dict[str, Any]:
     return {
         "mechanism": one.kind,
         "says": effect_sentence(one, gravity_axis),
         "probability": one.probability,
         "parameters": describe_values(one.values),
-        "where": None if one.centre is None else {"centre_m": one.centre, "radius_m": one.radius},
+        "where": _ball(one),
         "region": one.region,
     }
 
@@ -122,47 +106,31 @@ def _when(onset: Onset | None) -> dict[str, Any] | None:
 
 
 def _ranked(ranked: Ranked, gravity_axis: tuple[float, float, float] | None) -> dict[str, Any]:
-    return {
-        "mechanism": ranked.kind,
-        "says": effect_sentence(ranked, gravity_axis),
-        "physics": ranked.physics,
-        "log_evidence": ranked.log_evidence,
-        "probability": ranked.probability,
-        "heldout_rmse_change": ranked.heldout_rmse_change,
-        "detectability": ranked.detectability,
-        "estimate": describe_values(ranked.values),
-        "where": None if ranked.centre is None else {"centre_m": ranked.centre, "radius_m": ranked.radius},
-        "region": ranked.region,
-        "rejected_because": ranked.rejected_because,
-    }
+    return describe_cause(
+        ranked.kind,
+        ranked.rejected_because,
+        says=effect_sentence(ranked, gravity_axis),
+        physics=ranked.physics,
+        log_evidence=ranked.log_evidence,
+        probability=ranked.probability,
+        heldout_rmse_change=ranked.heldout_rmse_change,
+        detectability=ranked.detectability,
+        estimate=describe_values(ranked.values),
+        where=_ball(ranked),
+        region=ranked.region,
+    )
 
 
 def _rejected(kind: str, why: str) -> dict[str, Any]:
-    return {
-        "mechanism": kind,
-        "says": mechanisms()[kind].sentence,
-        "physics": True,
-        "log_evidence": None,
-        "probability": 0.0,
-        "heldout_rmse_change": None,
-        "detectability": None,
-        "estimate": {},
-        "where": None,
-        "region": "",
-        "rejected_because": why,
-    }
+    return describe_cause(kind, why, says=mechanisms()[kind].sentence, heldout_rmse_change=None, where=None)
 
 
-def noise_distance(noise: Floats, sensors: Sensors) -> float | None:
-    """Root mean square [m] of the distance in space that noise (n,) [m] alone leaves at a recorded point."""
-    rows = sensors.is_displacement
-    if not rows.any():
-        return None
-    return float(np.sqrt(np.sum(noise[rows] ** 2) / len(np.unique(sensors.groups[rows]))))
+def _ball(ranked: Ranked) -> dict[str, Any] | None:
+    return None if ranked.centre is None else {"centre_m": ranked.centre, "radius_m": ranked.radius}
 
 
 def _fit(found: Diagnosis) -> dict[str, Any]:
-    fit = found.fit
+    fit, noise, sensors = found.fit, found.base.noise, found.base.at.sensors
     rows = {"declared": fit.declared, "refitted": fit.refitted, "explained": fit.explained}
     check = dict(zip(rows, fit.check, strict=False)) if fit.check else None
     improvement = fit.improvement
@@ -171,23 +139,15 @@ def _fit(found: Diagnosis) -> dict[str, Any]:
         "heldout_rmse_m": {name: None if pair is None else pair[1] for name, pair in rows.items()},
         "check_rmse_m": check,
         "ceiling_heldout_rmse_m": fit.ceiling,
-        "noise_m": float(found.base.noise[found.base.at.sensors.is_displacement].mean())
-        if found.base.at.sensors.is_displacement.any()
-        else None,
-        "noise_rmse_m": noise_distance(found.base.noise, found.base.at.sensors),
+        "noise_m": float(noise[sensors.is_displacement].mean()) if sensors.is_displacement.any() else None,
+        "noise_rmse_m": distance(sensors, noise) if sensors.is_displacement.any() else None,
         "improvement": None
         if improvement is None
         else {"part": improvement[0], "interval_95": [improvement[1], improvement[2]]},
         "placebo_p": fit.placebo_p,
         "placebo_heldout_rmse_m": None if fit.placebo is None else list(fit.placebo),
         "confirmations": [
-            {
-                "mechanism": one.name,
-                "log_evidence": one.log_evidence,
-                "heldout_log_density": one.heldout_log_density,
-                "gain": list(one.gain),
-                "placebo_p": one.placebo_p,
-            }
+            {"mechanism" if key == "name" else key: value for key, value in asdict(one).items()}
             for one in found.confirmations
         ],
     }

@@ -9,13 +9,11 @@ from warpbrain.atomic import whole_file
 from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
 from warpbrain.inference.probability import percent
 from warpbrain.report.diagnosis.figures.agreement import agreement_figure
-from warpbrain.report.diagnosis.figures.candidates import candidates_figure
 from warpbrain.report.diagnosis.figures.confusion import confusion_figure
 from warpbrain.report.diagnosis.figures.curves import curves_figure
-from warpbrain.report.diagnosis.figures.held_out import held_out_figure
 from warpbrain.report.diagnosis.figures.map import map_figure
 from warpbrain.report.diagnosis.figures.residuals import residuals_figure
-from warpbrain.report.diagnosis.saved import Saved, read_saved
+from warpbrain.report.diagnosis.saved import Saved, read_saved, unit_of
 from warpbrain.report.diagnosis.tables import (
     aside_table,
     candidates_table,
@@ -23,12 +21,10 @@ from warpbrain.report.diagnosis.tables import (
     next_table,
     rejected_table,
     smallest_table,
-    stages_table,
     table,
     text,
 )
 from warpbrain.report.diagnosis.text import when_in_words
-from warpbrain.report.diagnosis.units import unit_of
 from warpbrain.report.diagnosis.viewer import asset, viewer
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.generative.page import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY
@@ -72,9 +68,7 @@ def page_of(saved: Saved) -> str:
         _verdict(summary),
         _before_and_after(saved),
         _view(saved),
-        _section(
-            "Candidates", candidates_figure(summary), _CANDIDATES, candidates_table(summary), stages_table(summary)
-        ),
+        _section("Candidates", _CANDIDATES, candidates_table(summary)),
         _where(saved),
         _apart(summary),
         _section("What to measure next", _next(summary)),
@@ -143,7 +137,6 @@ def _before_and_after(saved: Saved) -> str:
         parts.append(residuals_figure(summary, saved.anatomy, saved.rows))
     if saved.curves is not None:
         parts.append(curves_figure(saved.curves))
-    parts.append(held_out_figure(summary))
     parts.append(fit_table(summary))
     fit = summary["fit"]
     placebos = [("A", fit.get("placebo_p"))]

@@ -104,6 +104,34 @@ class Rows:
         return Vectors(where, left, self["set_aside"][rows][first] > 0.0)
 
 
+@dataclass(frozen=True)
+class Unit:
+    """How errors are shown.
+
+    Attributes
+    ----------
+    name : str
+    factor : float
+        From what is saved.
+    suffix : str
+        Of the keys of `diagnosis.json`.
+    error : str
+        What of one recorded row is squared.
+    """
+
+    name: str
+    factor: float
+    suffix: str
+    error: str
+
+
+def unit_of(summary: Mapping[str, Any]) -> Unit:
+    """That of the errors of a diagnosis."""
+    if "rmse_m" in summary["fit"]:
+        return Unit("mm", MILLIMETRES, "m", "distance in space")
+    return Unit("Pa", 1.0, "pa", "error of the stress")
+
+
 @dataclass(frozen=True, eq=False)
 class Saved:
     """A diagnosis as it lies in its folder.

@@ -1,39 +1,40 @@
-"""A diagnosis of a specimen as JSON and as lines of text: the keys of `diagnosis.json`, stresses for lengths."""
+"""A diagnosis of a specimen as JSON, with stresses for lengths, as lines of text and as curves."""
 
 from __future__ import annotations
 
 import math
 import textwrap
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from warpbrain.atomic import whole_file
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.probability import percent
-from warpbrain.report.diagnosis.common import describe_common, describe_values
+from warpbrain.report.diagnosis.common import describe_cause, describe_common, describe_decision, describe_values
+from warpbrain.report.diagnosis.saved import STATES
 from warpbrain.worlds.specimen.diagnose import SpecimenOptions
 from warpbrain.worlds.specimen.result import Ranked, SpecimenDiagnosis
 from warpbrain.worlds.specimen.sentences import sentence_of
 
 _WIDTH = 110
-_STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what was added"}
 
 
 def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptions, device: str) -> dict[str, Any]:
     """Everything that is known of a diagnosis; stresses in Pa, other units beside the values."""
     where = found.where
-    named = [_ranked(one) for one in found.named]
     particular = {
-        "named": named,
-        "mechanisms": named,
+        "mechanisms": [_ranked(one) for one in found.named],
         "where": None
         if where is None
         else {"test": where.test, "mode": where.mode, "segment": where.segment, "strain": list(where.strain)},
         "when": None if where is None or where.time is None else {"seconds": list(where.time)},
         "ranking": [_ranked(one) for one in found.ranking]
-        + [_rejected(name, why) for name, why in found.rejected.items()],
+        + [describe_cause(name, why, heldout_rmse_change_pa=None) for name, why in found.rejected.items()],
         "combinations": [asdict(one) for one in found.combinations],
-        "stages": _stages(found),
-        "before_checks": {"verdict": found.by_posterior.verdict, "causes": list(found.by_posterior.causes)},
+        "before_checks": describe_decision(found.by_posterior),
         "smallest_detectable": {
             name: {"size": one.size, "unit": one.unit, "parameter": one.name} for name, one in found.smallest.items()
         },
@@ -50,39 +51,21 @@ def describe_specimen_diagnosis(found: SpecimenDiagnosis, options: SpecimenOptio
 
 def _ranked(one: Ranked) -> dict[str, Any]:
     stands = math.isfinite(one.log_evidence)
-    return _rejected(one.name, "" if stands else "no fit with it stands") | {
-        "physics": one.kind is Kind.PHYSICS,
-        "log_evidence": one.log_evidence if stands else None,
-        "probability": one.probability,
-        "heldout_rmse_change_pa": one.change,
-        "detectability": one.detectability,
-        "estimate": describe_values(one.values),
-        "region": one.region,
-    }
-
-
-def _rejected(name: str, why: str) -> dict[str, Any]:
-    nothing = dict.fromkeys(("log_evidence", "heldout_rmse_change_pa", "detectability"))
-    return {"mechanism": name, "physics": True, "probability": 0.0, **nothing, "estimate": {}, "region": "",
-            "rejected_because": why}  # fmt: skip
-
-
-def _stages(found: SpecimenDiagnosis) -> list[dict[str, Any]]:
-    """What is left of the base, with the sets of causes that would explain it, and of the fit with what was added."""
-    candidates = [{"mechanism": " and ".join(one.causes) or "nothing", **asdict(one)} for one in found.combinations]
-    added = " and ".join(found.assumed) or None
-    stages = [
-        {"with": [], "p_value": found.p_value, "noise_scale": found.scale, "candidates": candidates, "added": added,
-         "why_not": " ".join(found.doubts)}
-    ]  # fmt: skip
-    if found.p_left is not None:
-        stages.append({"with": list(found.assumed), "p_value": found.p_left, "noise_scale": None, "candidates": [],
-                       "added": None, "why_not": ""})  # fmt: skip
-    return stages
+    return describe_cause(
+        one.name,
+        "" if stands else "no fit with it stands",
+        physics=one.kind is Kind.PHYSICS,
+        log_evidence=one.log_evidence if stands else None,
+        probability=one.probability,
+        heldout_rmse_change_pa=one.change,
+        detectability=one.detectability,
+        estimate=describe_values(one.values),
+        region=one.region,
+    )
 
 
 def _fit(found: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
-    scores = {name: found.scores.get(name) for name in _STATES}
+    scores = {name: found.scores.get(name) for name in STATES}
     gain = found.improvement
     return {
         "rmse_pa": {name: one.fitted if one else None for name, one in scores.items()},
@@ -134,7 +117,7 @@ def specimen_diagnosis_lines(found: SpecimenDiagnosis) -> list[str]:
         lines += ["", "  not tried:"]
         lines += [f"    {name}: {why}" for name, why in found.rejected.items()]
     lines += ["", "  RMSE of all rows [Pa]          fitted   held out   check"]
-    for key, name in _STATES.items():
+    for key, name in STATES.items():
         score = found.scores.get(key)
         if score is not None:
             held = " " * 10 if score.heldout is None else f"{score.heldout:10.4g}"
@@ -144,3 +127,21 @@ def specimen_diagnosis_lines(found: SpecimenDiagnosis) -> list[str]:
         lines += ["", "  what to measure next (expected log Bayes factor between the two most probable sets):"]
         lines += [f"    {one.expected_nats:8.1f}  {one.what}" for one in found.next_measurement[:4]]
     return lines
+
+
+def write_curves(path: Path, found: SpecimenDiagnosis) -> None:
+    """Write one row for each that was compared; times [s] are empty where there are none, stresses are nominal [Pa]."""
+    names = list(found.stresses)
+    simulated_names = [f"{name.replace(' ', '_')}_pa" for name in names]
+    header = ["test", "mode", "role", "time_s", "strain", "recorded_pa", *simulated_names]
+    lines = [",".join(header)]
+    for test, rows in zip(found.protocol.tests, found.protocol.rows, strict=True):
+        label = '"' + test.name.replace('"', '""') + '"'
+        simulated = np.column_stack([found.stresses[name][rows] for name in names])
+        for k in range(len(test.strain)):
+            time = "" if test.time is None else f"{test.time[k]:.9g}"
+            numbers = [f"{test.strain[k]:.9g}", f"{test.stress[k]:.9g}"]
+            numbers += ["" if np.isnan(value) else f"{value:.9g}" for value in simulated[k]]
+            lines.append(",".join([label, test.mode, "fit" if test.fitted else "check", time, *numbers]))
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")

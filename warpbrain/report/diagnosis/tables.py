@@ -11,8 +11,7 @@ import numpy as np
 from warpbrain.inference.probability import percent
 from warpbrain.physics.sizes import size_in_words
 from warpbrain.physics.values import Value
-from warpbrain.report.diagnosis.saved import STATES, Rows
-from warpbrain.report.diagnosis.units import unit_of
+from warpbrain.report.diagnosis.saved import STATES, Rows, unit_of
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = (), caption: str = "") -> str:
@@ -75,36 +74,25 @@ def rejected_table(summary: dict[str, Any]) -> str:
     return table(("not tried", "why"), rows) if rows else ""
 
 
-def stages_table(summary: dict[str, Any]) -> str:
-    """One mechanism after the other, as they were added to a specimen; empty of a body."""
-    rows = []
-    for stage in summary.get("stages", ()):
-        best = stage["candidates"][0] if stage["candidates"] else None
-        rows.append(
-            [
-                text(" and ".join(stage["with"]) or "nothing added"),
-                f"{stage['p_value']:.2g}",
-                "" if best is None else f"{text(best['mechanism'])} ({percent(best['probability'])})",
-                text(stage["added"] or ""),
-                text(stage["why_not"]),
-            ]
-        )
-    head = ("with", "p, nothing is left", "most probable", "added", "why not")
-    return table(head, rows, numbers=(1,), caption="One after the other") if rows else ""
-
-
 def fit_table(summary: dict[str, Any]) -> str:
-    """Errors of each state, at what was fitted, held out, and only checked."""
+    """Errors of each state, at what was fitted, held out, and only checked; beside them what others would reach."""
     unit, fit = unit_of(summary), summary["fit"]
-    rows = []
-    for state, name in STATES.items():
-        if fit[f"rmse_{unit.suffix}"].get(state) is None:
-            continue
-        cells = [name]
-        for key in ("rmse", "heldout_rmse", "check_rmse"):
-            value = (fit.get(f"{key}_{unit.suffix}") or {}).get(state)
-            cells.append(_error(value, unit.factor))
-        rows.append(cells)
+
+    def of(key: str) -> Any:
+        return fit.get(f"{key}_{unit.suffix}")
+
+    rows = [
+        [name, *(_error((of(key) or {}).get(state), unit.factor) for key in ("rmse", "heldout_rmse", "check_rmse"))]
+        for state, name in STATES.items()
+        if of("rmse").get(state) is not None
+    ]
+    if of("ceiling_heldout_rmse") is not None:
+        rows.append(["any smooth force without a name", "", _error(of("ceiling_heldout_rmse"), unit.factor), ""])
+    if of("placebo_heldout_rmse") is not None:
+        low, high = (_error(value, unit.factor) for value in of("placebo_heldout_rmse"))
+        rows.append(["nine of ten patterns that mean nothing, with as many parameters", "", f"{low} to {high}", ""])
+    if of("noise_rmse") is not None:
+        rows.append(["what noise alone leaves", _error(of("noise_rmse"), unit.factor), "", ""])
     head = ("", f"fitted [{unit.name}]", f"held out [{unit.name}]", f"check [{unit.name}]")
     return table(head, rows, numbers=(1, 2, 3), caption=f"Root mean square {unit.error}")
 

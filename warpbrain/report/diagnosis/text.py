@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from warpbrain.inference.probability import percent
+from warpbrain.report.diagnosis.saved import STATES
 from warpbrain.report.files import MILLIMETRES
 
 _WIDTH = 110
@@ -70,8 +71,7 @@ def _line(one: Mapping[str, Any]) -> str:
 
 def _fit_lines(fit: Mapping[str, Any]) -> list[str]:
     lines = ["  RMSE [mm]                      fitted   held out"]
-    names = (("declared", "as declared"), ("refitted", "tissue refitted"), ("explained", "with what is named"))
-    for key, name in names:
+    for key, name in STATES.items():
         inside, outside = fit["rmse_m"][key], fit["heldout_rmse_m"][key]
         if inside is not None:
             lines.append(f"  {name:<28} {MILLIMETRES * inside:8.3f}   {MILLIMETRES * outside:8.3f}")

@@ -14,7 +14,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.marginal import Marginal
 from warpbrain.simulation.extrapolated import extrapolated

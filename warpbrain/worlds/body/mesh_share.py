@@ -13,7 +13,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
-from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer

@@ -12,11 +12,10 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.boundary import Boundary, Fixed
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
-from warpbrain.estimation.discretisation import Difference
+from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
-from warpbrain.estimation.realigned import realigned
-from warpbrain.estimation.registration import registration_of
+from warpbrain.estimation.registration import realigned, registration_of
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.composition import CompositionError
 from warpbrain.physics.mechanism import Mechanism

@@ -193,7 +193,6 @@ class DiagnosingSpecimen:
                 for one in best.assumed
                 if not one.effect.runs
             ),
-            scale=base.scale,
             by_test=checking.folds.by_test,
             seconds=self.seconds,
         )

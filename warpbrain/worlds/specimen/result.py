@@ -113,8 +113,6 @@ class SpecimenDiagnosis:
         Of each mechanism of that fit.
     explained : Case or None
     assumptions, remarks : tuple of str
-    scale : float
-        Factor on the noise, of the refitted case.
     by_test : bool
         Whether whole tests were held out.
     seconds : dict of str to float
@@ -142,7 +140,6 @@ class SpecimenDiagnosis:
     explained: Case | None
     assumptions: tuple[str, ...]
     remarks: tuple[str, ...]
-    scale: float
     by_test: bool
     seconds: Mapping[str, float]
 

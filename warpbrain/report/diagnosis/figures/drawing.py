@@ -10,10 +10,9 @@ from typing import Any
 
 from warpbrain.report.generative.page import BLUE, ORANGE, VERMILLION
 
-#: Colour, marker and hatch of each state; in grey the first is the darkest but for its hatch, the last has none.
+#: Colour and marker of each state; in grey the first is the darkest.
 COLOURS = {"declared": VERMILLION, "refitted": ORANGE, "explained": BLUE}
 MARKERS = {"declared": "x", "refitted": "+", "explained": "o"}
-HATCHES = {"declared": "////", "refitted": "....", "explained": ""}
 
 #: Of a page for one inch of a figure, so that texts of all are alike.
 _PIXELS = 112
