@@ -12,7 +12,19 @@ from warpbrain.physics.mechanisms import mechanisms
 PACKAGE = Path(str(files("warpbrain")))
 #: From the ground up; docs/house.md says what each is for.
 FLOORS = [
-    *("kernels", "mesh", "physics", "recordings", "gp", "cases", "simulation", "ensemble", "inference", "estimation"),
+    *(
+        "kernels",
+        "mesh",
+        "physics",
+        "recordings",
+        "images",
+        "gp",
+        "cases",
+        "simulation",
+        "ensemble",
+        "inference",
+        "estimation",
+    ),
     *("worlds", "diagnosis", "report", "terminal", "bench", "cli"),
 ]
 #: Modules that any floor may use, and that use none.

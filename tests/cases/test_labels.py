@@ -99,7 +99,7 @@ def _furlongs(image):
         (SMALL * np.float32(0.75), None, r"found 120 voxels of 336 that are none, such as 1\.5"),
         (np.where(SMALL > 0, np.nan, 0).astype(np.float32), None, "found 120 voxels of 336 that are none, such as nan"),
         (-SMALL.astype(np.int16), None, "expected labels of 0 or more, found -2"),
-        (SMALL.astype(np.complex64), None, "expected whole numbers as labels, found values of type complex64"),
+        (SMALL.astype(np.complex64), None, "expected real or whole numbers, .*, found values of type complex64"),
         (np.stack([SMALL, SMALL], axis=-1), None, "three dimensions, found shape 6 x 7 x 8 x 2"),
         (SMALL[0], None, "three dimensions, found shape 7 x 8"),
         (SMALL, _no_place, r"does not say where its voxels are \(sform and qform code 0\)"),
@@ -139,7 +139,7 @@ def test_other_images_and_too_many_voxels_are_refused(tmp_path, monkeypatch):
     nibabel.save(nibabel.Spm99AnalyzeImage(SMALL, np.eye(4)), tmp_path / "a.img")
     with pytest.raises(InputError, match=r"a\.img: expected a NIfTI file \(.nii, .nii.gz\), found Spm"):
         read_labels(tmp_path / "a.img")
-    monkeypatch.setattr("warpbrain.cases.building.label_image.MOST_VOXELS", 300)
+    monkeypatch.setattr("warpbrain.images.reading.MOST_VOXELS", 300)
     with pytest.raises(InputError, match="6 x 7 x 8 voxels are more than 3e"):
         read_labels(write_labels(tmp_path / "a.nii", SMALL, np.eye(4)))
 
