@@ -17,9 +17,10 @@ Singles = NDArray[np.float32]
 #: Over which the continued displacement falls to 1/e [mm]. A choice and no measurement: shorter than the largest
 #: displacements that there are, about 10 to 20 mm, the map would fold where tissue moves outwards.
 LENGTH = 20.0
-#: Sweeps of the finest grid; each coarser one has twice as many, up to `_MOST` (cascadic: Bornemann and Deuflhard 1996,
-#: Numerische Mathematik 75, 135).
-_SWEEPS, _MOST = 8, 200
+#: Iterations of conjugate gradients on the finest grid; each coarser one, from whose solution they start, has twice as
+#: many, up to `_MOST` (cascadic: Bornemann and Deuflhard 1996, Numerische Mathematik 75, 135). The equation is then
+#: solved to about 3 % of the largest displacement.
+_ITERATIONS, _MOST = 8, 200
 #: Edge [voxels] of the grid from which on none coarser is made.
 _COARSEST = 12
 
@@ -43,28 +44,50 @@ def continued(values: Singles, known: Bools, voxel: Floats, length: float = LENG
         The values where known, and the continuation elsewhere.
     """
     given = np.where(known[..., None], values, np.float32(0.0)).astype(np.float32)
-    return _solved(given, known, np.asarray(voxel, dtype=np.float64), length, _SWEEPS)
+    return _solved(given, known, np.asarray(voxel, dtype=np.float64), length, _ITERATIONS)
 
 
-def _solved(given: Singles, known: Bools, voxel: Floats, length: float, sweeps: int) -> Singles:
+def _solved(given: Singles, known: Bools, voxel: Floats, length: float, iterations: int) -> Singles:
+    """Conjugate gradients from the solution on a grid of twice the edges."""
+    start = np.zeros_like(given)
     if min(known.shape) > _COARSEST:
-        start = _finer(_solved(*_coarser(given, known), 2.0 * voxel, length, min(2 * sweeps, _MOST)), known.shape)
+        more = min(2 * iterations, _MOST)
+        start = _finer(_solved(*_coarser(given, known), 2.0 * voxel, length, more), known.shape)
     else:
-        start, sweeps = np.zeros_like(given), _MOST
+        iterations = _MOST
     start[known] = given[known]
     weights = 1.0 / voxel**2
     factors = (weights / (2.0 * weights.sum() + 1.0 / length**2)).astype(np.float32)
-    for _ in range(sweeps):
-        # Gauss-Jacobi; beyond the grid there is zero
-        found = np.zeros_like(start)
-        for axis, factor in enumerate(factors):
-            ahead, behind = [slice(None)] * 3, [slice(None)] * 3
-            ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
-            found[tuple(behind)] += factor * start[tuple(ahead)]
-            found[tuple(ahead)] += factor * start[tuple(behind)]
-        found[known] = given[known]
-        start = found
+    left = _neighbours(start, factors) - start
+    left[known] = 0.0
+    direction, square = left.copy(), _dots(left, left)
+    for _ in range(iterations):
+        product = direction - _neighbours(direction, factors)
+        product[known] = 0.0
+        step = (square / np.maximum(_dots(direction, product), 1e-30)).astype(np.float32)
+        start += step * direction
+        left -= step * product
+        before, square = square, _dots(left, left)
+        direction *= (square / np.maximum(before, 1e-30)).astype(np.float32)
+        direction += left
     return start
+
+
+def _neighbours(values: Singles, factors: Singles) -> Singles:
+    """Sum of the six voxels around each, weighted by a factor for each axis; there is zero beyond the grid."""
+    found = np.zeros_like(values)
+    for axis, factor in enumerate(factors):
+        ahead, behind = [slice(None)] * 3, [slice(None)] * 3
+        ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
+        scaled = factor * values
+        found[tuple(behind)] += scaled[tuple(ahead)]
+        found[tuple(ahead)] += scaled[tuple(behind)]
+    return found
+
+
+def _dots(a: Singles, b: Singles) -> Floats:
+    """Inner products (c,) of two fields of c components."""
+    return np.einsum("nc,nc->c", a.reshape(-1, a.shape[3]), b.reshape(-1, b.shape[3]), dtype=np.float64)
 
 
 def _coarser(given: Singles, known: Bools) -> tuple[Singles, Bools]:

@@ -76,7 +76,7 @@ def write_slicer_scene(
     for name, moved in zip(SURFACES, (0.0, 1.0), strict=True):
         points = MILLIMETRES * (state.mesh.points + moved * state.u)[nodes]
         _write_surface(folder / name, points, numbers.reshape(-1, 3), size[nodes])
-    afters = [name for name in files if name.endswith("-after.nii.gz")]
+    afters = [name for name in files if name.endswith("-after.nii.gz") and not name.startswith("transform-")]
     points_after = [name for name in files if name.endswith(("-after.mrk.json", "-after.json", "-after.fcsv"))]
     label_name = None if labels is None else afters[-1]
     volumes = [] if image is None else [str(image.path.resolve())]
