@@ -38,6 +38,7 @@ NAMED = {
     "cases/case.py": "a case's anatomy is what its resection leaves",
     "simulation/of_case.py": "[[boundary]] kinds of case.toml that mechanisms compute",
     "cases/building/example_sets.py": "name of a node set of a shipped mesh",
+    "cases/building/tissue_names.py": "name of labels of tissue that is taken out",
     "cases/building/pipeline.py": "names of sets of a shipped mesh",
     "report/summary.py": "name of a set of a shipped mesh, in words",
     "report/views.py": "name of a set of a shipped mesh",

@@ -16,6 +16,7 @@ from warpbrain.cases.building.label_fields import make_fields
 from warpbrain.cases.building.label_image import LabelImage, read_labels
 from warpbrain.cases.building.label_regions import CAVITY, make_regions
 from warpbrain.cases.building.lattice import bcc_lattice
+from warpbrain.cases.building.presets import preset, preset_names
 from warpbrain.cases.building.tissue_names import Assignment, assign, parse_names
 from warpbrain.errors import InputError
 from warpbrain.mesh import boundary_faces, components, dihedral_angles, pinched_nodes, split_boundary
@@ -360,3 +361,48 @@ def test_a_tissue_too_thin_for_the_size_is_named(tmp_path):
         meshed(path, f"{NAMES},7=pea", 0.5)
     with pytest.raises(InputError, match=r"--size 90: too large for 5.. cm3 of tissue"):
         meshed(path, f"{NAMES},7=pea", 90.0)
+
+
+# presets
+
+
+def test_presets_name_labels_as_the_programs_do():
+    for name in preset_names():
+        assert preset(name)
+    names = preset("freesurfer")
+    assert (names[3], names[41], names[16], names[4]) == ("grey matter", "white matter", "brain stem", "ventricle")
+    assert (names[1035], names[2004], names[12140], names[24]) == (
+        *("grey matter", "white matter", "grey matter", "ignore"),
+    )
+    assert preset("synthseg").items() <= names.items()
+    assert preset("simnibs")[2] == "grey matter"
+    with pytest.raises(InputError, match="--preset: found 'itk', expected one of freesurfer, synthseg"):
+        preset("itk")
+
+
+def test_labels_of_a_preset_are_each_named_once():
+    """A number in two rows of a table would mean what comes last."""
+    import tomllib
+    from importlib.resources import files
+
+    tables = tomllib.loads((files("warpbrain.cases.building") / "presets.toml").read_text())
+    for name, table in tables.items():
+        numbers = []
+        for tissue, labels in table.items():
+            for label in labels if tissue != "source" else ():
+                first, _, last = str(label).partition("-")
+                numbers += range(int(first), int(last or first) + 1)
+        assert len(numbers) == len(set(numbers)) == len(preset(name)), name
+
+
+@pytest.mark.parametrize(("name", "meant"), [("gry", "grey matter"), ("whit", "white matter"), ("lesoin", "lesion")])
+def test_misspelt_tissues_are_asked_about(name, meant):
+    with pytest.raises(InputError, match=f"'{name}': did you mean {meant}"):
+        parse_names([f"2={name}"])
+
+
+def test_other_names_are_taken_as_they_are():
+    given = ["2=gel,3=lesion 2,4=brain stem,5=Grey,6=tumour core"]
+    assert parse_names(given)[2] == "gel"
+    assert parse_names(given)[3] == "lesion 2"
+    assert parse_names(given)[5] == "grey matter"

@@ -176,7 +176,11 @@ def _lines(
         f"continued outside, where it falls to 1/e in {LENGTH:g} mm",
         f"inverse   forward after inverse is off by {back.error_99:.2g} mm at the 99th percentile in tissue, at most "
         f"{back.error_largest:.2g} mm"
-        + (f"; {back.unsolved} voxels have none: the map folds there" if back.unsolved else ""),
+        + (
+            f"; at {back.unsolved} voxels it did not converge, where the map folds or nearly so"
+            if back.unsolved
+            else ""
+        ),
     ]
     for points in moved:
         count = len(points.points)
