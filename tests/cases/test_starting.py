@@ -297,3 +297,13 @@ def test_tissue_of_a_resection_label_is_taken_out(of_freesurfer):
 
 def test_a_new_case_has_the_density_of_brain(of_freesurfer):
     assert read_case(of_freesurfer.folder).density == 1040.0
+
+
+def test_a_label_that_can_mean_two_things_is_asked_about(tmp_path):
+    pytest.importorskip("mmgpy")
+    labels = np.zeros((40, 40, 40), dtype=np.int16)
+    labels[2:-2, 2:-2, 2:-2] = 4
+    write_labels(tmp_path / "seg.nii.gz", labels, np.diag([3.0, 3.0, 3.0, 1.0]))
+    with pytest.raises(InputError, match=r"seg.nii.gz: label 4: enhancing tumour until 2022.*--tissue 4=NAME"):
+        start_from_labels(tmp_path / "mine", tmp_path / "seg.nii.gz", program="brats")
+    assert not (tmp_path / "mine").exists()

@@ -205,6 +205,14 @@ def test_a_result_that_is_none(folder, tmp_path):
     assert "result.vtu: no body of tetrahedra that can be read" in done.err
 
 
+def test_a_run_stops_before_it_begins_on_an_image_of_something_else(folder, tmp_path):
+    nibabel.save(_far(nibabel.load(folder / "T1.nii.gz")), tmp_path / "T1.nii")
+    done = run(folder / "case", "--out", tmp_path / "out", "--image", tmp_path / "T1.nii")
+    assert done.status == 2
+    assert "T1.nii: affine: 0 % of the body" in done.err
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_run_stops_before_it_begins_on_a_bad_image(folder, tmp_path):
     (tmp_path / "T1.nii").write_bytes(b"nothing")
     done = run(folder / "case", "--out", tmp_path / "out", "--image", tmp_path / "T1.nii")

@@ -16,7 +16,7 @@ from warpbrain.cases.building.first_sets import first_sets
 from warpbrain.cases.building.label_image import read_labels
 from warpbrain.cases.building.labels import LabelMesh, mesh_labels
 from warpbrain.cases.building.plausible import check_volume_in, cm3
-from warpbrain.cases.building.presets import preset
+from warpbrain.cases.building.presets import Preset, preset
 from warpbrain.cases.building.tissue_names import OUTSIDE, RESECTION, VENTRICLE, Assignment, assign, parse_names
 from warpbrain.cases.case_template import case_text
 from warpbrain.errors import InputError
@@ -102,12 +102,14 @@ def start_from_labels(
     if size is not None and not 0 < size < np.inf:
         raise InputError(f"--size: found {size:g}, expected a positive length [mm]")
     given = parse_names(names)
-    usual = {} if program is None else preset(program)
+    usual = Preset({}, {}) if program is None else preset(program)
     require_extra(("mmgpy", "nibabel", "scipy", "meshio"))
     progress(f"reading {labels}")
     image = read_labels(labels)
     volumes = image.volumes()
-    given = {label: name for label, name in usual.items() if label in volumes} | given
+    for label in sorted(usual.unsure.keys() & volumes.keys() - given.keys()):
+        raise InputError(f"{labels}: label {label}: {usual.unsure[label]}: say which with --tissue {label}=NAME")
+    given = {label: name for label, name in usual.names.items() if label in volumes} | given
     assignment = assign(volumes, given, others)
     made = mesh_labels(image, assignment, size, progress)
     sets = first_sets(made.points, made.tetrahedra, made.opens)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from warpbrain.cli import warp
-from warpbrain.errors import InputError
 from warpbrain.terminal.progress import Progress
 
 
@@ -74,8 +73,7 @@ def _run(options: argparse.Namespace) -> None:
     device = find_device(options.device).alias
     images = warp.asked_for(options)
     case = find_case(options.case, options.tissue)
-    if images is not None and case.specimen is not None:
-        raise InputError(f"{case.path}: [specimen]: --image, --labels and --points are of a body, not of tests")
+    warp.check_place(images, case)
     way = _of_a_body() if case.specimen is None else _of_a_specimen()
     progress = Progress("diagnosis", options.quiet)
 

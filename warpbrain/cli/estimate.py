@@ -94,6 +94,7 @@ def _run(options: argparse.Namespace) -> None:
     case = find_case(options.case, options.tissue)
     if case.specimen is not None:
         raise InputError(f"{case.path}: [specimen]: tissue is estimated from a deformed body, not from tests")
+    warp.check_place(images, case)
     if options.model is not None:
         case = case.with_law(options.model)
     out = output_folder(options.out or Path(f"warpbrain-estimate-{safe_name(case.name)}-{options.tissue}"))

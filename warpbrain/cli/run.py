@@ -132,10 +132,9 @@ def _run(options: argparse.Namespace) -> None:
     find_device(options.device)
     asked = warp.asked_for(options)
     case, found = _case(options)
+    warp.check_place(asked, case)
     prior = None if found is None else describe_prior(found)
     if case.specimen is not None:
-        if asked is not None:
-            raise InputError(f"{case.path}: [specimen]: --image, --labels and --points are of a body, not of tests")
         from warpbrain.cli import run_specimen
 
         run_specimen.run(options, case, say, prior)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from warpbrain.errors import InputError
 
 if TYPE_CHECKING:
+    from warpbrain.cases.case import Case
     from warpbrain.report.warped import Asked
 
 
@@ -57,6 +58,17 @@ def asked_for(options: argparse.Namespace) -> Asked | None:
     from warpbrain.report.warped import read_asked
 
     return read_asked(options.image, options.labels, options.points)
+
+
+def check_place(asked: Asked | None, case: Case) -> None:
+    """`InputError` if what is to be warped is not of the case, before anything is computed."""
+    if asked is None:
+        return
+    if case.specimen is not None:
+        raise InputError(f"{case.path}: [specimen]: --image, --labels and --points are of a body, not of tests")
+    from warpbrain.report.warped import check_place
+
+    check_place(asked, case.mesh, case.path)
 
 
 def warp(result: Path, out: Path, asked: Asked, say: Callable[..., None], quiet: bool) -> list[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.images.continuation import continued
 from warpbrain.images.grid import MILLIMETRES, Grid
 from warpbrain.images.inside import VoxelsInside
@@ -33,6 +33,18 @@ class DisplacementField:
 
     grid: Grid
     vectors: Singles
+
+    def on(self, grid: Grid) -> DisplacementField:
+        """The same field on another grid."""
+        if grid is self.grid:
+            return self
+        vectors = np.empty((*grid.shape, 3), dtype=np.float32)
+        # a slice at a time, to bound the memory
+        plane = np.stack(np.meshgrid(*(np.arange(n) for n in grid.shape[1:]), indexing="ij"), axis=-1).reshape(-1, 2)
+        for i in range(grid.shape[0]):
+            places = np.column_stack([np.full(len(plane), i), plane])
+            vectors[i] = self.at(grid.positions(places)).reshape(*grid.shape[1:], 3)
+        return DisplacementField(grid, vectors)
 
     def at(self, points: ArrayLike) -> Floats:
         """Vectors (n, 3) [mm, RAS] at positions (n, 3) [mm, RAS]."""
@@ -106,7 +118,7 @@ def inverse(field: DisplacementField, tissue: Bools) -> Inverse:
     """
     grid = field.grid
     vectors = -field.vectors.reshape(-1, 3).astype(np.float64)
-    active = np.flatnonzero(np.linalg.norm(vectors, axis=1) > _TOLERANCE)
+    active: Ints = np.flatnonzero(np.linalg.norm(vectors, axis=1) > _TOLERANCE)
     best = vectors[active]
     error = np.full(len(active), np.inf)
     residual = np.zeros_like(best)
@@ -126,9 +138,8 @@ def inverse(field: DisplacementField, tissue: Bools) -> Inverse:
         if not going.any():
             active = active[:0]
             break
-        active, places, best, residual, error, step = (
-            array[going] for array in (active, places, best, residual, error, step)
-        )
+        active, places, error, step = active[going], places[going], error[going], step[going]
+        best, residual = best[going], residual[going]
         tried = best - step[:, None] * residual
     back = DisplacementField(grid, vectors.reshape(field.vectors.shape).astype(np.float32))
     errors = _errors(field, back, tissue)

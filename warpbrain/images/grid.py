@@ -41,6 +41,17 @@ class Grid:
         i, j, k = (int(n) for n in np.ceil((highest - lowest) / spacing) + 1)
         return cls((i, j, k), affine)
 
+    def finer(self, edge: float) -> Grid:
+        """The same box in voxels whose edges are `edge` [mm] at most: itself, if its own are no longer."""
+        parts = np.ceil(self.voxel / edge - 1e-3).astype(np.int64).clip(1)
+        if (parts == 1).all():
+            return self
+        affine = self.affine.copy()
+        affine[:3, :3] /= parts
+        affine[:3, 3] = self.positions(0.5 / parts - 0.5)
+        i, j, k = (int(n) for n in np.array(self.shape) * parts)
+        return Grid((i, j, k), affine)
+
     @property
     def voxel(self) -> Floats:
         """Edges (3,) of a voxel [mm]."""

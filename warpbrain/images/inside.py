@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,8 +74,8 @@ class VoxelsInside:
         found = np.einsum("ka,kac->kc", w * (2.0 * w - 1.0), values[corners])
         return np.asarray(found + np.einsum("ka,kac->kc", 4.0 * w[:, EDGES].prod(axis=2), middles[self.elements]))
 
-    def image(self, values: Floats) -> NDArray[np.float32]:
-        """Values (k, ...) of these voxels as an image, zero elsewhere."""
+    def image(self, values: NDArray[Any]) -> NDArray[np.float32]:
+        """Real or whole values (k, ...) of these voxels as an image, zero elsewhere."""
         found = np.zeros((self.grid.count, *values.shape[1:]), dtype=np.float32)
         found[self.voxels] = values
         return found.reshape(*self.grid.shape, *values.shape[1:])
@@ -84,7 +85,7 @@ def voxels_inside(mesh: TetMesh, grid: Grid) -> VoxelsInside:
     """Find the voxels of a grid whose centres are in a mesh (at rest, in metres)."""
     corners = grid.indices(MILLIMETRES * mesh.points)[mesh.tetrahedra]
     sides = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
-    gradients = np.linalg.inv(sides)
+    gradients: Floats = np.asarray(np.linalg.inv(sides), dtype=np.float64)
     parts = list(_found(corners, gradients, np.array(grid.shape)))
     voxels = np.concatenate([voxel for voxel, _, _ in parts]) if parts else np.zeros(0, dtype=np.int64)
     voxels, first = np.unique(voxels, return_index=True)

@@ -125,8 +125,8 @@ def _with_nibabel(path: Path) -> Image:
         values = np.asarray(image.dataobj)
     except Exception as error:  # gzip, zlib and nibabel all have their own ways to say that a file ends early
         raise InputError(f"{path}: the file is cut short or damaged ({_reason(error)})") from None
-    values = values.reshape(values.shape[:3])
-    return Image(path, values, Grid(values.shape, affine), tuple(notes))
+    i, j, k = values.shape[:3]
+    return Image(path, values.reshape(i, j, k), Grid((i, j, k), affine), tuple(notes))
 
 
 def _check_count(path: Path, shape: Iterable[int]) -> None:
