@@ -9,6 +9,7 @@ from segmentations import CENTRE, NAMES, ellipsoids, grid_affine, volume_of, wri
 from shapes import box
 
 from warpbrain.cases.case_template import MU, OTHER_MU, case_text
+from warpbrain.cases.checking import NOTHING_ACTS, check_case
 from warpbrain.cases.reading import read_case
 from warpbrain.cases.starting import start_from_labels, start_from_mesh, summary
 from warpbrain.errors import InputError
@@ -307,3 +308,10 @@ def test_a_label_that_can_mean_two_things_is_asked_about(tmp_path):
     with pytest.raises(InputError, match=r"seg.nii.gz: label 4: enhancing tumour until 2022.*--tissue 4=NAME"):
         start_from_labels(tmp_path / "mine", tmp_path / "seg.nii.gz", program="brats")
     assert not (tmp_path / "mine").exists()
+
+
+def test_a_case_in_which_nothing_acts_says_so(started, of_freesurfer):
+    for case, _ in (started, (of_freesurfer, None)):
+        # a resection alone moves nothing
+        assert read_case(case.folder).nothing_acts
+        assert NOTHING_ACTS in check_case(case.folder).remarks
