@@ -4,14 +4,16 @@ import numpy as np
 from image_grids import turned_grid
 
 
-def test_a_finer_grid_fills_the_same_box():
-    grid = turned_grid((6, 7, 5), (3.0, 0.7, 1.0))
-    finer = grid.finer(1.0)
-    assert finer.shape == (18, 7, 5)
-    np.testing.assert_allclose(finer.voxel, [1.0, 0.7, 1.0])
-    np.testing.assert_allclose(finer.positions([-0.5, -0.5, -0.5]), grid.positions([-0.5, -0.5, -0.5]))
-    np.testing.assert_allclose(finer.positions([17.5, 6.5, 4.5]), grid.positions([5.5, 6.5, 4.5]))
-    assert grid.finer(3.0) is grid
+def test_other_edges_fill_the_same_box():
+    grid = turned_grid((6, 7, 8), (3.0, 0.7, 0.4))
+    other = grid.with_edges(1.0)
+    assert other.shape == (18, 7, 4)
+    np.testing.assert_allclose(other.voxel, [1.0, 0.7, 0.8])
+    np.testing.assert_allclose(other.positions([-0.5, -0.5, -0.5]), grid.positions([-0.5, -0.5, -0.5]))
+    np.testing.assert_allclose(other.positions([17.5, 6.5, 3.5]), grid.positions([5.5, 6.5, 7.5]))
+    assert turned_grid((6, 7, 8), (0.6, 1.0, 0.9)).with_edges(1.0).shape == (6, 7, 8)
+    # the last voxel reaches beyond
+    assert turned_grid((5, 5, 5), (0.5, 0.5, 0.5)).with_edges(1.0).shape == (3, 3, 3)
 
 
 def test_positions_and_indices_are_inverse():

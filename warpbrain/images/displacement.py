@@ -117,14 +117,27 @@ def inverse(field: DisplacementField, tissue: Bools) -> Inverse:
         Where there is tissue before it is moved: what the error is told of.
     """
     grid = field.grid
-    vectors = -field.vectors.reshape(-1, 3).astype(np.float64)
+    vectors = -field.vectors.reshape(-1, 3)
     active: Ints = np.flatnonzero(np.linalg.norm(vectors, axis=1) > _TOLERANCE)
-    best = vectors[active]
-    error = np.full(len(active), np.inf)
+    unsolved = 0
+    for first in range(0, len(active), _BATCH):
+        part = active[first : first + _BATCH]
+        vectors[part], left = _inverted(field, part)
+        unsolved += left
+    back = DisplacementField(grid, vectors.reshape(field.vectors.shape))
+    errors = _errors(field, back, tissue)
+    return Inverse(back, float(np.percentile(errors, 99.0)), float(errors.max()), unsolved)
+
+
+def _inverted(field: DisplacementField, voxels: Ints) -> tuple[Floats, int]:
+    """The inverse (n, 3) at some voxels, and how many of them have none that is good enough."""
+    grid = field.grid
+    places = np.stack(np.unravel_index(voxels, grid.shape), axis=1).astype(np.float64)
+    found = -field.vectors.reshape(-1, 3)[voxels].astype(np.float64)
+    active: Ints = np.arange(len(voxels))
+    best = tried = found.copy()
+    error, step = np.full(len(voxels), np.inf), np.ones(len(voxels))
     residual = np.zeros_like(best)
-    step = np.ones(len(active))
-    places = np.stack(np.unravel_index(active, grid.shape), axis=1).astype(np.float64)
-    tried = best
     for _ in range(_ITERATIONS):
         left = tried + field.at_indices(places + grid.steps(tried))
         size = np.linalg.norm(left, axis=1)
@@ -133,17 +146,14 @@ def inverse(field: DisplacementField, tissue: Bools) -> Inverse:
         residual = np.where(better[:, None], left, residual)
         error = np.where(better, size, error)
         step = np.where(better, step, 0.5 * step)
-        vectors[active] = best
+        found[active] = best
         going = error > _TOLERANCE
-        if not going.any():
-            active = active[:0]
-            break
         active, places, error, step = active[going], places[going], error[going], step[going]
         best, residual = best[going], residual[going]
+        if not len(active):
+            break
         tried = best - step[:, None] * residual
-    back = DisplacementField(grid, vectors.reshape(field.vectors.shape).astype(np.float32))
-    errors = _errors(field, back, tissue)
-    return Inverse(back, float(np.percentile(errors, 99.0)), float(errors.max()), len(active))
+    return found, len(active)
 
 
 def _errors(field: DisplacementField, back: DisplacementField, tissue: Bools) -> Floats:

@@ -41,15 +41,21 @@ class Grid:
         i, j, k = (int(n) for n in np.ceil((highest - lowest) / spacing) + 1)
         return cls((i, j, k), affine)
 
-    def finer(self, edge: float) -> Grid:
-        """The same box in voxels whose edges are `edge` [mm] at most: itself, if its own are no longer."""
-        parts = np.ceil(self.voxel / edge - 1e-3).astype(np.int64).clip(1)
-        if (parts == 1).all():
+    def with_edges(self, edge: float) -> Grid:
+        """The same box in voxels whose edges are `edge` [mm] at most and more than half of it.
+
+        Larger ones are divided, several smaller ones put together; itself, if its own are such. A voxel at the end may
+        reach beyond the box.
+        """
+        divided = np.ceil(self.voxel / edge - 1e-3).clip(1)
+        joined = np.floor(edge / self.voxel + 1e-3).clip(1)
+        factor = joined / divided
+        if (factor == 1.0).all():
             return self
         affine = self.affine.copy()
-        affine[:3, :3] /= parts
-        affine[:3, 3] = self.positions(0.5 / parts - 0.5)
-        i, j, k = (int(n) for n in np.array(self.shape) * parts)
+        affine[:3, :3] *= factor
+        affine[:3, 3] = self.positions(0.5 * factor - 0.5)
+        i, j, k = (int(n) for n in np.ceil(np.array(self.shape) / factor - 1e-9))
         return Grid((i, j, k), affine)
 
     @property

@@ -25,8 +25,9 @@ from warpbrain.report.state_files import LEFT, SEEN, UNSEEN, SavedState
 
 #: Edges of voxels, and how far they reach beyond the body, where there is no image [mm].
 _SPACING, _MARGIN = 2.0, 40.0
-#: Of a voxel of the transforms [mm]: between the centres of larger ones the inverse is off by more than 0.05 mm.
-_LARGEST_EDGE = 1.0
+#: Of a voxel of the transforms [mm], at most: between the centres of larger ones the inverse is off by more than 0.05
+#: mm, and smaller ones cost memory and time.
+_EDGE = 1.0
 #: Part of the body that may lie outside an image before the image is none of it.
 _INSIDE = 0.5
 #: Names of the transforms: what they do to an image.
@@ -104,7 +105,7 @@ def write_warped(
     check_place(asked, state.mesh, state.path)
     grid = Grid.around(state.mesh, _SPACING, _MARGIN) if source is None else source.grid
     progress("displacement on the grid of the image")
-    fine = grid.finer(_LARGEST_EDGE)
+    fine = grid.with_edges(_EDGE)
     inside = voxels_inside(state.mesh, fine)
     field = displacement_field(inside, state.u, state.middles)
     progress("its inverse")
