@@ -21,7 +21,7 @@ SURFACES = ("surface-before.vtu", "surface-after.vtu")
 _TEXT = '''\
 """Loads a result of warpbrain into 3D Slicer. In its Python console:
 
-    exec(open(r"{path}").read())
+    exec(open("{path}").read())
 """
 
 import os
@@ -36,6 +36,7 @@ LABELS = {labels}
 SURFACES = {surfaces}
 POINTS = {points}
 TRANSFORM = {transform}
+# the largest displacement [mm]
 LARGEST = {largest}
 
 
@@ -79,11 +80,11 @@ def write_slicer_scene(
     afters = [name for name in files if name.endswith("-after.nii.gz") and not name.startswith("transform-")]
     points_after = [name for name in files if name.endswith(("-after.mrk.json", "-after.json", "-after.fcsv"))]
     label_name = None if labels is None else afters[-1]
-    volumes = [] if image is None else [str(image.path.resolve())]
+    volumes = [] if image is None else [image.path.resolve().as_posix()]
     volumes += [name for name in afters if name != label_name]
     script = _TEXT.format(
-        path=(folder / SCRIPT).resolve(),
-        folder=json.dumps(str(folder.resolve())),
+        path=(folder / SCRIPT).resolve().as_posix(),
+        folder=json.dumps(folder.resolve().as_posix()),
         volumes=json.dumps([name for name in volumes if not name.endswith((".mgz", ".mgh"))]),
         labels=json.dumps([*([] if label_name is None else [label_name]), *_known(files, "trust.nii.gz")]),
         surfaces=json.dumps([[SURFACES[0], 0.3], [SURFACES[1], 1.0]]),
