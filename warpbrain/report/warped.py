@@ -30,6 +30,12 @@ _SPACING, _MARGIN = 2.0, 40.0
 _EDGE = 1.0
 #: Part of the body that may lie outside an image before the image is none of it.
 _INSIDE = 0.5
+#: What the values of `trust.nii.gz` mean.
+TRUST = {
+    SEEN: "recordings see a force, and nothing is left",
+    UNSEEN: "recordings see nothing",
+    LEFT: "recordings and the declared case disagree",
+}
 #: Names of the transforms: what they do to an image.
 FORTH, BACK = "transform-before-to-after.nii.gz", "transform-after-to-before.nii.gz"
 
@@ -126,7 +132,7 @@ def write_warped(
     if moved:
         files += write_moved(folder, moved)
     files += write_slicer_scene(folder, state, asked.image, asked.labels, files)
-    return _lines(asked, field, inside, back, moved), files
+    return [*_lines(asked, field, inside, back, moved), *_trust_lines(state)], files
 
 
 def _after(path: Path) -> str:
@@ -173,6 +179,21 @@ def _write_maps(folder: Path, state: SavedState, inside: VoxelsInside) -> list[s
     return files
 
 
+def _trust_lines(state: SavedState) -> list[str]:
+    """Where not to believe a displacement."""
+    lines = []
+    if state.deviation is not None:
+        lines.append(
+            f"sd        standard deviation of the displacement: up to {MILLIMETRES * state.deviation.max():.2g} mm"
+        )
+    if state.trust is not None:
+        volumes = state.mesh.node_volumes
+        shares = {value: volumes[state.trust == value].sum() / volumes.sum() for value in TRUST}
+        said = "; ".join(f"in {100.0 * share:.0f} % of the body {TRUST[value]}" for value, share in shares.items())
+        lines.append(f"trust     {said}")
+    return lines
+
+
 def _lines(
     asked: Asked, field: DisplacementField, inside: VoxelsInside, back: Inverse, moved: list[MovedPoints]
 ) -> list[str]:
@@ -204,11 +225,3 @@ def _lines(
     for image in (asked.image, asked.labels):
         lines += [f"note      {note}" for note in (image.notes if image is not None else ())]
     return lines
-
-
-#: What the values of `trust.nii.gz` mean.
-TRUST = {
-    SEEN: "recordings see a force here, and nothing is left",
-    UNSEEN: "recordings see nothing here",
-    LEFT: "recordings and the declared case disagree here",
-}
