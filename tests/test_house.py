@@ -12,7 +12,19 @@ from warpbrain.physics.mechanisms import mechanisms
 PACKAGE = Path(str(files("warpbrain")))
 #: From the ground up; docs/house.md says what each is for.
 FLOORS = [
-    *("kernels", "mesh", "physics", "recordings", "gp", "cases", "simulation", "ensemble", "inference", "estimation"),
+    *(
+        "kernels",
+        "mesh",
+        "physics",
+        "recordings",
+        "images",
+        "gp",
+        "cases",
+        "simulation",
+        "ensemble",
+        "inference",
+        "estimation",
+    ),
     *("worlds", "diagnosis", "report", "terminal", "bench", "cli"),
 ]
 #: Modules that any floor may use, and that use none.
@@ -26,6 +38,7 @@ NAMED = {
     "cases/case.py": "a case's anatomy is what its resection leaves",
     "simulation/of_case.py": "[[boundary]] kinds of case.toml that mechanisms compute",
     "cases/building/example_sets.py": "name of a node set of a shipped mesh",
+    "cases/building/tissue_names.py": "name of labels of tissue that is taken out",
     "cases/building/pipeline.py": "names of sets of a shipped mesh",
     "report/summary.py": "name of a set of a shipped mesh, in words",
     "report/views.py": "name of a set of a shipped mesh",

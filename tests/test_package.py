@@ -90,6 +90,9 @@ def test_what_is_imported_is_declared():
     for cuda in ("12", "13"):
         assert [line.split(">")[0] for line in extras[f"cuda{cuda}"]] == [f"cupy-cuda{cuda}x[ctk]"]
     imported -= {"cupy", "cupyx"}
+    images = {_plain(re.split(r"[^\w.-]", line)[0]) for line in extras["images"]}
+    assert images == {"nibabel", "simpleitk"}
+    imported -= {"nibabel", "SimpleITK"}
     foreign = imported - set(sys.stdlib_module_names) - {"warpbrain"}
     dependencies = tomllib.loads(project)["project"]["dependencies"]
     declared = {_plain(re.split(r"[^\w.-]", line)[0]) for line in dependencies}

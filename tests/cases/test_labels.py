@@ -16,6 +16,7 @@ from warpbrain.cases.building.label_fields import make_fields
 from warpbrain.cases.building.label_image import LabelImage, read_labels
 from warpbrain.cases.building.label_regions import CAVITY, make_regions
 from warpbrain.cases.building.lattice import bcc_lattice
+from warpbrain.cases.building.presets import preset, preset_names
 from warpbrain.cases.building.tissue_names import Assignment, assign, parse_names
 from warpbrain.errors import InputError
 from warpbrain.mesh import boundary_faces, components, dihedral_angles, pinched_nodes, split_boundary
@@ -99,7 +100,7 @@ def _furlongs(image):
         (SMALL * np.float32(0.75), None, r"found 120 voxels of 336 that are none, such as 1\.5"),
         (np.where(SMALL > 0, np.nan, 0).astype(np.float32), None, "found 120 voxels of 336 that are none, such as nan"),
         (-SMALL.astype(np.int16), None, "expected labels of 0 or more, found -2"),
-        (SMALL.astype(np.complex64), None, "expected whole numbers as labels, found values of type complex64"),
+        (SMALL.astype(np.complex64), None, "expected real or whole numbers, .*, found values of type complex64"),
         (np.stack([SMALL, SMALL], axis=-1), None, "three dimensions, found shape 6 x 7 x 8 x 2"),
         (SMALL[0], None, "three dimensions, found shape 7 x 8"),
         (SMALL, _no_place, r"does not say where its voxels are \(sform and qform code 0\)"),
@@ -139,7 +140,7 @@ def test_other_images_and_too_many_voxels_are_refused(tmp_path, monkeypatch):
     nibabel.save(nibabel.Spm99AnalyzeImage(SMALL, np.eye(4)), tmp_path / "a.img")
     with pytest.raises(InputError, match=r"a\.img: expected a NIfTI file \(.nii, .nii.gz\), found Spm"):
         read_labels(tmp_path / "a.img")
-    monkeypatch.setattr("warpbrain.cases.building.label_image.MOST_VOXELS", 300)
+    monkeypatch.setattr("warpbrain.images.reading.MOST_VOXELS", 300)
     with pytest.raises(InputError, match="6 x 7 x 8 voxels are more than 3e"):
         read_labels(write_labels(tmp_path / "a.nii", SMALL, np.eye(4)))
 
@@ -360,3 +361,48 @@ def test_a_tissue_too_thin_for_the_size_is_named(tmp_path):
         meshed(path, f"{NAMES},7=pea", 0.5)
     with pytest.raises(InputError, match=r"--size 90: too large for 5.. cm3 of tissue"):
         meshed(path, f"{NAMES},7=pea", 90.0)
+
+
+# presets
+
+
+def test_presets_name_labels_as_the_programs_do():
+    for name in preset_names():
+        assert preset(name).names
+    names = preset("freesurfer").names
+    assert (names[3], names[41], names[16], names[4]) == ("grey matter", "white matter", "brain stem", "ventricle")
+    assert (names[1035], names[2004], names[12140], names[24]) == (
+        *("grey matter", "white matter", "grey matter", "ignore"),
+    )
+    assert preset("synthseg").names.items() <= names.items()
+    assert preset("simnibs").names[2] == "grey matter"
+    with pytest.raises(InputError, match="--preset: found 'itk', expected one of freesurfer, synthseg"):
+        preset("itk")
+
+
+def test_labels_of_a_preset_are_each_named_once():
+    """A number in two rows of a table would mean what comes last."""
+    import tomllib
+    from importlib.resources import files
+
+    tables = tomllib.loads((files("warpbrain.cases.building") / "presets.toml").read_text())
+    for name, table in tables.items():
+        numbers = []
+        for tissue, labels in table.items():
+            for label in labels if tissue not in ("source", "unsure") else ():
+                first, _, last = str(label).partition("-")
+                numbers += range(int(first), int(last or first) + 1)
+        assert len(numbers) == len(set(numbers)) == len(preset(name).names), name
+
+
+@pytest.mark.parametrize(("name", "meant"), [("gry", "grey matter"), ("whit", "white matter"), ("lesoin", "lesion")])
+def test_misspelt_tissues_are_asked_about(name, meant):
+    with pytest.raises(InputError, match=f"'{name}': did you mean {meant}"):
+        parse_names([f"2={name}"])
+
+
+def test_other_names_are_taken_as_they_are():
+    given = ["2=gel,3=lesion 2,4=brain stem,5=Grey,6=tumour core"]
+    assert parse_names(given)[2] == "gel"
+    assert parse_names(given)[3] == "lesion 2"
+    assert parse_names(given)[5] == "grey matter"

@@ -14,6 +14,7 @@ from warpbrain.cases.reading import read_case
 from warpbrain.cases.writing import write_case
 from warpbrain.errors import InputError
 from warpbrain.mesh import face_vectors, wall_nodes
+from warpbrain.mesh.vtu import read_vtu
 from warpbrain.physics.directions import element_directions
 from warpbrain.physics.mechanisms.contact import Contact
 from warpbrain.physics.mechanisms.fibres import Fibres
@@ -33,7 +34,7 @@ def with_mechanism(folder: Path, text: str, *changes: tuple[str, str]) -> Path:
 
 def add_arrays(folder: Path, **arrays: np.ndarray) -> None:
     """Put arrays of points or cells into the mesh file of a folder."""
-    raw = meshio.read(folder / "mesh.vtu")
+    raw = read_vtu(folder / "mesh.vtu")
     for name, values in arrays.items():
         if len(values) == COUNT:
             raw.cell_data[name] = [values]

@@ -5,10 +5,11 @@ import tomllib
 import meshio
 import numpy as np
 import pytest
-from segmentations import CENTRE, NAMES, volume_of, write_ellipsoids
+from segmentations import CENTRE, NAMES, ellipsoids, grid_affine, volume_of, write_ellipsoids, write_labels
 from shapes import box
 
 from warpbrain.cases.case_template import MU, OTHER_MU, case_text
+from warpbrain.cases.checking import NOTHING_ACTS, check_case
 from warpbrain.cases.reading import read_case
 from warpbrain.cases.starting import start_from_labels, start_from_mesh, summary
 from warpbrain.errors import InputError
@@ -264,3 +265,53 @@ def test_missing_extra_is_named(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"building meshes needs mmgpy, nibabel, .*warpbrain\[build\]"):
         start_from_labels(tmp_path / "new", tmp_path / "none.nii")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def of_freesurfer(tmp_path_factory):
+    """Labels with FreeSurfer's numbers, a part that was taken out, and what lies outside."""
+    for package in ("mmgpy", "nibabel"):
+        pytest.importorskip(package)
+    place = tmp_path_factory.mktemp("preset")
+    shape = (40, 42, 40)
+    affine = grid_affine((3.0, 3.0, 3.0), shape)
+    labels = np.array([0, 0, 1017, 41, 4], dtype=np.int32)[ellipsoids(affine, shape)]
+    away = np.indices(shape).reshape(3, -1).T @ affine[:3, :3].T + affine[:3, 3] - CENTRE
+    labels[((np.linalg.norm(away - [0.0, 38.0, 30.0], axis=1) < 18.0).reshape(shape)) & (labels > 0)] = 500
+    labels[:3, :3, :3] = 24
+    write_labels(place / "aseg.nii.gz", labels, affine)
+    return start_from_labels(place / "mine", place / "aseg.nii.gz", ["500=resection"], size=14.0, program="freesurfer")
+
+
+def test_a_preset_names_what_there_is(of_freesurfer):
+    assert of_freesurfer.tissues == {41: "white matter", 500: "resection", 1017: "grey matter"}
+    assert of_freesurfer.notes[0] == "outside the mesh: 0.729 cm3, labels 24 (0.729 cm3)"
+
+
+def test_tissue_of_a_resection_label_is_taken_out(of_freesurfer):
+    case = read_case(of_freesurfer.folder)
+    removed = case.mesh.tissue == 500
+    assert removed.any()
+    np.testing.assert_array_equal(case.mesh.element_sets["resection"], removed)
+    assert case.remaining[0].volume == pytest.approx(case.mesh.volumes[~removed].sum())
+
+
+def test_a_new_case_has_the_density_of_brain(of_freesurfer):
+    assert read_case(of_freesurfer.folder).density == 1040.0
+
+
+def test_a_label_that_can_mean_two_things_is_asked_about(tmp_path):
+    pytest.importorskip("mmgpy")
+    labels = np.zeros((40, 40, 40), dtype=np.int16)
+    labels[2:-2, 2:-2, 2:-2] = 4
+    write_labels(tmp_path / "seg.nii.gz", labels, np.diag([3.0, 3.0, 3.0, 1.0]))
+    with pytest.raises(InputError, match=r"seg.nii.gz: label 4: enhancing tumour until 2022.*--tissue 4=NAME"):
+        start_from_labels(tmp_path / "mine", tmp_path / "seg.nii.gz", program="brats")
+    assert not (tmp_path / "mine").exists()
+
+
+def test_a_case_in_which_nothing_acts_says_so(started, of_freesurfer):
+    for case, _ in (started, (of_freesurfer, None)):
+        # a resection alone moves nothing
+        assert read_case(case.folder).nothing_acts
+        assert NOTHING_ACTS in check_case(case.folder).remarks

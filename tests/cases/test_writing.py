@@ -16,6 +16,7 @@ from warpbrain.cases.shipped import SHIPPED, find_case
 from warpbrain.cases.writing import write_case
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
+from warpbrain.mesh.vtu import read_vtu
 
 EVERYTHING = [
     ('axes = "RAS"', 'axes = "LPS"\ngravity_axis = [0.5, 1.0, 0.25]\nregistration = { mm = 2.5, degrees = 0.7 }'),
@@ -51,7 +52,7 @@ def everything(folder: Path) -> Path:
     corners = np.array([[0, 0, 0], [90, 0, 0], [0, 90, 0], [0, 0, 90]]) - 20.0
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     meshio.write(folder / "skull.stl", meshio.Mesh(corners, [("triangle", faces)]), binary=True)
-    raw = meshio.read(folder / "mesh.vtu")
+    raw = read_vtu(folder / "mesh.vtu")
     rows = "".join(f"{number},1,-2\n" for number in range(len(raw.cells[0].data)))
     (folder / "fibres.csv").write_text("x,y,z\n" + rows)
     raw.points[:, :2] *= -1.0

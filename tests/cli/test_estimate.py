@@ -10,6 +10,7 @@ from command import Ran, warpbrain
 from synthetic import GREY, WHITE, beads, block, truth
 
 from warpbrain.cases.writing import write_case
+from warpbrain.report.state_files import read_state
 
 QUICK = ("--samples", "25", "--no-causes")
 
@@ -61,6 +62,8 @@ def test_tables_files_and_figures(folder, tmp_path):
     assert said["versions"]["warpbrain"] and said["seconds"] and said["equilibria"]["check of the posterior"] == 25
     rows = (out / "predictions.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + 60 + 40
+    state = read_state(out)
+    assert 0.0 < state.deviation.max() < np.linalg.norm(state.u, axis=1).max()
     for picture in ("posterior.png", "predicted.png", "residuals.png"):
         assert (out / picture).stat().st_size > 5000
 

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib.image
-import meshio
 import numpy as np
 import pytest
 from command import Ran, run
@@ -15,6 +14,7 @@ from folders import SIDE, block, write_folder
 from warpbrain.cases.shipped import STAND_INS
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh, write_mesh
+from warpbrain.mesh.vtu import read_vtu
 
 FILES = ["deformation.png", "result.vtu", "summary.json"]
 RAN: dict[tuple[str, ...], tuple[Ran, Path]] = {}
@@ -44,7 +44,7 @@ def block_run(folder, tmp_path_factory):
 
 def displacement(out: Path) -> np.ndarray:
     """[mm]"""
-    return meshio.read(out / "result.vtu").point_data["displacement"]
+    return read_vtu(out / "result.vtu").point_data["displacement"]
 
 
 def summary(out: Path) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def test_what_is_printed(block_run, folder):
 
 def test_result_file(block_run):
     _, out = block_run()
-    file = meshio.read(out / "result.vtu")
+    file = read_vtu(out / "result.vtu")
     mesh = block()
     np.testing.assert_allclose(file.points, 1000.0 * mesh.points, atol=1e-12)
     assert [block.type for block in file.cells] == ["tetra"]
@@ -273,7 +273,7 @@ def test_units_and_axes_change_nothing(block_run, tmp_path):
     assert run(case, "--out", tmp_path / "out").status == 0
     static = displacement(block_run()[1])
     np.testing.assert_allclose(displacement(tmp_path / "out"), static, rtol=0, atol=1e-7 * np.abs(static).max())
-    np.testing.assert_allclose(meshio.read(tmp_path / "out" / "result.vtu").points.max(axis=0), 1000.0 * SIDE)
+    np.testing.assert_allclose(read_vtu(tmp_path / "out" / "result.vtu").points.max(axis=0), 1000.0 * SIDE)
 
 
 def test_quiet_prints_nothing(folder, tmp_path, capfd):
@@ -335,7 +335,7 @@ def test_clinical_case(tmp_path):
     assert moved["fixed"]["largest"] == 0.0
     # a brain that sinks by tenths of a millimetre to millimetres, as far as its fluid drained
     assert 0.1 < moved["ventricle"]["mean"] < 20.0
-    file = meshio.read(tmp_path / "result.vtu")
+    file = read_vtu(tmp_path / "result.vtu")
     assert (file.cell_data["J"][0] > 0.0).all()
     # along gravity, to the back
     assert file.point_data["displacement"][:, 1].mean() < -0.1
@@ -364,7 +364,7 @@ def test_error_of_the_mesh(folder, tmp_path, arguments):
     ran = run(folder, "--mesh-error", *arguments, "--out", tmp_path)
     assert (ran.status, ran.err) == (0, "")
     said = summary(tmp_path)["mesh_error"]
-    file = meshio.read(tmp_path / "result.vtu")
+    file = read_vtu(tmp_path / "result.vtu")
     sizes = np.linalg.norm(file.point_data["mesh_error"], axis=1)
     for key, expected in (("median", np.median(sizes)), ("largest", sizes.max())):
         assert said["displacement_mm"][key] == pytest.approx(expected, rel=1e-6)
@@ -381,7 +381,7 @@ def test_error_of_elements_alone(block_run, folder, tmp_path):
     """What `--elements tet4-averaged` changes."""
     plain, averaged = (displacement(block_run(*extra)[1]) for extra in ((), ("--elements", "tet4-averaged")))
     assert run(folder, "--mesh-error", "elements", "--out", tmp_path, "--quiet") == Ran(0, "", "")
-    found = meshio.read(tmp_path / "result.vtu").point_data["mesh_error"]
+    found = read_vtu(tmp_path / "result.vtu").point_data["mesh_error"]
     np.testing.assert_allclose(found, averaged - plain, atol=1e-4 * np.abs(plain).max())
     wrong = run(folder, "--mesh-error", "elements", "--elements", "tet4-averaged", "--out", tmp_path / "none")
     assert wrong.status == 2 and "--mesh-error elements: compares with tet4-averaged" in wrong.err
@@ -397,4 +397,4 @@ def test_a_run_stands_where_the_error_of_its_mesh_is_not_found(folder, tmp_path,
     assert (ran.status, ran.err) == (0, "")
     assert "error of the mesh: not known: on elements tet4-averaged: no equilibrium" in ran.out
     assert summary(tmp_path)["mesh_error"] == {"unknown": "on elements tet4-averaged: no equilibrium"}
-    assert "mesh_error" not in meshio.read(tmp_path / "result.vtu").point_data
+    assert "mesh_error" not in read_vtu(tmp_path / "result.vtu").point_data

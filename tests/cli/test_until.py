@@ -2,17 +2,18 @@
 
 import json
 
-import meshio
 import numpy as np
 import pytest
 from command import run
 from folders import write_folder
 
+from warpbrain.mesh.vtu import read_vtu
+
 FLUID = "drainage:permeability=1e-9,drained=top"
 
 
 def result(out):
-    return meshio.read(out / "result.vtu").point_data
+    return read_vtu(out / "result.vtu").point_data
 
 
 def test_fluid_flows_away_until_the_skeleton_carries_the_load(tmp_path):

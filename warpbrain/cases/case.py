@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.cases.boundary import Boundary
+from warpbrain.cases.boundary import Boundary, Fixed, Sliding
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
@@ -116,6 +116,12 @@ class Case:
         """One sentence for each thing that is assumed to act."""
         said = tuple(boundary.sentence() for boundary in self.boundaries)
         return said + tuple(mechanism.sentence + mechanism.detail() for mechanism in self.mechanisms)
+
+    @property
+    def nothing_acts(self) -> bool:
+        """Whether the body must stay at rest: it is held, and cut perhaps, but nothing moves or loads it."""
+        holding = all(isinstance(boundary, Fixed | Sliding) for boundary in self.boundaries)
+        return holding and all(isinstance(mechanism, Resection) for mechanism in self.mechanisms)
 
     @property
     def resection(self) -> Resection | None:

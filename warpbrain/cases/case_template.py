@@ -7,6 +7,9 @@ from collections.abc import Mapping
 
 #: Shear modulus [Pa] of tissues that are not named, between those of grey and white matter.
 OTHER_MU = 1200.0
+#: Of brain [kg/m3]: ICRU Report 44 (1989), Tissue substitutes in radiation dosimetry and measurement. The
+#: paper's 1211.5 kg/m3, which the shipped cases have, are of its own table.
+DENSITY = 1040.0
 #: Shear moduli [Pa] of the shipped cases, the paper's reference for its multi-tissue phantom.
 MU = {"grey matter": 1370.0, "white matter": 1000.0}
 
@@ -30,7 +33,7 @@ file = "mesh.vtu"
 # (docs/anatomy.md), {other:g} Pa for anything else.
 {tissues}
 [body]
-density = 1211.5               # kg/m3
+density = {density:g}                 # kg/m3, of brain (ICRU Report 44, 1989)
 poisson = 0.45
 
 # What is ASSUMED to act. What is not written here is not assumed.
@@ -54,9 +57,9 @@ kind = "fixed"
 # csf_level = 60.0             # how high the fluid still stands, in mm above the lowest point of the brain
 
 # Tissue that was taken out: the element set `set_resection` of the mesh.
-# [[mechanism]]
-# kind = "resection"
-# elements = "resection"
+{mark}[[mechanism]]
+{mark}kind = "resection"
+{mark}elements = "resection"
 
 # What was observed: landmarks and where they went.
 # [[recording]]
@@ -68,7 +71,7 @@ kind = "fixed"
 """
 
 
-def case_text(name: str, source: str, tissues: Mapping[int, str], cavities: bool) -> str:
+def case_text(name: str, source: str, tissues: Mapping[int, str], cavities: bool, resected: bool = False) -> str:
     """Text of a `case.toml` that can be run as it is.
 
     Parameters
@@ -81,12 +84,16 @@ def case_text(name: str, source: str, tissues: Mapping[int, str], cavities: bool
         Names of the tissues, by number.
     cavities : bool
         Whether the mesh has the node set `ventricle`.
+    resected : bool
+        Whether the mesh has the element set `resection`, which is then taken out.
     """
     return _TEXT.format(
         name=quoted(name),
         source=quoted(source),
         other=OTHER_MU,
+        density=DENSITY,
         tissues="".join(_tissue(number, tissue) for number, tissue in tissues.items()),
+        mark="" if resected else "# ",
         pushed="ventricle" if cavities else "surface",
     )
 

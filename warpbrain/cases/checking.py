@@ -21,6 +21,11 @@ SOFT = (20.0, 100_000.0)
 LARGEST_SHIFT = 0.05
 #: Displacement [m] that nobody would record: a tenth of the best tracking.
 SMALLEST_SHIFT = 1e-5
+#: What a case without loads should be told, before it is run.
+NOTHING_ACTS = (
+    "nothing acts: no [[boundary]] moves, pushes or presses and no [[mechanism]] loads the body, so that a run leaves "
+    "it as it is; --with or case.toml can add what is assumed"
+)
 #: Dihedral angles [degrees] below which elements make a solver slow and stresses wrong.
 SHARP = 5.0
 
@@ -120,6 +125,8 @@ def _nothing_there(case: Case) -> list[str]:
     found = []
     if not case.boundaries and case.specimen is None:
         found.append("no [[boundary]]: nothing holds the body, so it cannot be simulated")
+    if case.nothing_acts and case.specimen is None:
+        found.append(NOTHING_ACTS)
     if not case.recordings:
         found.append("no [[recording]]: there is nothing to compare a simulation with")
     return found

@@ -16,7 +16,8 @@ from warpbrain.cases.building.first_sets import first_sets
 from warpbrain.cases.building.label_image import read_labels
 from warpbrain.cases.building.labels import LabelMesh, mesh_labels
 from warpbrain.cases.building.plausible import check_volume_in, cm3
-from warpbrain.cases.building.tissue_names import OUTSIDE, VENTRICLE, assign, parse_names
+from warpbrain.cases.building.presets import Preset, preset
+from warpbrain.cases.building.tissue_names import OUTSIDE, RESECTION, VENTRICLE, Assignment, assign, parse_names
 from warpbrain.cases.case_template import case_text
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
@@ -70,6 +71,8 @@ def start_from_labels(
     others: str | None = None,
     size: float | None = None,
     progress: Callable[[str], None] = lambda line: None,
+    *,
+    program: str | None = None,
 ) -> StartedCase:
     """Make a case folder from a label volume.
 
@@ -87,6 +90,8 @@ def start_from_labels(
         Wanted mean edge [mm]; by default what gives about 5,000 nodes.
     progress : callable
         Called with one line of text whenever something is begun.
+    program : str, optional
+        Whose labels they are, see `preset`; `names` take precedence, and labels that the volume lacks are no mistake.
 
     Raises
     ------
@@ -97,14 +102,22 @@ def start_from_labels(
     if size is not None and not 0 < size < np.inf:
         raise InputError(f"--size: found {size:g}, expected a positive length [mm]")
     given = parse_names(names)
+    usual = Preset({}, {}) if program is None else preset(program)
     require_extra(("mmgpy", "nibabel", "scipy", "meshio"))
     progress(f"reading {labels}")
     image = read_labels(labels)
-    assignment = assign(image.volumes(), given, others)
+    volumes = image.volumes()
+    for label in sorted(usual.unsure.keys() & volumes.keys() - given.keys()):
+        raise InputError(f"{labels}: label {label}: {usual.unsure[label]}: say which with --tissue {label}=NAME")
+    given = {label: name for label, name in usual.names.items() if label in volumes} | given
+    assignment = assign(volumes, given, others)
     made = mesh_labels(image, assignment, size, progress)
     sets = first_sets(made.points, made.tetrahedra, made.opens)
-    notes = [*image.notes, *made.notes]
-    mesh = ordered(TetMesh(made.points * 1e-3, made.tetrahedra.astype(np.int32), made.tissue.astype(np.int32), sets))
+    notes = [*image.notes, *_left_out(volumes, given, others, assignment), *made.notes]
+    tissue = made.tissue.astype(np.int32)
+    resected = [number for number, name in assignment.tissues.items() if name == RESECTION]
+    taken = {RESECTION: np.isin(tissue, resected)} if resected else {}
+    mesh = ordered(TetMesh(made.points * 1e-3, made.tetrahedra.astype(np.int32), tissue, sets, taken))
     cavity = _cavity_volume(mesh)
     tissues = dict(assignment.tissues)
     notes += _unfaithful(made, mesh, tissues)
@@ -215,9 +228,21 @@ def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path
     name = folder.resolve().name
     with whole_folder(folder) as place:
         write_mesh(place / "mesh.vtu", mesh, unit="mm")
-        text = case_text(name, source.name, tissues, "ventricle" in mesh.node_sets)
+        text = case_text(name, source.name, tissues, "ventricle" in mesh.node_sets, RESECTION in mesh.element_sets)
         (place / "case.toml").write_text(text, encoding="utf-8")
         (place / "recordings").mkdir()
+
+
+def _left_out(
+    volumes: Mapping[int, float], given: Mapping[int, str], others: str | None, assignment: Assignment
+) -> list[str]:
+    """What of the volume is no part of the mesh, label by label."""
+    out = [f"{label} ({volumes[label] / 1000.0:.3g} cm3)" for label in assignment.outside]
+    if not out:
+        return []
+    total = sum(volumes[label] for label in assignment.outside)
+    unnamed = "" if others is None else f"; {len(set(volumes) - set(given))} of them are --others {others}"
+    return [f"outside the mesh: {total / 1000.0:.4g} cm3, labels {', '.join(out)}{unnamed}"]
 
 
 def _unfaithful(made: LabelMesh, mesh: TetMesh, tissues: Mapping[int, str]) -> list[str]:

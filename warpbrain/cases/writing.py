@@ -20,6 +20,7 @@ from warpbrain.cases.parts.mechanisms import in_file
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.mesh import write_mesh
+from warpbrain.mesh.vtu import write_vtu
 from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.recordings.recording import (
@@ -68,7 +69,7 @@ def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
         tables["mesh"] = {"file": name, "tissue": "tissue"}
         turned = {name: frame.directions(vectors) for name, vectors in case.mesh.element_vectors.items()}
         in_axes = replace(case.mesh, points=frame.directions(case.mesh.points), element_vectors=turned)
-        write_mesh(folder / name, in_axes, unit=frame.unit)
+        write_mesh(folder / name, in_axes, unit=frame.unit, axes=frame.axes)
     tables["tissue"] = {str(label): _tissue(tissue) for label, tissue in sorted(case.tissues.items())}
     tables["body"] = {"density": case.density, "poisson": case.poisson}
     if case.boundaries:
@@ -150,7 +151,7 @@ def _surface(folder: Path, surface: ClosedSurface, name: str, frame: Frame) -> s
     file = _new_file(folder, "surfaces", name, ".vtu")
     with whole_file(folder / file) as temporary:
         mesh = meshio.Mesh(frame.file_lengths(surface.points), [("triangle", surface.faces)])
-        meshio.write(temporary, mesh, file_format="vtu", binary=True, compression="zlib")
+        write_vtu(temporary, mesh, frame.axes)
     return file
 
 

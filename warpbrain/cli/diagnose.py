@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from warpbrain.cli import warp
 from warpbrain.terminal.progress import Progress
 
 
@@ -17,7 +18,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="say what physics a case leaves out",
         description="Locates where simulation and recordings differ, names the physics that was left out, models it, "
         "and shows the fit improve on data it was not fitted to. Writes "
-        "report.html, diagnosis.json, map.vtu, points.csv, covariance.npz and explained/.",
+        "report.html, diagnosis.json, map.vtu, state.vtu, points.csv, covariance.npz and explained/.",
     )
     add = parser.add_argument
     add("--case", required=True, metavar="NAME", help="0529, ... (see warpbrain cases), or the path of a case folder")
@@ -39,6 +40,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     )
     add("--homogeneous", action="store_true", help="of a specimen: take its state for homogeneous whatever its grips")
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
+    warp.add_arguments(parser)
     add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-diagnose-CASE)")
     add("--quiet", action="store_true", help="print nothing but errors")
     parser.set_defaults(call=_run)
@@ -69,7 +71,9 @@ def _run(options: argparse.Namespace) -> None:
 
     start_warp_quietly()
     device = find_device(options.device).alias
+    images = warp.asked_for(options)
     case = find_case(options.case, options.tissue)
+    warp.check_place(images, case)
     way = _of_a_body() if case.specimen is None else _of_a_specimen()
     progress = Progress("diagnosis", options.quiet)
 
@@ -96,6 +100,8 @@ def _run(options: argparse.Namespace) -> None:
     # after all that it speaks of: whoever finds it finds the others
     write_summary(out / "diagnosis.json", said)
     write_page(out)
+    if images is not None:
+        written += warp.warp(out / "state.vtu", out, images, say, options.quiet)
     say("", f"written to {out}: report.html, diagnosis.json, {', '.join(written)}", sep="\n")
 
 
@@ -114,9 +120,15 @@ def _of_a_body() -> _Way:
     from warpbrain.report.diagnosis.files import write_map
     from warpbrain.report.diagnosis.points import write_covariance, write_points
     from warpbrain.report.diagnosis.text import diagnosis_lines
+    from warpbrain.report.state_files import write_diagnosed_state
 
     tables: dict[str, Callable[[Path, Any], None]]
-    tables = {"map.vtu": write_map, "points.csv": write_points, "covariance.npz": write_covariance}
+    tables = {
+        "map.vtu": write_map,
+        "state.vtu": write_diagnosed_state,
+        "points.csv": write_points,
+        "covariance.npz": write_covariance,
+    }
     return _Way(Diagnosing, describe_diagnosis, lambda _found, said: diagnosis_lines(said), tables)
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from warpbrain.cli import warp
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from warpbrain.estimation.options import EstimationOptions
     from warpbrain.estimation.posterior import Posterior
     from warpbrain.recordings.registration import Registration
+    from warpbrain.report.warped import Asked
     from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
 #: Nodes up to which it is said unasked what else may act: its cost grows faster than that of an estimate.
@@ -32,7 +34,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "estimate",
         help="estimate tissue from a case's recordings",
         description="Estimates the laws of a case's tissues from its recordings, and says how well they are known. "
-        "Writes estimate.json, predictions and figures, or sweep.csv and its figure.",
+        "Writes estimate.json, state.vtu, predictions and figures, or sweep.csv and its figure.",
     )
     add = parser.add_argument
     add("--case", required=True, metavar="NAME", help="0529, ... (see warpbrain cases), or the path of a case folder")
@@ -74,6 +76,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     add("--samples", type=int, default=40, metavar="N", help="equilibria that check the posterior (default: 40)")
     add("--seed", type=int, default=0, metavar="S", help="of these draws (default: 0)")
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
+    warp.add_arguments(parser)
     add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-estimate-CASE-TISSUE)")
     add("--quiet", action="store_true", help="print nothing but errors")
     parser.set_defaults(call=_run)
@@ -90,9 +93,13 @@ def _run(options: argparse.Namespace) -> None:
 
     start_warp_quietly()
     find_device(options.device)
+    images = warp.asked_for(options)
+    if images is not None and options.method == "grid":
+        raise InputError("--method grid: has no state that --image, --labels and --points could be warped by")
     case = find_case(options.case, options.tissue)
     if case.specimen is not None:
         raise InputError(f"{case.path}: [specimen]: tissue is estimated from a deformed body, not from tests")
+    warp.check_place(images, case)
     if options.model is not None:
         case = case.with_law(options.model)
     if registration is not None:
@@ -104,7 +111,7 @@ def _run(options: argparse.Namespace) -> None:
     if options.method == "grid":
         _sweep(options, case, out, say)
     else:
-        _estimate(options, asked, case, out, say)
+        _estimate(options, asked, case, images, out, say)
 
 
 def _registration(options: argparse.Namespace) -> Registration | None:
@@ -137,7 +144,12 @@ def _options(options: argparse.Namespace) -> EstimationOptions:
 
 
 def _estimate(
-    options: argparse.Namespace, asked: EstimationOptions, case: Case, out: Path, say: Callable[..., None]
+    options: argparse.Namespace,
+    asked: EstimationOptions,
+    case: Case,
+    images: Asked | None,
+    out: Path,
+    say: Callable[..., None],
 ) -> None:
     from warpbrain.estimation.estimate import Estimation, Listener
     from warpbrain.estimation.modes import GaussNewtonStep
@@ -147,6 +159,7 @@ def _estimate(
     from warpbrain.report.estimate_files import write_predictions
     from warpbrain.report.estimate_text import estimate_lines
     from warpbrain.report.files import write_summary
+    from warpbrain.report.state_files import write_estimated_state
     from warpbrain.simulation.system import find_device
 
     progress = Progress("equilibria", options.quiet)
@@ -174,11 +187,15 @@ def _estimate(
         say("", f"what else may act is left out on more than {_LARGEST} nodes; --causes computes it", sep="\n")
     say("", *estimate_lines(posterior, averaged), sep="\n")
     write_predictions(out / "predictions.csv", posterior)
+    write_estimated_state(out / "state.vtu", posterior)
     estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)
     estimate_picture.write_observed_against_predicted(out / "predicted.png", posterior)
     estimate_picture.write_residuals(out / "residuals.png", posterior)
     write_summary(out / "estimate.json", describe_estimate(posterior, find_device(options.device).alias, averaged))
-    say("", f"written to {out}: estimate.json, predictions.csv, posterior.png, predicted.png, residuals.png", sep="\n")
+    files = ["estimate.json", "predictions.csv", "state.vtu", "posterior.png", "predicted.png", "residuals.png"]
+    if images is not None:
+        files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
+    say("", f"written to {out}: {', '.join(files)}", sep="\n")
 
 
 def _averaged(posterior: Posterior, device: str | None, on_stage: Callable[[str], None]) -> AveragedTissue | None:

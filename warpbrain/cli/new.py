@@ -17,7 +17,7 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
     )
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder to make; must not be there, or be empty")
     source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument("--labels", type=Path, metavar="FILE", help="label volume: NIfTI (.nii, .nii.gz) or .mgz")
+    source.add_argument("--labels", type=Path, metavar="FILE", help="label volume: .nii, .nii.gz, .mgz or .nrrd")
     source.add_argument("--mesh", type=Path, metavar="FILE", help="tetrahedral mesh: .vtu, .msh, .inp, ...")
     parser.add_argument(
         "--tissue",
@@ -28,6 +28,11 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
         help="what each label is, such as 2=white,3=grey,4=ventricle; 'ventricle' is an open cavity, 'ignore' outside",
     )
     labels = parser.add_argument_group("with --labels")
+    labels.add_argument(
+        "--preset",
+        metavar="PROGRAM",
+        help="whose labels they are: freesurfer, synthseg, simnibs or brats; --tissue changes what it says of some",
+    )
     labels.add_argument("--others", metavar="NAME", help="what every label is that --tissue does not name")
     labels.add_argument("--size", type=float, metavar="MM", help="mean edge of an element (default: about 5,000 nodes)")
     mesh = parser.add_argument_group("with --mesh")
@@ -42,13 +47,19 @@ def _new(options: argparse.Namespace) -> None:
     from warpbrain.errors import InputError
     from warpbrain.frame import Frame
 
-    foreign = ("units", "axes", "array") if options.labels else ("others", "size")
+    foreign = ("units", "axes", "array") if options.labels else ("others", "size", "preset")
     for name in foreign:
         if getattr(options, name) is not None:
             raise InputError(f"--{name} means nothing with {'--labels' if options.labels else '--mesh'}")
     if options.labels:
         case = start_from_labels(
-            options.folder, options.labels, options.tissue, options.others, options.size, progress=print
+            options.folder,
+            options.labels,
+            options.tissue,
+            options.others,
+            options.size,
+            progress=print,
+            program=options.preset,
         )
     else:
         frame = Frame(options.units or "mm", options.axes or "RAS")

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli import run_slowly
+from warpbrain.cli import run_slowly, warp
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -107,6 +107,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="print also what the paper's own code calls rmse, the root of the mean distance in sqrt(mm)",
     )
     add("--allow-unstable", action="store_true", help="accept a law that breaks the paper's stability conditions")
+    warp.add_arguments(parser)
     add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-CASE-TISSUE)")
     add("--quiet", action="store_true", help="print nothing but errors")
     parser.set_defaults(call=_run)
@@ -129,7 +130,9 @@ def _run(options: argparse.Namespace) -> None:
 
     start_warp_quietly()
     find_device(options.device)
+    asked = warp.asked_for(options)
     case, found = _case(options)
+    warp.check_place(asked, case)
     prior = None if found is None else describe_prior(found)
     if case.specimen is not None:
         from warpbrain.cli import run_specimen
@@ -189,6 +192,8 @@ def _run(options: argparse.Namespace) -> None:
     if observed.comparisons:
         write_comparisons(out / "comparison.csv", case, observed)
         files.append("comparison.csv")
+    if asked is not None:
+        files += warp.warp(out / "result.vtu", out, asked, say, options.quiet)
     say("", f"written to {out}: {', '.join(files)}", sep="\n")
 
 

@@ -26,6 +26,7 @@ from warpbrain.atomic import whole_file
 from warpbrain.frame import METRES
 from warpbrain.mesh.patience import patience
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
+from warpbrain.mesh.vtu import read_vtu, write_vtu
 
 ELEMENT_SET_PREFIX = "set_"
 #: A larger file [bytes] is refused, not read: the largest meshes that are worth a simulation are a tenth of it.
@@ -92,7 +93,7 @@ def read_mesh_file(path: str | os.PathLike[str], unit: str = "m", tissue: str | 
         raise MeshError(f"{source}: found {size / 1e6:.0f} MB, expected a mesh of at most {LARGEST_FILE / 1e6:.0f} MB")
     try:
         with patience(source):
-            raw = meshio.read(source)
+            raw = read_vtu(source) if source.suffix.lower() == ".vtu" else meshio.read(source)
     except SystemExit as error:  # meshio leaves the program on some unreadable files
         raise MeshError(f"{source}: not a mesh that meshio can read") from error
     except Exception as error:  # its readers raise whatever their parsers do
@@ -189,7 +190,7 @@ def _members(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArr
     return sets
 
 
-def write_mesh(path: str | os.PathLike[str], mesh: TetMesh, unit: str = "m") -> None:
+def write_mesh(path: str | os.PathLike[str], mesh: TetMesh, unit: str = "m", axes: str = "RAS") -> None:
     """Write a mesh as compressed binary VTU, whole or not at all.
 
     Parameters
@@ -200,6 +201,8 @@ def write_mesh(path: str | os.PathLike[str], mesh: TetMesh, unit: str = "m") -> 
         What to write.
     unit : {"m", "mm"}
         Unit of the coordinates in the file.
+    axes : {"RAS", "LPS"}
+        What the file says its axes are; coordinates are written as they are.
     """
     import meshio
 
@@ -218,7 +221,7 @@ def write_mesh(path: str | os.PathLike[str], mesh: TetMesh, unit: str = "m") -> 
         },
     )
     with whole_file(target) as scratch:
-        meshio.write(scratch, raw, file_format="vtu", binary=True, compression="zlib")
+        write_vtu(scratch, raw, axes)
 
 
 def _scale(unit: str) -> float:

@@ -103,6 +103,10 @@ class QuadraticMesh:
         """Values at corners (n, ...) at all nodes (N, ...): those of midside nodes are the means of their ends."""
         return np.asarray(values[self.ends].mean(axis=1))
 
+    def at_middles(self, values: Floats) -> Floats:
+        """Values at all nodes (N, c) in the middle of the `EDGES` of each of `corners.tetrahedra`: (m, 6, c)."""
+        return np.asarray(values[self.middles(np.sort(self.corners.tetrahedra[:, EDGES], axis=2))])
+
     def at_corners(self, forces: Floats) -> Floats:
         """Forces (N, 3) as forces on corners (n, 3), half of a midside node's at each end: the same sum and moments."""
         found = np.zeros((len(self.corners.points), forces.shape[1]))

@@ -24,9 +24,10 @@ from warpbrain.recordings.text import lines_of, read_text, shown
 Floats = NDArray[np.float64]
 
 ENDINGS = (".mrk.json", ".json", ".fcsv")
-# names of the axes in new files, numbers in old ones
-_AXES = {"RAS": "RAS", "LPS": "LPS", "0": "RAS", "1": "LPS"}
-_COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
+#: Names of the axes in new files, numbers in old ones.
+AXES_NAMED = {"RAS": "RAS", "LPS": "LPS", "0": "RAS", "1": "LPS"}
+#: Columns of a `.fcsv` that does not name them.
+COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +127,7 @@ def _position(control: dict[str, Any], number: int, path: Path, problems: Proble
 def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
     axes: str | None = None
     named = False
-    columns = _COLUMNS.split(",")
+    columns = COLUMNS.split(",")
     positions: list[list[float]] = []
     labels: list[str] = []
     for row, line in enumerate(lines_of(text), 1):
@@ -138,7 +139,7 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
             elif key.strip() == "columns":
                 columns = [name.strip() for name in value.split(",")]
                 if not {"x", "y", "z", "label"} <= set(columns):
-                    problems.add(path, f"row {row}", f"found columns {shown(value)}, expected {_COLUMNS}")
+                    problems.add(path, f"row {row}", f"found columns {shown(value)}, expected {COLUMNS}")
                     return None
         elif line.strip():
             try:
@@ -168,7 +169,7 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
 
 
 def _axes(value: object, path: Path, place: str, problems: Problems) -> str | None:
-    axes = _AXES.get(str(value).strip())
+    axes = AXES_NAMED.get(str(value).strip())
     if axes is None:
         problems.add(path, place, f"found coordinate system {shown(value)}, expected RAS, LPS, 0 (RAS) or 1 (LPS)")
     return axes

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from warpbrain.frame import AXES
 from warpbrain.mesh.patience import patience
+from warpbrain.mesh.vtu import axes_of_vtu, read_vtu
 from warpbrain.problems import Problems
 from warpbrain.recordings.tables import LARGEST
 from warpbrain.recordings.text import is_readable, shown
@@ -83,7 +84,7 @@ def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh | None:
     try:
         # it prints what it says, and leaves the program where it cannot read
         with redirect_stdout(said), redirect_stderr(said), np.errstate(all="ignore"), patience(path):
-            raw = meshio.read(path)
+            raw = read_vtu(path) if path.suffix.lower() == ".vtu" else meshio.read(path)
     except SystemExit:
         raise ValueError("meshio cannot read it") from None
     foreign = {block.type for block in raw.cells} - {*_WITHOUT_AREA, *_WITH_AREA}
@@ -100,8 +101,10 @@ def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh | None:
     if points.ndim != 2 or points.shape[1] != 3:
         problems.add(path, "", f"found points of shape {points.shape}, expected (n, 3)")
         return None
-    mark = _SPACE.search(head[:2048])
-    return SurfaceMesh(points, faces if len(faces) else None, mark.group(1).decode() if mark else None)
+    axes = axes_of_vtu(path) if path.suffix.lower() == ".vtu" else None
+    if axes is None and (mark := _SPACE.search(head[:2048])):
+        axes = mark.group(1).decode()
+    return SurfaceMesh(points, faces if len(faces) else None, axes)
 
 
 def _checked(raw: SurfaceMesh, path: Path, problems: Problems) -> SurfaceMesh | None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
+from warpbrain.mesh.vtu import write_vtu
 from warpbrain.recordings.reading import DISPLACEMENT, FORCE, NORMAL, POSITION
 from warpbrain.recordings.recording import (
     ForceRecording,
@@ -95,7 +96,7 @@ def _write_mesh(path: Path, recording: SurfaceRecording, frame: Frame) -> None:
         raise InputError(f"{path}: a surface with triangles is written without times and normals; leave them out")
     mesh = meshio.Mesh(frame.file_lengths(recording.points), [("triangle", recording.faces)])
     with whole_file(path) as scratch:
-        meshio.write(scratch, mesh, file_format="vtu", binary=True, compression="zlib")
+        write_vtu(scratch, mesh, frame.axes)
 
 
 def _check_ending(path: Path, ending: str, recording: Recording) -> None:

@@ -86,8 +86,13 @@ class _Scene:
         return tuple(cut(mesh.points, mesh.tetrahedra, nothing, view.axis, place) for view, place in cuts)
 
     @cached_property
+    def names(self) -> dict[int, str]:
+        """Of the tissues, by label."""
+        return {label: tissue.name for label, tissue in self.case.tissues.items()}
+
+    @cached_property
     def colours(self) -> NDArray[np.str_]:
-        return views.element_colours(self.mesh, self.resected)
+        return views.element_colours(self.mesh, self.resected, self.names)
 
     @cached_property
     def boundary(self) -> Ints:

@@ -11,6 +11,7 @@ import numpy as np
 
 from warpbrain.atomic import whole_file
 from warpbrain.ensemble.results import EnsembleResult, Fields, Row
+from warpbrain.mesh.vtu import write_vtu
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 
@@ -92,4 +93,4 @@ def write_fields(path: Path, fields: Fields) -> None:
         MILLIMETRES * mesh.points, [("tetra", mesh.tetrahedra)], point_data=arrays, cell_data={"tissue": [mesh.tissue]}
     )
     with whole_file(path) as scratch:
-        meshio.write(scratch, file, file_format="vtu", binary=True, compression="zlib")
+        write_vtu(scratch, file)

@@ -10,10 +10,13 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.atomic import whole_file
+from warpbrain.mesh.vtu import write_vtu
 from warpbrain.simulation.result import Result
 
 #: Millimetres of one metre: lengths are converted where they leave the program, and nowhere else.
 MILLIMETRES = 1000.0
+#: Cell array of the displacement of midside nodes.
+MIDDLES = "displacement_of_edges"
 
 
 def write_result(path: Path, result: Result, mesh_error: Floats | None = None) -> None:
@@ -21,7 +24,8 @@ def write_result(path: Path, result: Result, mesh_error: Floats | None = None) -
 
     Point arrays: ``displacement`` [mm], ``reaction`` [N], the node sets, ``fluid_pressure`` [Pa] of drainage and, if it
     was estimated, ``mesh_error`` [mm]: what is to be added to the displacement. Cell arrays: ``tissue``, ``J``,
-    ``principal_stretches`` (descending), ``von_mises`` and ``pressure`` [Pa] of the Cauchy stress.
+    ``principal_stretches`` (descending), ``von_mises`` and ``pressure`` [Pa] of the Cauchy stress and, of quadratic
+    elements, ``displacement_of_edges`` [mm]: x, y, z in the middle of the edges 01, 02, 03, 12, 13 and 23 of each cell.
     """
     import meshio
 
@@ -43,10 +47,15 @@ def write_result(path: Path, result: Result, mesh_error: Floats | None = None) -
             "principal_stretches": [result.principal_stretches],
             "von_mises": [result.von_mises],
             "pressure": [result.pressure],
+            **({} if result.u_middles is None else {MIDDLES: [_in_rows(result.u_middles)]}),
         },
     )
     with whole_file(path) as temporary:
-        meshio.write(temporary, file, file_format="vtu", binary=True, compression="zlib")
+        write_vtu(temporary, file)
+
+
+def _in_rows(u_middles: Floats) -> Floats:
+    return MILLIMETRES * u_middles.reshape(len(u_middles), -1)
 
 
 def write_summary(path: Path, summary: dict[str, Any]) -> None:

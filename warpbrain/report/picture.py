@@ -45,7 +45,7 @@ def write_picture(path: Path, result: Result, whole: TetMesh, names: dict[int, s
     before, after = boundary_faces(whole.tetrahedra), boundary_faces(result.mesh.tetrahedra)
     for column, (view, place) in enumerate(zip(views.VIEWS, views.places(whole, resected), strict=True)):
         section = cut(whole.points, whole.tetrahedra, np.zeros(len(whole.points)), view.axis, place)
-        views.draw_tissue(axes[0, column], section, views.element_colours(whole, resected))
+        views.draw_tissue(axes[0, column], section, views.element_colours(whole, resected, names))
         views.draw_outline(axes[0, column], before, whole.points, view, place)
         shown = _draw_after(axes[1, column], result, after, sizes, view, place, top)
         for row in (0, 1):

@@ -9,6 +9,7 @@ from typing import Any
 
 from warpbrain import __version__
 from warpbrain.cases.case import Case
+from warpbrain.cases.checking import NOTHING_ACTS
 from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model, unaware_of_midsides
 from warpbrain.simulation.result import Result
@@ -78,7 +79,7 @@ def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[s
         },
         "assumptions": list(case.assumptions),
         "left_out": left_out(model),
-        "remarks": list(case.remarks),
+        "remarks": [*case.remarks, *([NOTHING_ACTS] if case.nothing_acts else [])],
     }
 
 

@@ -25,6 +25,8 @@ from warpbrain.report.slices import Cut, outline
 
 Ints = NDArray[np.int32]
 
+#: Of tissue in pictures: that of its name; other names have the remaining ones in the order of their numbers.
+COLOUR_OF = {"grey matter": "#b9aea6", "white matter": "#efe8df"}
 TISSUE_COLOURS = ("#b9aea6", "#efe8df", "#d3b8a8", "#c9d3c0", "#c5c3d8", "#d9cfa8")
 RESECTED = "#d9483b"
 TISSUE_EDGE = "#4d4640"
@@ -88,10 +90,18 @@ def heading(mesh: TetMesh, view: View, place: float) -> str:
     return f"{view.name}, {'xyz'[view.axis]} = {place * MILLIMETRES:z.{decimals}f} mm"
 
 
-def element_colours(mesh: TetMesh, resected: Bools) -> NDArray[np.str_]:
-    """Colour of each element: of its tissue, or that of what was resected."""
-    numbers = np.unique(mesh.tissue, return_inverse=True)[1]
-    return np.where(resected, RESECTED, np.array(TISSUE_COLOURS)[numbers % len(TISSUE_COLOURS)])
+def tissue_colours(names: Mapping[int, str], mesh: TetMesh) -> dict[int, str]:
+    """Colour of each label of a mesh, whatever the order of the labels."""
+    known = {label: COLOUR_OF[names[label]] for label in mesh.labels if names.get(label) in COLOUR_OF}
+    left = [colour for colour in TISSUE_COLOURS if colour not in known.values()]
+    others = [label for label in mesh.labels if label not in known]
+    return known | {label: left[i % len(left)] for i, label in enumerate(others)}
+
+
+def element_colours(mesh: TetMesh, resected: Bools, names: Mapping[int, str] | None = None) -> NDArray[np.str_]:
+    """Colour of each element: of its tissue, or that of what was resected; see `tissue_colours`."""
+    colours, numbers = tissue_colours(names or {}, mesh), np.unique(mesh.tissue, return_inverse=True)[1]
+    return np.where(resected, RESECTED, np.array([colours[label] for label in mesh.labels])[numbers])
 
 
 def draw_tissue(axes: Any, section: Cut, colours: NDArray[np.str_], rim: float = 0.4) -> None:
@@ -148,8 +158,7 @@ def tissue_entries(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> 
     from matplotlib.patches import Patch
 
     entries = []
-    for i, label in enumerate(mesh.labels):
-        colour = TISSUE_COLOURS[i % len(TISSUE_COLOURS)]
+    for label, colour in sorted(tissue_colours(names, mesh).items()):
         entries.append((Patch(facecolor=colour, edgecolor=TISSUE_EDGE), names.get(label, str(label))))
     if resected.any():
         entries.append((Patch(facecolor=RESECTED), "resected"))

@@ -64,6 +64,8 @@ class Result:
         elsewhere.
     nodal_pressures : mapping of str to (n,) array
         What mechanisms know at the nodes [Pa]: ``fluid_pressure`` of drainage.
+    u_middles : (m, 6, 3) array or None
+        Displacement [m] of the midside nodes of quadratic elements, in the order of `warpbrain.mesh.quality.EDGES`.
 
     Of quadratic elements displacements are those of the mesh's own nodes, strain and stress those in the middle of
     elements, and half of what holds a midside node is at either end of its edge.
@@ -77,6 +79,7 @@ class Result:
     pressure: Floats
     reactions: Floats
     nodal_pressures: Mapping[str, Floats] = field(default_factory=dict)
+    u_middles: Floats | None = None
 
     def displacement_statistics(self) -> Mapping[str, Statistics]:
         """Statistics of the displacement by node set, and of all nodes under ``"all nodes"``."""
@@ -125,7 +128,9 @@ def result_of(system: System, time: float = math.inf) -> Result:
     pressure = -np.trace(cauchy, axis1=1, axis2=2) / 3.0
     deviator = cauchy + pressure[:, None, None] * np.eye(3)
     u, reactions = state.u, state.reactions
+    u_middles = None
     if system.quadratic is not None:
+        u_middles = system.quadratic.at_middles(u)
         u, reactions = u[: len(system.mesh.points)], system.quadratic.at_corners(reactions)
     return Result(
         mesh=system.mesh,
@@ -136,4 +141,5 @@ def result_of(system: System, time: float = math.inf) -> Result:
         pressure=pressure,
         reactions=reactions,
         nodal_pressures={name: p for term in system.terms for name, p in term.nodal_pressures().items()},
+        u_middles=u_middles,
     )

@@ -1,9 +1,9 @@
 """`points.csv` says again, number by number, what the errors of `diagnosis.json` are made of."""
 
-import meshio
 import numpy as np
 import pytest
 
+from warpbrain.mesh.vtu import read_vtu
 from warpbrain.report.diagnosis.saved import read_saved
 
 
@@ -41,7 +41,7 @@ def test_vectors_are_what_is_left_of_points(saved, small_diagnosis):
 
 
 def test_map_says_where_the_data_are_blind(diagnosed, saved):
-    fields = meshio.read(diagnosed / "map.vtu").point_data
+    fields = read_vtu(diagnosed / "map.vtu").point_data
     above = 1000.0 * saved.summary["map"]["blind_above_n"]
     np.testing.assert_array_equal(fields["blind"] == 1, fields["detectable_force"] > above)
     np.testing.assert_array_equal(fields["significant"] == 1, fields["score"] > saved.summary["map"]["threshold"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 from warpbrain.errors import InputError
 
@@ -15,12 +16,32 @@ OUTSIDE = ("ignore", "background")
 MOST_UNNAMED = 8
 #: Tissues of one mesh.
 MOST_TISSUES = 40
+#: Name of tissue that was or is to be taken out.
+RESECTION = "resection"
 _USUAL = {
     "grey": "grey matter",
     "gray": "grey matter",
     "gray matter": "grey matter",
     "white": "white matter",
 }
+#: Names that the literature or other programs use; one that is nearly one of them was meant for it.
+_KNOWN = (
+    *(
+        "grey matter",
+        "gray matter",
+        "white matter",
+        "grey",
+        "gray",
+        "white",
+        "cerebellum",
+        "brain stem",
+        "brainstem",
+        "thalamus",
+    ),
+    *("hippocampus", "lesion", "tumour", "tumor", "oedema", "edema", RESECTION, "brain"),
+)
+#: From which likeness on a name is taken for a misspelt one.
+_LIKE = 0.75
 _NAME = re.compile(r"[^\W_](?:[\w ().+/-]{0,58}[\w)])?")
 
 
@@ -81,6 +102,11 @@ def usual_name(name: str) -> str:
         )
     if not _NAME.fullmatch(name):
         raise InputError(f"--tissue: '{name}' cannot be the name of a tissue: use letters, digits, spaces and ().+/-")
+    known = (*_KNOWN, *OUTSIDE)
+    # a number after a name, as in 'lesion 2', makes it no other word
+    word = re.sub(r"[\W\d_]+$", "", low)
+    if word not in known and (near := get_close_matches(word, known, 1, _LIKE)):
+        raise InputError(f"--tissue: '{name}': did you mean {_USUAL.get(near[0], near[0])}?")
     return _USUAL.get(low, name)
 
 

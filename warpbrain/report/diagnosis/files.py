@@ -11,6 +11,7 @@ from warpbrain.atomic import whole_file
 from warpbrain.cases.case import Case
 from warpbrain.cases.writing import write_case
 from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.mesh.vtu import write_vtu
 from warpbrain.report.files import MILLIMETRES
 
 
@@ -41,7 +42,7 @@ def write_map(path: Path, found: Diagnosis) -> None:
         cell_data={"tissue": [mesh.tissue]},
     )
     with whole_file(path) as temporary:
-        meshio.write(temporary, file, file_format="vtu", binary=True, compression="zlib")
+        write_vtu(temporary, file)
 
 
 def write_explained(folder: Path, case: Case) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.vtu import read_vtu
 from warpbrain.report.files import MILLIMETRES
 
 #: States of a case in the order in which they are shown, and their names for people.
@@ -175,9 +176,7 @@ def read_saved(folder: Path) -> Saved:
 def _anatomy(path: Path) -> Anatomy | None:
     if not path.is_file():
         return None
-    import meshio
-
-    file = meshio.read(path)
+    file = read_vtu(path)
     mesh = TetMesh(file.points / MILLIMETRES, file.cells[0].data, file.cell_data["tissue"][0], {}, {})
     return Anatomy(mesh, file.point_data)
 

@@ -1,0 +1,221 @@
+"""`warpbrain warp` from the outside: files that other programs open, and what it refuses."""
+
+import csv
+import json
+import runpy
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
+import numpy as np
+import pytest
+from command import run, warpbrain
+from folders import write_folder
+from landmark_files import fcsv, markup
+
+nibabel = pytest.importorskip("nibabel")
+
+POINTS = [("a", [5.0, 8.0, 12.0]), ("b", [20.0, 11.0, 27.0]), ("out", [35.0, 15.0, 15.0])]
+ELECTRODES = "name\tx\ty\tz\tsize\nLA1\t9\t12\t25\t5\nREF\tn/a\tn/a\tn/a\tn/a\n"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A block that was pressed, and images and points of it."""
+    place = tmp_path_factory.mktemp("block")
+    write_folder(place / "case", ("total = [0.01, 0.02, -0.05]", "total = [0.2, 0.3, -0.2]"))
+    affine = np.diag([-1.0, 1.0, 0.8, 1.0])
+    affine[:3, 3] = [40.0, -10.0, -10.0]
+    at = np.indices((51, 51, 64)).reshape(3, -1).T @ affine[:3, :3].T + affine[:3, 3]
+    values = (200 + 100 * np.sin(at / 4.0).prod(axis=1)).reshape(51, 51, 64)
+    nibabel.save(nibabel.Nifti1Image(values.astype(np.int16), affine), place / "T1.nii.gz")
+    inside = ((at > 0) & (at < 30)).all(axis=1) * (1 + (at[:, 0] > 15))
+    nibabel.save(nibabel.MGHImage(inside.reshape(values.shape).astype(np.int32), affine), place / "seg.mgz")
+    (place / "F.mrk.json").write_text(markup(*POINTS, coordinateSystem="RAS"))
+    lps = [(label, (-x, -y, z)) for label, (x, y, z) in POINTS]
+    (place / "G.fcsv").write_text(fcsv(*lps))
+    (place / "sub-1_electrodes.tsv").write_text(ELECTRODES)
+    return place
+
+
+def asked(folder):
+    points = (folder / name for name in ("F.mrk.json", "G.fcsv", "sub-1_electrodes.tsv"))
+    return "--image", folder / "T1.nii.gz", "--labels", folder / "seg.mgz", "--points", *points
+
+
+@pytest.fixture(scope="module")
+def warped(folder) -> Path:
+    done = run(folder / "case", "--elements", "tet10", "--out", folder / "result", *asked(folder))
+    assert done.status == 0, done.err
+    assert "forward after inverse is off by" in done.out
+    assert "F.mrk.json: 3 moved, 1 of them outside the mesh, by up to 5 mm" in done.out
+    return folder / "result"
+
+
+def moved_of(path: Path):
+    with (path / "moved.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    before, after = (
+        np.array([[float(row[f"{p}{axis}_mm"]) for axis in "xyz"] for row in rows]) for p in ("", "moved_")
+    )
+    return rows, before, after
+
+
+def test_run_and_warp_write_the_same(folder, warped, tmp_path):
+    done = warpbrain("warp", warped, "--out", tmp_path / "again", *asked(folder))
+    assert done.status == 0, done.err
+    names = {path.name for path in (tmp_path / "again").iterdir()}
+    for name in ("displacement.nii.gz", "T1-after.nii.gz", "seg-after.nii.gz", "F-after.mrk.json", "G-after.fcsv"):
+        assert name in names
+    for name in names - {"load_in_slicer.py"}:
+        assert (tmp_path / "again" / name).read_bytes() == (warped / name).read_bytes(), name
+
+
+def test_points_of_all_files_move_alike(warped):
+    rows, before, after = moved_of(warped)
+    assert [row["label"] for row in rows] == ["a", "b", "out", "a", "b", "out", "LA1"]
+    np.testing.assert_allclose(before[:3], before[3:6], atol=1e-3)
+    np.testing.assert_allclose(after[:3], after[3:6], atol=1e-3)
+    assert np.linalg.norm(after - before, axis=1).min() > 0.01
+    controls = json.loads((warped / "F-after.mrk.json").read_text())["markups"][0]["controlPoints"]
+    np.testing.assert_allclose([control["position"] for control in controls], after[:3], atol=1e-3)
+    last = (warped / "sub-1_desc-after_electrodes.tsv").read_text().splitlines()
+    np.testing.assert_allclose([float(word) for word in last[1].split("\t")[1:4]], after[6], atol=1e-3)
+    assert last[2] == ELECTRODES.splitlines()[2]
+
+
+def test_simpleitk_agrees(folder, warped, verify):
+    sitk = pytest.importorskip("SimpleITK")
+    forth, back = (
+        sitk.DisplacementFieldTransform(sitk.ReadImage(warped / f"transform-{name}.nii.gz", sitk.sitkVectorFloat64))
+        for name in ("before-to-after", "after-to-before")
+    )
+    _, before, after = moved_of(warped)
+    signs = np.array([-1.0, -1.0, 1.0])
+    moved = np.array([back.TransformPoint((signs * point).tolist()) for point in before]) * signs
+    verify(
+        "landmarks in and beside a body of ten-node tetrahedra, largest error of moved.csv",
+        "SimpleITK with the transform that is written",
+        np.linalg.norm(moved - after, axis=1).max(),
+        0.05,
+        "mm",
+    )
+    image = sitk.ReadImage(folder / "T1.nii.gz", sitk.sitkFloat32)
+    expected = sitk.GetArrayFromImage(sitk.Resample(image, image, forth, sitk.sitkLinear, 0.0))
+    found = nibabel.load(warped / "T1-after.nii.gz")
+    assert found.get_data_dtype() == np.int16
+    np.testing.assert_allclose(found.affine, nibabel.load(folder / "T1.nii.gz").affine)
+    difference = np.abs(np.asarray(found.dataobj).transpose(2, 1, 0) - expected)[2:-2, 2:-2, 2:-2]
+    verify(
+        "warped image of whole numbers, largest difference of grey values of 100 to 300",
+        "SimpleITK's resampling by the transform that is written",
+        difference.max(),
+        # half of it is rounding to whole numbers, the rest of displacements to 1/8192 mm
+        0.52,
+    )
+
+
+def test_every_model_says_its_axes(warped):
+    from mesh_axes import space_of
+
+    for path in warped.glob("*.vtu"):
+        assert space_of(path) == "RAS", path
+
+
+def test_the_scene_loads_what_is_there(folder, warped, monkeypatch):
+    slicer = MagicMock()
+    slicer.util.loadVolume.side_effect = lambda name: Path(name)
+    monkeypatch.setitem(sys.modules, "slicer", slicer)
+    monkeypatch.setitem(sys.modules, "vtk", SimpleNamespace(vtkAssignAttribute=SimpleNamespace(POINT_DATA=0)))
+    runpy.run_path(str(warped / "load_in_slicer.py"))
+    calls = {
+        name: [Path(call.args[0]) for call in getattr(slicer.util, name).call_args_list]
+        for name in ("loadVolume", "loadLabelVolume", "loadModel", "loadMarkups", "loadTransform")
+    }
+    assert [len(paths) for paths in calls.values()] == [2, 1, 2, 2, 1]
+    assert all(path.is_file() for paths in calls.values() for path in paths)
+
+
+def test_an_nrrd_image_gives_the_same(folder, warped, tmp_path):
+    sitk = pytest.importorskip("SimpleITK")
+    sitk.WriteImage(sitk.ReadImage(folder / "T1.nii.gz"), tmp_path / "T1.nrrd")
+    done = warpbrain("warp", warped, "--out", tmp_path, "--image", tmp_path / "T1.nrrd")
+    assert done.status == 0, done.err
+    images = [nibabel.load(place / "T1-after.nii.gz") for place in (tmp_path, warped)]
+    np.testing.assert_allclose(images[0].affine, images[1].affine, atol=1e-5)
+    np.testing.assert_array_equal(*(np.asarray(image.dataobj) for image in images))
+
+
+def test_points_need_no_image(folder, warped, tmp_path):
+    done = warpbrain("warp", warped / "result.vtu", "--out", tmp_path / "out", "--points", folder / "F.mrk.json")
+    assert done.status == 0, done.err
+    _, _, after = moved_of(tmp_path / "out")
+    _, _, expected = moved_of(warped)
+    np.testing.assert_allclose(after[:2], expected[:2], atol=1e-4)
+
+
+def _far(image):
+    image.affine[:3, 3] += 500.0
+    return nibabel.Nifti1Image(np.asarray(image.dataobj), image.affine)
+
+
+def _skew(image):
+    image.affine[0, 1] = 0.3
+    return nibabel.Nifti1Image(np.asarray(image.dataobj), image.affine)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [(_far, "bad.nii.gz: affine: 0 % of the body"), (_skew, "bad.nii.gz: affine: its axes are not at right angles")],
+)
+def test_images_that_cannot_be_of_the_body(folder, warped, tmp_path, change, message):
+    nibabel.save(change(nibabel.load(folder / "T1.nii.gz")), tmp_path / "bad.nii.gz")
+    done = warpbrain("warp", warped, "--image", tmp_path / "bad.nii.gz", "--out", tmp_path / "out")
+    assert done.status == 2
+    assert message in done.err
+    assert not list(tmp_path.glob("out/*"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "expected --image, --labels or --points"),
+        (("--image", "nothing.nii.gz"), "nothing.nii.gz: no such file"),
+        (("--points", "{}/T1.nii.gz"), "T1.nii.gz: found ending '.gz', expected .mrk.json"),
+        (("--image", "{}"), "found a folder, expected a volume: of a DICOM series make one with dcm2niix"),
+        (("--image", "{}/T1.nii.gz", "--labels", "{}/T1.nii.gz"), "T1-after.nii.gz: 2 of the files"),
+    ],
+)
+def test_what_is_refused(folder, warped, tmp_path, arguments, message):
+    given = [word.format(folder) for word in arguments]
+    done = warpbrain("warp", warped, "--out", tmp_path / "out", *given)
+    assert done.status == 2
+    assert message in done.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_result_that_is_none(folder, tmp_path):
+    done = warpbrain("warp", tmp_path, "--image", folder / "T1.nii.gz")
+    assert done.status == 2
+    assert "found none of result.vtu, state.vtu, fields.vtu" in done.err
+    (tmp_path / "result.vtu").write_text("nonsense")
+    done = warpbrain("warp", tmp_path, "--image", folder / "T1.nii.gz")
+    assert done.status == 2
+    assert "result.vtu: no body of tetrahedra that can be read" in done.err
+
+
+def test_a_run_stops_before_it_begins_on_an_image_of_something_else(folder, tmp_path):
+    nibabel.save(_far(nibabel.load(folder / "T1.nii.gz")), tmp_path / "T1.nii")
+    done = run(folder / "case", "--out", tmp_path / "out", "--image", tmp_path / "T1.nii")
+    assert done.status == 2
+    assert "T1.nii: affine: 0 % of the body" in done.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_stops_before_it_begins_on_a_bad_image(folder, tmp_path):
+    (tmp_path / "T1.nii").write_bytes(b"nothing")
+    done = run(folder / "case", "--out", tmp_path / "out", "--image", tmp_path / "T1.nii")
+    assert done.status == 2
+    assert "T1.nii: not a NIfTI file" in done.err
+    assert not (tmp_path / "out").exists()

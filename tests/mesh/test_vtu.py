@@ -1,0 +1,46 @@
+"""VTU files that say their axes as 3D Slicer reads them."""
+
+import meshio
+import numpy as np
+import pytest
+from mesh_axes import space_of
+from shapes import box
+
+from warpbrain.mesh import read_mesh, write_mesh
+from warpbrain.mesh.vtu import axes_of_vtu, read_vtu, write_vtu
+
+
+@pytest.mark.parametrize("axes", ["RAS", "LPS"])
+def test_axes_are_said_and_the_mesh_comes_back(tmp_path, axes):
+    mesh = box((2, 1, 1), (1.0, 0.5, 0.5))
+    write_mesh(tmp_path / "a.vtu", mesh, axes=axes)
+    assert space_of(tmp_path / "a.vtu") == axes
+    assert axes_of_vtu(tmp_path / "a.vtu") == axes
+    np.testing.assert_array_equal(read_mesh(tmp_path / "a.vtu").points, mesh.points)
+
+
+def test_a_file_that_says_nothing(tmp_path):
+    mesh = meshio.Mesh(np.eye(4, 3), [("tetra", np.array([[0, 1, 2, 3]]))])
+    meshio.write(tmp_path / "a.vtu", mesh, file_format="vtu")
+    assert axes_of_vtu(tmp_path / "a.vtu") is None
+    np.testing.assert_array_equal(read_vtu(tmp_path / "a.vtu").points, mesh.points)
+
+
+def test_other_fields_stay(tmp_path):
+    mesh = meshio.Mesh(np.eye(4, 3), [("tetra", np.array([[0, 1, 2, 3]]))])
+    write_vtu(tmp_path / "a.vtu", mesh)
+    number = b'<DataArray type="Float64" Name="TIME" NumberOfTuples="1" format="ascii">2.5</DataArray></FieldData>'
+    (tmp_path / "a.vtu").write_bytes((tmp_path / "a.vtu").read_bytes().replace(b"</FieldData>", number, 1))
+    assert read_vtu(tmp_path / "a.vtu").field_data["TIME"] == pytest.approx(2.5)
+
+
+def test_vtk_reads_them(tmp_path):
+    vtk = pytest.importorskip("vtk")
+    write_mesh(tmp_path / "a.vtu", box((1, 1, 1), (1.0, 1.0, 1.0)))
+    reader = vtk.vtkXMLUnstructuredGridReader()
+    reader.SetFileName(str(tmp_path / "a.vtu"))
+    reader.Update()
+    array = reader.GetOutput().GetFieldData().GetAbstractArray("SPACE")
+    assert isinstance(array, vtk.vtkStringArray)
+    assert array.GetValue(0) == "RAS"
+    assert reader.GetOutput().GetNumberOfPoints() == 8

@@ -1,0 +1,108 @@
+"""`warpbrain warp`: images and points as a result deforms them; and the same options for commands that make results."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from warpbrain.errors import InputError
+
+if TYPE_CHECKING:
+    from warpbrain.cases.case import Case
+    from warpbrain.report.warped import Asked
+
+
+def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "warp",
+        help="warp images and points by a result",
+        description="Writes displacement.nii.gz, transforms for ITK, ANTs and 3D Slicer in both directions, the warped "
+        "image and labels, moved points, displacement_sd.nii.gz and trust.nii.gz where the result knows them, and a "
+        "script that loads all of it in 3D Slicer (see docs/images.md).",
+    )
+    parser.add_argument(
+        "result",
+        type=Path,
+        metavar="RESULT",
+        help="folder that run, estimate, diagnose or ensemble has written, or its .vtu file",
+    )
+    add_arguments(parser)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the files (default: that of the result)")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.set_defaults(call=_run)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what is to be warped, for commands that make a result."""
+    parser.add_argument(
+        "--image", type=Path, metavar="FILE", help="image to warp, on whose grid all is written: .nii.gz, .nrrd, .mgz"
+    )
+    parser.add_argument("--labels", type=Path, metavar="FILE", help="label volume to warp")
+    parser.add_argument(
+        "--points",
+        type=Path,
+        nargs="+",
+        metavar="FILE",
+        default=[],
+        help="points to move: .mrk.json and .fcsv of 3D Slicer, BIDS electrodes.tsv",
+    )
+
+
+def asked_for(options: argparse.Namespace) -> Asked | None:
+    """What is to be warped, read before long work so that what is wrong with it is known then; None if nothing is."""
+    if options.image is None and options.labels is None and not options.points:
+        return None
+    from warpbrain.report.warped import read_asked
+
+    return read_asked(options.image, options.labels, options.points)
+
+
+def check_place(asked: Asked | None, case: Case) -> None:
+    """`InputError` if what is to be warped is not of the case, before anything is computed."""
+    if asked is None:
+        return
+    if case.specimen is not None:
+        raise InputError(f"{case.path}: [specimen]: --image, --labels and --points are of a body, not of tests")
+    from warpbrain.report.warped import check_place
+
+    check_place(asked, case.mesh, case.path)
+
+
+def warp(result: Path, out: Path, asked: Asked, say: Callable[..., None], quiet: bool) -> list[str]:
+    """Warp by a result, say what there is to say; returns the names of the files."""
+    from warpbrain.report.state_files import read_state
+    from warpbrain.report.warped import write_warped
+    from warpbrain.terminal.progress import Progress
+
+    state = read_state(result)
+    progress = Progress("warping", quiet)
+    stages = iter((0.0, 0.3, 0.8))
+    try:
+        lines, files = write_warped(out, state, asked, lambda text: progress.show(next(stages), text))
+    finally:
+        progress.clear()
+    say("", *lines, sep="\n")
+    return files
+
+
+def _run(options: argparse.Namespace) -> None:
+    from warpbrain.atomic import output_folder
+
+    asked = asked_for(options)
+    if asked is None:
+        raise InputError("expected --image, --labels or --points: what is to be warped")
+    say: Callable[..., None] = _silent if options.quiet else print
+    out = options.out or (options.result if options.result.is_dir() else options.result.parent)
+    # nothing is made for a result that is none
+    from warpbrain.report.state_files import read_state
+
+    read_state(options.result)
+    files = warp(options.result, output_folder(out), asked, say, options.quiet)
+    say("", f"written to {out}: {', '.join(files)}", sep="\n")
+
+
+def _silent(*_values: object, **_options: object) -> None:
+    """Stands for `print` where nothing is to be said."""

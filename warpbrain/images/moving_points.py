@@ -1,0 +1,174 @@
+"""Files of points with their points where tissue has carried them."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from warpbrain.arrays import Bools, Floats
+from warpbrain.atomic import whole_file
+from warpbrain.errors import InputError
+from warpbrain.images.displacement import DisplacementField
+from warpbrain.images.grid import MILLIMETRES
+from warpbrain.mesh import TetMesh
+from warpbrain.mesh.quality import EDGES
+from warpbrain.problems import Problems
+from warpbrain.recordings.electrodes import is_electrodes, read_electrodes
+from warpbrain.recordings.location import locate
+from warpbrain.recordings.markups import ENDINGS, is_markup, read_markup
+from warpbrain.recordings.moving_markups import moved_markup
+
+_HEADER = (
+    *("file", "label", "x_mm", "y_mm", "z_mm", "moved_x_mm", "moved_y_mm", "moved_z_mm"),
+    *("displacement_mm", "outside_mm"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class PointFile:
+    """A file of points.
+
+    Attributes
+    ----------
+    path : Path
+    labels : tuple of str
+    points : (n, 3) array
+        Before [mm, RAS].
+    moved_text : callable
+        From positions after (n, 3) [mm, RAS] to the text of the file that has them.
+    remarks : tuple of str
+    """
+
+    path: Path
+    labels: tuple[str, ...]
+    points: Floats
+    moved_text: Callable[[Floats], str]
+    remarks: tuple[str, ...]
+
+    @property
+    def moved_name(self) -> str:
+        """Name of the file with moved points."""
+        name = self.path.name
+        if is_electrodes(self.path):
+            return f"{name[: -len('electrodes.tsv')]}desc-after_{name[-len('electrodes.tsv') :]}"
+        ending = next(ending for ending in ENDINGS if name.lower().endswith(ending))
+        return f"{name[: -len(ending)]}-after{name[-len(ending) :]}"
+
+
+@dataclass(frozen=True, eq=False)
+class MovedPoints:
+    """Points of a file and where they have gone.
+
+    Attributes
+    ----------
+    file : PointFile
+    points : (n, 3) array
+        After [mm, RAS].
+    outside : (n,) array
+        How far outside the mesh they were before [mm].
+    beyond : (n,) bool array
+        Beyond the grid: they are taken not to move.
+    """
+
+    file: PointFile
+    points: Floats
+    outside: Floats
+    beyond: Bools
+
+
+def read_point_file(path: Path) -> PointFile:
+    """Read a 3D Slicer markup (`.mrk.json`, `.fcsv`) or a BIDS `electrodes.tsv`.
+
+    Raises
+    ------
+    InputError
+        Naming the file, what was found and what was expected.
+    """
+    problems = Problems()
+    if is_electrodes(path):
+        electrodes = read_electrodes(path, problems)
+        problems.stop()
+        assert electrodes is not None
+        return PointFile(
+            path,
+            electrodes.names,
+            MILLIMETRES * electrodes.points,
+            lambda points: electrodes.moved_text(points / MILLIMETRES),
+            tuple(problems.remarks),
+        )
+    if not is_markup(path):
+        raise InputError(f"{path}: found ending '{path.suffix}', expected .mrk.json, .fcsv or a BIDS electrodes.tsv")
+    markup = read_markup(path, problems)
+    problems.stop()
+    assert markup is not None
+    text = path.read_text(encoding="utf-8-sig")
+    return PointFile(
+        path,
+        markup.labels,
+        MILLIMETRES * markup.points,
+        lambda points: moved_markup(path, text, points / MILLIMETRES),
+        tuple(problems.remarks),
+    )
+
+
+def move_points(
+    file: PointFile, mesh: TetMesh, u: Floats, middles: Floats | None, field: DisplacementField
+) -> MovedPoints:
+    """Move points along: inside the mesh as its elements do, outside as the field that continues it.
+
+    Parameters
+    ----------
+    file : PointFile
+    mesh : TetMesh
+    u, middles
+        Displacement [m], as of `warpbrain.images.displacement.displacement_field`.
+    field : DisplacementField
+    """
+    points = file.points / MILLIMETRES
+    place = locate(mesh.points, mesh.tetrahedra, points)
+    displacement = MILLIMETRES * place.interpolate(u)
+    if middles is not None:
+        displacement = MILLIMETRES * _quadratic(mesh, place.nodes, place.weights, u, middles)
+    outside = place.distance > 0.0
+    displacement[outside] = field.at(file.points[outside])
+    return MovedPoints(
+        file, file.points + displacement, MILLIMETRES * place.distance, ~field.grid.contains(file.points)
+    )
+
+
+def _quadratic(mesh: TetMesh, nodes: np.ndarray, weights: Floats, u: Floats, middles: Floats) -> Floats:
+    """The quadratic interpolant where points are given by corners and weights."""
+    # the tetrahedron that has these corners, and which of its corners each is
+    order = np.argsort(mesh.tetrahedra, axis=1)
+    rows = {tuple(corners): element for element, corners in enumerate(np.sort(mesh.tetrahedra, axis=1).tolist())}
+    elements = np.array([rows[tuple(sorted(corners))] for corners in nodes.tolist()], dtype=np.int64)
+    w = np.empty_like(weights)
+    np.put_along_axis(w, order[elements], np.take_along_axis(weights, np.argsort(nodes, axis=1), axis=1), axis=1)
+    found = np.einsum("na,nac->nc", w * (2.0 * w - 1.0), u[mesh.tetrahedra[elements]])
+    return np.asarray(found + np.einsum("na,nac->nc", 4.0 * w[:, EDGES].prod(axis=2), middles[elements]))
+
+
+def write_moved(folder: Path, moved: Sequence[MovedPoints]) -> list[str]:
+    """Write each file with its points moved, and all of them in `moved.csv` [mm, RAS]; returns the names."""
+    names = []
+    for points in moved:
+        name = points.file.moved_name
+        text = points.file.moved_text(points.points)
+        with whole_file(folder / name) as scratch:
+            scratch.write_text(text, encoding="utf-8")
+        names.append(name)
+    with whole_file(folder / "moved.csv") as scratch, scratch.open("w", encoding="utf-8", newline="") as stream:
+        rows = csv.writer(stream)
+        rows.writerow(_HEADER)
+        for points in moved:
+            sizes = np.linalg.norm(points.points - points.file.points, axis=1)
+            for label, before, after, size, outside in zip(
+                points.file.labels, points.file.points, points.points, sizes, points.outside, strict=True
+            ):
+                numbers = [f"{value:.4f}" for value in (*before, *after, size, outside)]
+                rows.writerow([points.file.path.name, label, *numbers])
+    return [*names, "moved.csv"]

@@ -1,0 +1,150 @@
+"""Electrodes as BIDS has them: ``*_electrodes.tsv``, and ``*_coordsystem.json`` beside it, which says unit and axes.
+
+https://bids-specification.readthedocs.io/en/stable/modality-specific-files/intracranial-electroencephalography.html
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpbrain.arrays import Floats, Ints
+from warpbrain.problems import Problems
+from warpbrain.recordings.tables import LARGEST
+from warpbrain.recordings.text import lines_of, read_text, shown
+
+ENDING = "electrodes.tsv"
+#: Metres of the units of the specification.
+_METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+#: Coordinate systems of the head or of a screen and not the scanner's: nothing says where they are in an image.
+_ELSEWHERE = ("pixels", "ctf", "elektaneuromag", "4dbti", "kityokogawa", "chietiitab", "captrak", "eeglab", "eeglab-hj")
+_NOTHING = "n/a"
+
+
+@dataclass(frozen=True, eq=False)
+class Electrodes:
+    """Electrodes of a file.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of those that have a position.
+    points : (n, 3) array
+        [m, RAS]
+    header : list of str
+        Columns.
+    cells : list of rows
+        All rows as text.
+    rows : (n,) int array
+        Which rows have a position.
+    metres : float
+        Of one unit of the file.
+    """
+
+    names: tuple[str, ...]
+    points: Floats
+    header: list[str]
+    cells: list[list[str]]
+    rows: Ints
+    metres: float
+
+    def moved_text(self, points: ArrayLike) -> str:
+        """The file with the electrodes at other places (n, 3) [m, RAS], everything else as it was."""
+        cells = [list(row) for row in self.cells]
+        for row, position in zip(self.rows, np.asarray(points, dtype=np.float64) / self.metres, strict=True):
+            for name, value in zip("xyz", position, strict=True):
+                cells[row][self.header.index(name)] = f"{value:.9g}"
+        return "".join("\t".join(row) + "\n" for row in (self.header, *cells))
+
+
+def is_electrodes(path: Path) -> bool:
+    """Whether the name is that of a BIDS file of electrodes."""
+    return path.name.lower().endswith(ENDING)
+
+
+def read_electrodes(path: Path, problems: Problems) -> Electrodes | None:
+    """Read electrodes; None if there were problems.
+
+    Positions are taken for scanner coordinates (RAS), as `iEEGCoordinateSystem` ACPC, ScanRAS, a template's or Other
+    are; without a ``coordsystem.json`` they are in mm, which is remarked.
+    """
+    text = read_text(path, problems)
+    if text is None:
+        return None
+    before = len(problems.found)
+    header, *cells = [line.split("\t") for line in lines_of(text) if line.strip()]
+    for name in ("name", "x", "y", "z"):
+        if name not in header:
+            problems.add(path, "header", f"found no column '{name}', found {', '.join(header)[:100]}")
+    if len(problems.found) > before:
+        return None
+    names, points, rows = [], [], []
+    for number, row in enumerate(cells):
+        if len(row) != len(header):
+            problems.add(path, f"row {number + 2}", f"found {len(row)} fields, expected {len(header)}")
+            continue
+        words = [row[header.index(axis)].strip() for axis in "xyz"]
+        if all(word.lower() == _NOTHING for word in words):
+            continue
+        values = [_number(word) for word in words]
+        if not all(abs(value) <= LARGEST for value in values):
+            problems.add(path, f"row {number + 2}", f"found position {shown(' '.join(words))}, expected finite numbers")
+            continue
+        names.append(row[header.index("name")].strip())
+        points.append(values)
+        rows.append(number)
+    if not points and len(problems.found) == before:
+        problems.add(path, "", "found no electrode with a position")
+    metres = _unit(path, problems)
+    if metres is None or len(problems.found) > before:
+        return None
+    return Electrodes(tuple(names), metres * np.array(points), header, cells, np.array(rows), metres)
+
+
+def _number(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        return math.nan
+
+
+def _unit(path: Path, problems: Problems) -> float | None:
+    """Metres of one unit of a file, None if its coordinate system cannot be used."""
+    side = _coordinate_file(path)
+    if side is None:
+        problems.remark(path, "no coordsystem.json beside it: positions are taken for mm in scanner coordinates (RAS)")
+        return _METRES["mm"]
+    try:
+        content: Any = json.loads(side.read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError) as error:
+        problems.add(side, "", f"found no valid JSON ({error})")
+        return None
+    if not isinstance(content, dict):
+        problems.add(side, "", "found no object, expected that of a BIDS coordsystem.json")
+        return None
+    kind = next((kind for kind in ("iEEG", "EEG", "MEG", "NIRS") if f"{kind}CoordinateSystem" in content), "iEEG")
+    system, unit = (content.get(f"{kind}Coordinate{what}") for what in ("System", "Units"))
+    if str(system).lower() in _ELSEWHERE:
+        cure = "give positions in scanner coordinates (ScanRAS or ACPC) of the image"
+        problems.add(side, f"{kind}CoordinateSystem", f"found {shown(system)}, expected one of an image", cure)
+    if unit not in _METRES:
+        problems.add(side, f"{kind}CoordinateUnits", f"found {shown(unit)}, expected one of {', '.join(_METRES)}")
+        return None
+    return _METRES[str(unit)]
+
+
+def _coordinate_file(path: Path) -> Path | None:
+    """The `coordsystem.json` with most of the entities of the file of electrodes, and no other."""
+    mine = set(path.name.lower().removesuffix(ENDING).strip("_").split("_"))
+    found = []
+    for side in path.parent.glob("*coordsystem.json"):
+        its = set(side.name.lower().removesuffix("coordsystem.json").strip("_").split("_")) - {""}
+        if its <= mine:
+            found.append((len(its), side))
+    return max(found)[1] if found else None

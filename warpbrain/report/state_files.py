@@ -1,0 +1,158 @@
+"""Deformed bodies in the folders of results, opened again: what images are warped by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpbrain.arrays import Floats, Ints
+from warpbrain.atomic import whole_file
+from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.errors import InputError
+from warpbrain.estimation.posterior import Posterior
+from warpbrain.mesh import TetMesh
+from warpbrain.mesh.vtu import read_vtu, write_vtu
+from warpbrain.report.files import MIDDLES, MILLIMETRES
+
+#: Files that hold a deformed body, in the order in which they are looked for: of `run`, of `estimate` and `diagnose`,
+#: and of `ensemble`.
+FILES = ("result.vtu", "state.vtu", "fields.vtu")
+#: What is known of a place, as `trust` says it.
+OUTSIDE, SEEN, UNSEEN, LEFT = 0, 1, 2, 3
+
+
+@dataclass(frozen=True, eq=False)
+class SavedState:
+    """A deformed body.
+
+    Attributes
+    ----------
+    path : Path
+    mesh : TetMesh
+        At rest, without sets.
+    u : (n, 3) array
+        Displacement [m]; of an ensemble its mean.
+    middles : (m, 6, 3) array or None
+        Displacement of the midside nodes of quadratic elements [m].
+    deviation : (n,) array or None
+        Standard deviation of the displacement [m]: the root of the summed variances of its components.
+    trust : (n,) int array or None
+        `SEEN`, `UNSEEN` where recordings see no force, `LEFT` where they and the declared case disagree.
+    """
+
+    path: Path
+    mesh: TetMesh
+    u: Floats
+    middles: Floats | None
+    deviation: Floats | None
+    trust: Ints | None
+
+
+def read_state(result: Path) -> SavedState:
+    """Open the deformed body of a result.
+
+    Parameters
+    ----------
+    result : Path
+        A folder that `warpbrain run`, `estimate`, `diagnose` or `ensemble` has written, or a file of `FILES`.
+
+    Raises
+    ------
+    InputError
+        Naming the file, what was found and what was expected.
+    """
+    path = result
+    if result.is_dir():
+        known = [result / name for name in FILES if (result / name).is_file()]
+        if not known:
+            raise InputError(f"{result}: found none of {', '.join(FILES)}: it is no folder of a result with a body")
+        path = known[0]
+    elif not result.is_file():
+        raise InputError(f"{result}: no such file or folder")
+    try:
+        file = read_vtu(path)
+        cells = file.cells[0].data
+        at = {name: np.asarray(values, dtype=np.float64) for name, values in file.point_data.items()}
+        of_cells = {name: values[0] for name, values in file.cell_data.items()}
+        mesh = TetMesh(file.points / MILLIMETRES, cells, of_cells["tissue"])
+    except (Exception, SystemExit) as error:  # whatever its parsers raise; meshio leaves the program on some files
+        detail = " ".join(str(error).split())[:200] or type(error).__name__
+        raise InputError(f"{path}: no body of tetrahedra that can be read ({detail})") from None
+    u = at.get("displacement", at.get("displacement_mean"))
+    if u is None or u.shape != mesh.points.shape or not np.isfinite(u).all():
+        raise InputError(f"{path}: displacement: expected a finite vector at each of {len(mesh.points)} nodes")
+    middles = None
+    if MIDDLES in of_cells:
+        middles = np.asarray(of_cells[MIDDLES], dtype=np.float64)
+        if middles.shape != (len(cells), 18) or not np.isfinite(middles).all():
+            raise InputError(f"{path}: {MIDDLES}: expected 18 finite numbers for each of {len(cells)} tetrahedra")
+        middles = middles.reshape(-1, 6, 3) / MILLIMETRES
+    return SavedState(path, mesh, u / MILLIMETRES, middles, _deviation(at), _trust(at))
+
+
+def _deviation(at: Mapping[str, Floats]) -> Floats | None:
+    if "displacement_sd" not in at:
+        return None
+    values = at["displacement_sd"]
+    return np.asarray(np.linalg.norm(values.reshape(len(values), -1), axis=1) / MILLIMETRES)
+
+
+def _trust(at: Mapping[str, Floats]) -> Ints | None:
+    if not {"blind", "significant"} <= at.keys():
+        return None
+    seen = np.where(at["blind"] > 0.0, UNSEEN, SEEN)
+    return np.where(at["significant"] > 0.0, LEFT, seen)
+
+
+def write_estimated_state(path: Path, posterior: Posterior) -> None:
+    """Write the most probable state of an estimate as VTU with coordinates in mm.
+
+    Point arrays: ``displacement`` [mm] and ``displacement_sd`` of its components [mm]: what is not known of the tissue,
+    to first order about that state.
+    """
+    du, covariance = posterior.best.linearised.du, posterior.covariance
+    variance = np.einsum("pnk,pq,qnk->nk", du, covariance, du)
+    _write(
+        path,
+        posterior.case.remaining[0],
+        {
+            "displacement": MILLIMETRES * posterior.best.point.state.u,
+            "displacement_sd": MILLIMETRES * np.sqrt(np.maximum(variance, 0.0)),
+        },
+    )
+
+
+def write_diagnosed_state(path: Path, found: Diagnosis) -> None:
+    """Write the last state of a diagnosis, with all that is named, as VTU with coordinates in mm.
+
+    Point arrays: ``displacement`` [mm], ``significant`` and ``blind`` as in `map.vtu`.
+    """
+    from scipy.spatial import cKDTree
+
+    where, refit = found.map, found.best.refit
+    state = found.base.at if refit is None else refit.state
+    mesh = state.system.model.mesh
+    nearest = cKDTree(where.sites).query(mesh.points)[1]
+    _write(
+        path,
+        mesh,
+        {
+            "displacement": MILLIMETRES * state.u,
+            "significant": (where.scores[nearest] > where.threshold).astype(np.uint8),
+            "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
+        },
+    )
+
+
+def _write(path: Path, mesh: TetMesh, arrays: dict[str, Any]) -> None:
+    import meshio
+
+    file = meshio.Mesh(
+        MILLIMETRES * mesh.points, [("tetra", mesh.tetrahedra)], point_data=arrays, cell_data={"tissue": [mesh.tissue]}
+    )
+    with whole_file(path) as scratch:
+        write_vtu(scratch, file)

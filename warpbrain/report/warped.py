@@ -1,0 +1,227 @@
+"""A result as other programs open it: displacement, transforms, warped images, moved points, a scene for Slicer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from warpbrain.errors import InputError
+from warpbrain.images.continuation import LENGTH
+from warpbrain.images.displacement import DisplacementField, Inverse, displacement_field, inverse
+from warpbrain.images.grid import Grid
+from warpbrain.images.inside import VoxelsInside, voxels_inside
+from warpbrain.images.labels import labels_of
+from warpbrain.images.moving_points import MovedPoints, PointFile, move_points, read_point_file, write_moved
+from warpbrain.images.reading import Image, read_image, require
+from warpbrain.images.resampling import resampled
+from warpbrain.images.writing import write_displacement, write_transform, write_volume
+from warpbrain.mesh import TetMesh
+from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.slicer import write_slicer_scene
+from warpbrain.report.state_files import LEFT, SEEN, UNSEEN, SavedState
+
+#: Edges of voxels, and how far they reach beyond the body, where there is no image [mm].
+_SPACING, _MARGIN = 2.0, 40.0
+#: Of a voxel of the transforms [mm], at most: between the centres of larger ones the inverse is off by more than 0.05
+#: mm, and smaller ones cost memory and time.
+_EDGE = 1.0
+#: Part of the body that may lie outside an image before the image is none of it.
+_INSIDE = 0.5
+#: What the values of `trust.nii.gz` mean.
+TRUST = {
+    SEEN: "recordings see a force, and nothing is left",
+    UNSEEN: "recordings see nothing",
+    LEFT: "recordings and the declared case disagree",
+}
+#: Names of the transforms: what they do to an image.
+FORTH, BACK = "transform-before-to-after.nii.gz", "transform-after-to-before.nii.gz"
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What is to be warped, read and checked before anything is computed.
+
+    Attributes
+    ----------
+    image, labels : Image or None
+    points : tuple of PointFile
+    """
+
+    image: Image | None
+    labels: Image | None
+    points: tuple[PointFile, ...]
+
+    @property
+    def grid_of(self) -> Image | None:
+        """The image whose grid is that of the files."""
+        return self.labels if self.image is None else self.image
+
+
+def read_asked(image: Path | None, labels: Path | None, points: Sequence[Path]) -> Asked:
+    """Read what is to be warped.
+
+    Raises
+    ------
+    InputError
+        Naming the file, what was found and what was expected.
+    """
+    require("nibabel", "nibabel", "writing of images")
+    asked = Asked(
+        None if image is None else read_image(image),
+        None if labels is None else read_image(labels),
+        tuple(read_point_file(path) for path in points),
+    )
+    if asked.labels is not None:
+        labels_of(asked.labels)
+    if asked.image is not None and asked.image.values.dtype.kind not in "iufb":
+        raise InputError(f"{asked.image.path}: expected real numbers, found values of type {asked.image.values.dtype}")
+    if asked.grid_of is not None and asked.grid_of.grid.is_skew:
+        raise InputError(
+            f"{asked.grid_of.path}: affine: its axes are not at right angles, which no ITK transform can have: "
+            "resample the image first"
+        )
+    names = [_after(each.path) for each in (asked.image, asked.labels) if each is not None]
+    names += [file.moved_name for file in asked.points]
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        raise InputError(f"{name}: {names.count(name)} of the files given would be written as it: rename one")
+    return asked
+
+
+def write_warped(
+    folder: Path, state: SavedState, asked: Asked, progress: Callable[[str], None] = lambda line: None
+) -> tuple[list[str], list[str]]:
+    """Write everything that a state and what is asked for give.
+
+    Returns
+    -------
+    lines : list of str
+        What a user should read.
+    files : list of str
+        Names of the files.
+
+    Raises
+    ------
+    InputError
+        If the image is not of the body.
+    """
+    source = asked.grid_of
+    check_place(asked, state.mesh, state.path)
+    grid = Grid.around(state.mesh, _SPACING, _MARGIN) if source is None else source.grid
+    progress("displacement on the grid of the image")
+    fine = grid.with_edges(_EDGE)
+    inside = voxels_inside(state.mesh, fine)
+    field = displacement_field(inside, state.u, state.middles)
+    progress("its inverse")
+    back = inverse(field, inside.mask)
+    progress("files")
+    write_displacement(folder / "displacement.nii.gz", field.on(grid))
+    write_transform(folder / FORTH, back.field)
+    write_transform(folder / BACK, field)
+    files = ["displacement.nii.gz", FORTH, BACK]
+    onto = back.field.on(grid)
+    for image, nearest in ((asked.image, False), (asked.labels, True)):
+        if image is not None:
+            name = _after(image.path)
+            write_volume(folder / name, resampled(image.values, image.grid, onto, nearest=nearest), grid)
+            files.append(name)
+    files += _write_maps(folder, state, inside if fine is grid else voxels_inside(state.mesh, grid))
+    moved = [move_points(file, state.mesh, state.u, state.middles, field) for file in asked.points]
+    if moved:
+        files += write_moved(folder, moved)
+    files += write_slicer_scene(folder, state, asked.image, asked.labels, files)
+    return [*_lines(asked, field, inside, back, moved), *_trust_lines(state)], files
+
+
+def _after(path: Path) -> str:
+    stem = path.name
+    for ending in (".gz", ".nii", ".mgz", ".mgh", ".nrrd", ".nhdr", ".mha", ".mhd", ".img", ".hdr"):
+        if stem.lower().endswith(ending):
+            stem = stem[: -len(ending)]
+    return f"{stem}-after.nii.gz"
+
+
+def check_place(asked: Asked, mesh: TetMesh, path: Path) -> None:
+    """`InputError` if most of a body is outside of the image: in another place, unit or orientation."""
+    image = asked.grid_of
+    if image is None:
+        return
+    points = MILLIMETRES * mesh.points
+    share = float(np.mean(image.grid.contains(points)))
+    if share < _INSIDE:
+        corners = image.grid.positions(np.array([[0, 0, 0], np.array(image.grid.shape) - 1]))
+        raise InputError(
+            f"{image.path}: affine: {100 * share:.0f} % of the body of {path} are in it: it spans "
+            f"{_span(np.sort(corners, axis=0))}, the body {_span(np.array([points.min(axis=0), points.max(axis=0)]))} "
+            "mm RAS: is it the image that the mesh was made from?"
+        )
+
+
+def _span(ends: np.ndarray) -> str:
+    return " x ".join(f"{low:.0f} to {high:.0f}" for low, high in ends.T)
+
+
+def _write_maps(folder: Path, state: SavedState, inside: VoxelsInside) -> list[str]:
+    """`displacement_sd.nii.gz` and `trust.nii.gz`, where the result knows them."""
+    files = []
+    if state.deviation is not None:
+        deviation = MILLIMETRES * inside.interpolate(state.deviation[:, None])[:, 0]
+        write_volume(folder / "displacement_sd.nii.gz", inside.image(deviation), inside.grid)
+        files.append("displacement_sd.nii.gz")
+    if state.trust is not None:
+        nearest = np.take_along_axis(
+            state.mesh.tetrahedra[inside.elements], inside.weights.argmax(axis=1)[:, None], axis=1
+        )[:, 0]
+        write_volume(folder / "trust.nii.gz", inside.image(state.trust[nearest]).astype(np.uint8), inside.grid)
+        files.append("trust.nii.gz")
+    return files
+
+
+def _trust_lines(state: SavedState) -> list[str]:
+    """Where not to believe a displacement."""
+    lines = []
+    if state.deviation is not None:
+        lines.append(
+            f"sd        standard deviation of the displacement: up to {MILLIMETRES * state.deviation.max():.2g} mm"
+        )
+    if state.trust is not None:
+        volumes = state.mesh.node_volumes
+        shares = {value: volumes[state.trust == value].sum() / volumes.sum() for value in TRUST}
+        said = "; ".join(f"in {100.0 * share:.0f} % of the body {TRUST[value]}" for value, share in shares.items())
+        lines.append(f"trust     {said}")
+    return lines
+
+
+def _lines(
+    asked: Asked, field: DisplacementField, inside: VoxelsInside, back: Inverse, moved: list[MovedPoints]
+) -> list[str]:
+    sizes = np.linalg.norm(field.vectors[inside.mask], axis=1)
+    shape = " x ".join(str(n) for n in field.grid.shape)
+    edges = " x ".join(f"{edge:.3g}" for edge in field.grid.voxel)
+    lines = [
+        f"warped    {shape} voxels of {edges} mm; displacement in the body up to {sizes.max(initial=0.0):.3g} mm, "
+        f"continued outside, where it falls to 1/e in {LENGTH:g} mm",
+        f"inverse   forward after inverse is off by {back.error_99:.2g} mm at the 99th percentile in tissue, at most "
+        f"{back.error_largest:.2g} mm"
+        + (
+            f"; at {back.unsolved} voxels it did not converge, where the map folds or nearly so"
+            if back.unsolved
+            else ""
+        ),
+    ]
+    for points in moved:
+        count = len(points.points)
+        out = np.count_nonzero(points.outside > 0.0)
+        line = f"points    {points.file.path.name}: {count} moved"
+        if out:
+            line += f", {out} of them outside the mesh, by up to {points.outside.max():.3g} mm"
+        if points.beyond.any():
+            line += (
+                f", {np.count_nonzero(points.beyond)} beyond the image, which stay where they are if outside the mesh"
+            )
+        lines += [line, *(f"note      {remark}" for remark in points.file.remarks)]
+    for image in (asked.image, asked.labels):
+        lines += [f"note      {note}" for note in (image.notes if image is not None else ())]
+    return lines
