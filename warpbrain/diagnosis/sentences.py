@@ -76,10 +76,13 @@ def _not_physics(diagnosis: Diagnosis) -> str:
 
 def _cannot_say(diagnosis: Diagnosis) -> str:
     likely = [
-        ranked for ranked in diagnosis.ranking if ranked.physics and ranked.probability > belief("checks.perhaps")
+        ranked
+        for ranked in diagnosis.ranking
+        if ranked.kind != UNKNOWN and ranked.probability > belief("checks.perhaps")
     ][:2]
     perhaps = f" Perhaps: {'; or '.join(_clause(ranked.kind) for ranked in likely)}." if likely else ""
-    return f"Something is missing ({_chance(diagnosis)}), but these data cannot say what.{perhaps}"
+    missing = "Something is missing" if all(ranked.physics for ranked in likely) else "Something is wrong or missing"
+    return f"{missing} ({_chance(diagnosis)}), but these data cannot say what.{perhaps}"
 
 
 _SENTENCES: dict[str, Callable[[Diagnosis], str]] = {

@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
+from warpbrain.inference.decide import NOTHING
 from warpbrain.inference.probability import percent
 from warpbrain.report.diagnosis.saved import STATES
 from warpbrain.report.files import MILLIMETRES
@@ -35,6 +36,10 @@ def diagnosis_lines(summary: Mapping[str, Any]) -> list[str]:
         lines += ["", "  not tried:"]
         lines += [f"    {one['mechanism']}: {one['rejected_because']}" for one in rejected]
     lines += ["", *_fit_lines(summary["fit"])]
+    if summary["verdict"] != NOTHING and summary["smallest_detectable"]:
+        shown = "; ".join(f"{kind} {one['says']}" for kind, one in summary["smallest_detectable"].items())
+        shown = f"What these data would have shown: {shown}."
+        lines += ["", *textwrap.wrap(shown, _WIDTH, initial_indent="  ", subsequent_indent="    ")]
     if summary["next_measurement"]:
         lines += ["", "  what to measure next (expected log Bayes factor between the two most probable mechanisms):"]
         lines += [f"    {one['expected_nats']:8.1f}  {one['what']}" for one in summary["next_measurement"][:5]]
