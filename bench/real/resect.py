@@ -27,6 +27,7 @@ from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.estimation.registration import moved_back, registration_of
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.recording import PointsRecording
+from warpbrain.worlds.body.effects import width_of
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
 Floats = NDArray[np.float64]
@@ -67,9 +68,10 @@ def rigid_of(found: Diagnosis, best: WeightedSet, points: Floats) -> Floats:
     deviations = registration_of(found.case).deviations
     rest = (best.coordinates[part] - base.states.motion_coordinates) * deviations
     if "registration" in best.names:
-        at = nuisances.columns.shape[1]
+        # columns of what is no mechanism stand between those of nuisances and effects
+        linear = slice(nuisances.columns.shape[1], best.columns.shape[1] - width_of(best.effects))
         rows = base.at.sensors.is_displacement
-        wrong = best.linear_columns[rows] @ best.coordinates[at : at + best.linear_columns.shape[1]]
+        wrong = best.columns[rows, linear] @ best.coordinates[linear]
         rest = rest + np.linalg.lstsq(base.at.sensors.rigid[rows], wrong, rcond=None)[0]
     # the inverse of what takes a recording back, about the centre of what was recorded
     there = Rotation.from_rotvec(motion[3:]).apply(points - centre) + centre + motion[:3]

@@ -99,7 +99,7 @@ _SENTENCES: dict[str, Callable[[Diagnosis], str]] = {
 def effect_sentence(ranked: Ranked, gravity_axis: tuple[float, float, float] | None = None) -> str:
     """What a mechanism is, how large it was found to be, and where."""
     sizes = "; ".join(size_in_words(ranked.kind, ranked.values, gravity_axis))
-    parts = [_sentence_of_kind(ranked.kind).rstrip(".")]
+    parts = [sentence_of_kind(ranked.kind).rstrip(".")]
     if sizes:
         parts.append(f": {sizes}")
     return f"{''.join(parts)}.{_where(ranked)}"
@@ -118,7 +118,8 @@ def confusion_sentences(confusion: Confusion) -> tuple[str, ...]:
     )
 
 
-def _sentence_of_kind(kind: str) -> str:
+def sentence_of_kind(kind: str) -> str:
+    """What a kind of cause is, in words."""
     registry = mechanisms()
     if kind in registry:
         return registry[kind].sentence
@@ -127,7 +128,7 @@ def _sentence_of_kind(kind: str) -> str:
 
 def _clause(kind: str) -> str:
     """The sentence of a kind as a clause."""
-    sentence = _sentence_of_kind(kind)
+    sentence = sentence_of_kind(kind)
     return f"{sentence[0].lower()}{sentence[1:].rstrip('.')}"
 
 

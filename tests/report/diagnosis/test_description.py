@@ -97,3 +97,14 @@ def test_the_noise_is_a_distance_where_errors_are(small_diagnosis):
     rows = sensors.is_displacement
     squares = [(drawn[:, rows & (sensors.groups == point)] ** 2).sum(axis=1) for point in set(sensors.groups[rows])]
     assert distance(sensors, noise) == pytest.approx(np.sqrt(np.mean(squares)), rel=0.01)
+
+
+def test_what_was_not_weighed_is_in_the_ranking_whatever_kind_it_is_of(small_diagnosis, tmp_path):
+    """What is no physics, and the unknown, are no mechanisms with a sentence of their own."""
+    kinds = {"drainage": True, "loads": False, "registration": False, "unknown": False}
+    diagnosis = replace(small_diagnosis, rejected=dict.fromkeys(kinds, "nothing tells of it"))
+    write_summary(tmp_path / "diagnosis.json", describe_diagnosis(diagnosis, OPTIONS, "cpu"))
+    rows = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))["ranking"][-len(kinds) :]
+    assert {row["mechanism"]: row["physics"] for row in rows} == kinds
+    assert all(row["says"].endswith(".") and set(row) == RANKED for row in rows)
+    assert read_diagnosis(tmp_path / "diagnosis.json").verdict == diagnosis.verdict

@@ -9,7 +9,7 @@ from warpbrain.diagnosis.held_out import distance
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis, Ranked
-from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence
+from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence, sentence_of_kind
 from warpbrain.diagnosis.traits import Traits
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import smallest_in_words
@@ -122,7 +122,8 @@ def _ranked(ranked: Ranked, gravity_axis: tuple[float, float, float] | None) -> 
 
 
 def _rejected(kind: str, why: str) -> dict[str, Any]:
-    return describe_cause(kind, why, says=mechanisms()[kind].sentence, heldout_rmse_change=None, where=None)
+    physics = kind in mechanisms()
+    return describe_cause(kind, why, says=sentence_of_kind(kind), physics=physics, heldout_rmse_change=None, where=None)
 
 
 def _ball(ranked: Ranked) -> dict[str, Any] | None:
