@@ -45,8 +45,8 @@ class Ranking:
     def _ranked(self, cause: Cause, weighted_set: WeightedSet) -> Ranked:
         probability = sum(p for other, p in self._sets if cause.name in other.names)
         alone, nothing = self._search.get((cause.name,)), self._search.nothing
-        log_evidence = float("-inf") if alone is None else alone.hypothesis.log_evidence
-        gain = log_evidence - nothing.hypothesis.log_evidence
+        # alone it was not weighed if about the base it changes nothing
+        gain = 0.0 if alone is None else alone.hypothesis.log_evidence - nothing.hypothesis.log_evidence
         if cause.kind is not Kind.PHYSICS:
             why = "no physics" if cause.kind is Kind.NOT_PHYSICS else ""
             return Ranked(cause.name, False, gain, probability, 0.0, None, (), None, None, "", why)

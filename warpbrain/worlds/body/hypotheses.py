@@ -92,8 +92,8 @@ class HypothesisSearch:
 
     @property
     def invisible(self) -> tuple[str, ...]:
-        """Causes that were not weighed, since nothing that was recorded would tell of them."""
-        weighed = {cause.name for cause in self._visible.causes}
+        """Causes that are in no set that was weighed, since nothing that was recorded would tell of them."""
+        weighed = {name for names in self._sets for name in names}
         return tuple(cause.name for cause in self.causes.causes if cause.name not in weighed)
 
     @property
