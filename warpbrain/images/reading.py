@@ -130,7 +130,10 @@ def _with_nibabel(path: Path) -> Image:
 
 
 def _check_count(path: Path, shape: Iterable[int]) -> None:
-    if int(np.prod(list(shape), dtype=np.int64)) > MOST_VOXELS:
+    count = int(np.prod(list(shape), dtype=np.int64))
+    if count == 0:
+        raise InputError(f"{path}: found no voxels ({_times(shape)})")
+    if count > MOST_VOXELS:
         raise InputError(f"{path}: {_times(shape)} voxels are more than {MOST_VOXELS:.0e}: crop or resample the volume")
 
 
