@@ -176,8 +176,8 @@ def _unit(path: Path, header: Any, notes: list[str]) -> float:
     try:
         unit = header.get_xyzt_units()[0]
     except KeyError:
-        found = int(header["xyzt_units"])
-        raise InputError(f"{path}: unknown unit of length (xyzt_units {found}); expected mm, meter or micron") from None
+        code = int(header["xyzt_units"])
+        raise InputError(f"{path}: unknown unit of length (xyzt_units {code}); expected mm, meter or micron") from None
     if unit not in ("mm", "unknown"):
         notes.append(f"{path.name} is in units of {unit}: converted to mm")
     return _MILLIMETRES[unit]

@@ -141,10 +141,10 @@ def _unit(path: Path, problems: Problems) -> float | None:
 
 def _coordinate_file(path: Path) -> Path | None:
     """The `coordsystem.json` with most of the entities of the file of electrodes, and no other."""
-    mine = set(path.name.lower().removesuffix(ENDING).strip("_").split("_"))
-    found = []
+    entities = set(path.name.lower().removesuffix(ENDING).strip("_").split("_"))
+    sides = []
     for side in path.parent.glob("*coordsystem.json"):
-        its = set(side.name.lower().removesuffix("coordsystem.json").strip("_").split("_")) - {""}
-        if its <= mine:
-            found.append((len(its), side))
-    return max(found)[1] if found else None
+        of_side = set(side.name.lower().removesuffix("coordsystem.json").strip("_").split("_")) - {""}
+        if of_side <= entities:
+            sides.append((len(of_side), side))
+    return max(sides)[1] if sides else None
