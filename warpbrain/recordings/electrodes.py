@@ -122,7 +122,7 @@ def _unit(path: Path, problems: Problems) -> float | None:
         return _METRES["mm"]
     try:
         content: Any = json.loads(side.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         problems.add(side, "", f"found no valid JSON ({error})")
         return None
     if not isinstance(content, dict):
@@ -133,10 +133,10 @@ def _unit(path: Path, problems: Problems) -> float | None:
     if str(system).lower() in _ELSEWHERE:
         cure = "give positions in scanner coordinates (ScanRAS or ACPC) of the image"
         problems.add(side, f"{kind}CoordinateSystem", f"found {shown(system)}, expected one of an image", cure)
-    if unit not in _METRES:
+    if not isinstance(unit, str) or unit not in _METRES:
         problems.add(side, f"{kind}CoordinateUnits", f"found {shown(unit)}, expected one of {', '.join(_METRES)}")
         return None
-    return _METRES[str(unit)]
+    return _METRES[unit]
 
 
 def _coordinate_file(path: Path) -> Path | None:
