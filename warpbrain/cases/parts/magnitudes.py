@@ -43,7 +43,10 @@ def check_magnitudes(
         if 1.0 / _OFF < times < _OFF:
             continue
         number, unit = next(
-            (k, table.get("unit", "Pa")) for k, table in enumerate(tables, 1) if table.get("name") == recording.name
+            (k, table.get("unit", "Pa"))
+            for k, table in enumerate(tables, 1)
+            # what is no table is a problem that was noted when it was read
+            if isinstance(table, dict) and table.get("name") == recording.name
         )
         message = (
             f"the {recording.quantities[1]} is {times:.2g} times what the declared tissue (mu = {mu:g} Pa) answers"
