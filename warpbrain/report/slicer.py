@@ -101,7 +101,7 @@ def write_slicer_scene(
     for name, moved in zip(SURFACES, (0.0, 1.0), strict=True):
         points = MILLIMETRES * (state.mesh.points + moved * state.u)[nodes]
         _write_surface(folder / name, points, numbers.reshape(-1, 3), size[nodes])
-    points_after = [name for name in files if name.endswith(("-after.mrk.json", "-after.json", "-after.fcsv"))]
+    points_after = [name for name in files if name.lower().endswith(("-after.mrk.json", "-after.json", "-after.fcsv"))]
     volumes = [] if image is None else [image.path.resolve().as_posix()]
     volumes += [] if image_after is None else [image_after]
     script = _TEXT.format(
