@@ -152,6 +152,13 @@ def test_a_stress_of_another_order_of_magnitude_is_an_error(tmp_path, unit, time
     [problem] = check_case(write(tmp_path, text, table)).problems
     words = (*said, "[recording 1] unit: ", f"(mu = 1000 Pa) answers if it is in {unit}")
     assert all(word in str(problem) for word in words), str(problem)
+    # only small strains tell: a law with a large exponent stiffens by more than that
+    steep = text.replace('unit = "kPa"', 'unit = "Pa"')
+    stretches = np.array([1.0, 0.98, 0.95, 0.7])
+    stresses = 2.0 * 1000.0 / -20.0 * (stretches**-21 - stretches**9)
+    assert abs(stresses[-1]) > 100.0 * 3.0 * 1000.0 * 0.3
+    rows = "".join(f"{l},{s}\n" for l, s in zip(stretches, stresses, strict=True))
+    assert not check_case(write(tmp_path, steep, "stretch,stress\n" + rows)).problems
     # a tissue that is ten times stiffer or softer than declared is another tissue, not another unit
     for mu in ("100.0", "10000.0"):
         other = text.replace("mu = 1000.0", f"mu = {mu}").replace('unit = "kPa"', 'unit = "Pa"')

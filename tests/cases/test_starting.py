@@ -310,6 +310,16 @@ def test_a_label_that_can_mean_two_things_is_asked_about(tmp_path):
     assert not (tmp_path / "mine").exists()
 
 
+def test_a_preset_of_another_program_is_refused(tmp_path):
+    pytest.importorskip("mmgpy")
+    labels = np.zeros((40, 40, 40), dtype=np.int16)
+    labels[2:-2, 2:-2, 2:-2] = 100
+    write_labels(tmp_path / "seg.nii.gz", labels, np.diag([3.0, 3.0, 3.0, 1.0]))
+    with pytest.raises(InputError, match=r"seg.nii.gz: has none of the labels of --preset synthseg; it has 100"):
+        start_from_labels(tmp_path / "mine", tmp_path / "seg.nii.gz", program="synthseg")
+    assert not (tmp_path / "mine").exists()
+
+
 def test_a_case_in_which_nothing_acts_says_so(started, of_freesurfer):
     for case, _ in (started, (of_freesurfer, None)):
         # a resection alone moves nothing

@@ -137,6 +137,17 @@ def test_the_scene_loads_what_is_there(folder, warped, monkeypatch):
     assert all(path.is_file() for paths in calls.values() for path in paths)
 
 
+def test_labels_may_have_the_name_of_a_transform(folder, warped, tmp_path):
+    labels = nibabel.load(folder / "seg.mgz")
+    nibabel.save(nibabel.Nifti1Image(np.asarray(labels.dataobj), labels.affine), tmp_path / "transform-seg.nii.gz")
+    out = tmp_path / "out"
+    done = warpbrain("warp", warped, "--out", out, "--labels", tmp_path / "transform-seg.nii.gz")
+    assert done.status == 0, done.err
+    assert 'LABELS = ["transform-seg-after.nii.gz"]' in (out / "load_in_slicer.py").read_text(encoding="utf-8")
+    images = [nibabel.load(path) for path in (out / "transform-seg-after.nii.gz", warped / "seg-after.nii.gz")]
+    np.testing.assert_array_equal(*(np.asarray(image.dataobj) for image in images))
+
+
 def test_an_nrrd_image_gives_the_same(folder, warped, tmp_path):
     sitk = pytest.importorskip("SimpleITK")
     sitk.WriteImage(sitk.ReadImage(folder / "T1.nii.gz"), tmp_path / "T1.nrrd")
@@ -174,7 +185,7 @@ def test_images_that_cannot_be_of_the_body(folder, warped, tmp_path, change, mes
     done = warpbrain("warp", warped, "--image", tmp_path / "bad.nii.gz", "--out", tmp_path / "out")
     assert done.status == 2
     assert message in done.err
-    assert not list(tmp_path.glob("out/*"))
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

@@ -160,3 +160,31 @@ def test_resampling_by_a_translation_is_exact():
     assert found.dtype == np.int16
     assert not found[10:].any()
     np.testing.assert_array_equal(resampled(values, grid, back, nearest=True), found)
+
+
+@pytest.mark.parametrize("nearest", [True, False])
+def test_large_whole_numbers_stay_as_they_are(nearest):
+    grid = Grid((3, 3, 3), np.eye(4))
+    values = np.full(grid.shape, 2**31 - 1, dtype=np.int32)
+    values[0] = 2**24 + 1
+    still = DisplacementField(grid, np.zeros((*grid.shape, 3), dtype=np.float32))
+    np.testing.assert_array_equal(resampled(values, grid, still, nearest=nearest), values)
+
+
+@pytest.mark.parametrize(
+    ("values", "written"),
+    [
+        (np.array([-5, 7], dtype=np.int64), np.int32),
+        (np.array([0, 2**40], dtype=np.int64), np.float64),
+        (np.array([0, 2**31], dtype=np.uint64), np.float64),
+        (np.array([True, False]), np.uint8),
+        (np.array([1.0, 0.5], dtype=np.float16), np.float32),
+        (np.array([-3, 4], dtype=">i2"), np.int16),
+    ],
+)
+def test_no_value_is_changed_by_the_type_it_is_written_in(tmp_path, values, written):
+    nibabel = pytest.importorskip("nibabel")
+    write_volume(tmp_path / "values.nii.gz", values.reshape(2, 1, 1), Grid((2, 1, 1), np.eye(4)))
+    file = nibabel.load(tmp_path / "values.nii.gz")
+    assert file.get_data_dtype() == written
+    np.testing.assert_array_equal(np.asarray(file.dataobj).ravel(), values)

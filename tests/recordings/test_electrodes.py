@@ -44,6 +44,8 @@ def test_the_unit_is_that_of_the_coordinate_system(tmp_path, unit, metres):
         (TEXT, {"iEEGCoordinateSystem": "Pixels", "iEEGCoordinateUnits": "pixels"}, "iEEGCoordinateSystem: found 'Pix"),
         (TEXT, {"EEGCoordinateSystem": "CapTrak", "EEGCoordinateUnits": "mm"}, "EEGCoordinateSystem: found 'CapTrak'"),
         (TEXT, {"iEEGCoordinateSystem": "ACPC", "iEEGCoordinateUnits": "inch"}, "iEEGCoordinateUnits: found 'inch'"),
+        (TEXT, {"iEEGCoordinateSystem": "ACPC", "iEEGCoordinateUnits": ["mm"]}, "iEEGCoordinateUnits: found '['mm']'"),
+        (TEXT, {"iEEGCoordinateSystem": "ACPC"}, "iEEGCoordinateUnits: found 'None'"),
         (TEXT.replace("5.5", "five"), None, "row 2: found position '10 -20 five'"),
         (TEXT.replace("12\t-20", "12"), None, "row 4: found 4 fields, expected 5"),
         (TEXT.replace("\ty", "\tv"), None, "header: found no column 'y'"),

@@ -101,19 +101,24 @@ def start_from_labels(
     check_new_folder(folder)
     if size is not None and not 0 < size < np.inf:
         raise InputError(f"--size: found {size:g}, expected a positive length [mm]")
-    given = parse_names(names)
+    chosen = parse_names(names)
     usual = Preset({}, {}) if program is None else preset(program)
     require_extra(("mmgpy", "nibabel", "scipy", "meshio"))
     progress(f"reading {labels}")
     image = read_labels(labels)
     volumes = image.volumes()
-    for label in sorted(usual.unsure.keys() & volumes.keys() - given.keys()):
+    for label in sorted(usual.unsure.keys() & volumes.keys() - chosen.keys()):
         raise InputError(f"{labels}: label {label}: {usual.unsure[label]}: say which with --tissue {label}=NAME")
-    given = {label: name for label, name in usual.names.items() if label in volumes} | given
-    assignment = assign(volumes, given, others)
+    known = {label: name for label, name in usual.names.items() if label in volumes}
+    if program is not None and not (known or chosen):
+        raise InputError(
+            f"{labels}: has none of the labels of --preset {program}; it has {', '.join(map(str, volumes))}"
+        )
+    named = known | chosen
+    assignment = assign(volumes, named, others)
     made = mesh_labels(image, assignment, size, progress)
     sets = first_sets(made.points, made.tetrahedra, made.opens)
-    notes = [*image.notes, *_left_out(volumes, given, others, assignment), *made.notes]
+    notes = [*image.notes, *_left_out(volumes, named, others, assignment), *made.notes]
     tissue = made.tissue.astype(np.int32)
     resected = [number for number, name in assignment.tissues.items() if name == RESECTION]
     taken = {RESECTION: np.isin(tissue, resected)} if resected else {}
@@ -234,14 +239,14 @@ def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path
 
 
 def _left_out(
-    volumes: Mapping[int, float], given: Mapping[int, str], others: str | None, assignment: Assignment
+    volumes: Mapping[int, float], named: Mapping[int, str], others: str | None, assignment: Assignment
 ) -> list[str]:
     """What of the volume is no part of the mesh, label by label."""
     out = [f"{label} ({volumes[label] / 1000.0:.3g} cm3)" for label in assignment.outside]
     if not out:
         return []
     total = sum(volumes[label] for label in assignment.outside)
-    unnamed = "" if others is None else f"; {len(set(volumes) - set(given))} of them are --others {others}"
+    unnamed = "" if others is None else f"; {len(set(volumes) - set(named))} of them are --others {others}"
     return [f"outside the mesh: {total / 1000.0:.4g} cm3, labels {', '.join(out)}{unnamed}"]
 
 

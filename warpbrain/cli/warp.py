@@ -11,6 +11,7 @@ from warpbrain.errors import InputError
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
+    from warpbrain.report.state_files import SavedState
     from warpbrain.report.warped import Asked
 
 
@@ -74,10 +75,14 @@ def check_place(asked: Asked | None, case: Case) -> None:
 def warp(result: Path, out: Path, asked: Asked, say: Callable[..., None], quiet: bool) -> list[str]:
     """Warp by a result, say what there is to say; returns the names of the files."""
     from warpbrain.report.state_files import read_state
+
+    return _write(read_state(result), out, asked, say, quiet)
+
+
+def _write(state: SavedState, out: Path, asked: Asked, say: Callable[..., None], quiet: bool) -> list[str]:
     from warpbrain.report.warped import write_warped
     from warpbrain.terminal.progress import Progress
 
-    state = read_state(result)
     progress = Progress("warping", quiet)
     stages = iter((0.0, 0.3, 0.8))
     try:
@@ -90,17 +95,18 @@ def warp(result: Path, out: Path, asked: Asked, say: Callable[..., None], quiet:
 
 def _run(options: argparse.Namespace) -> None:
     from warpbrain.atomic import output_folder
+    from warpbrain.report import warped
+    from warpbrain.report.state_files import read_state
 
     asked = asked_for(options)
     if asked is None:
         raise InputError("expected --image, --labels or --points: what is to be warped")
     say: Callable[..., None] = _silent if options.quiet else print
     out = options.out or (options.result if options.result.is_dir() else options.result.parent)
-    # nothing is made for a result that is none
-    from warpbrain.report.state_files import read_state
-
-    read_state(options.result)
-    files = warp(options.result, output_folder(out), asked, say, options.quiet)
+    # no folder is made for a result that is none, or an image of another body
+    state = read_state(options.result)
+    warped.check_place(asked, state.mesh, state.path)
+    files = _write(state, output_folder(out), asked, say, options.quiet)
     say("", f"written to {out}: {', '.join(files)}", sep="\n")
 
 

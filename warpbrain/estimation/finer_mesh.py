@@ -130,6 +130,8 @@ class FinerMesh:
         try:
             solution = solver.solve(external, start)
         except SolveError:
+            if not earlier:
+                raise
             solution = solver.solve(external, flat)
         if linear is not None and linear.slow:
             self._factors = self._linear = None

@@ -153,7 +153,7 @@ class _Descent:
     def __init__(self, search: GaussNewton, point: Point, linearised: Linearised, tolerance: float) -> None:
         self.problem = problem = search.problem
         self.point, self.linearised, self.decrement = point, linearised, np.inf
-        self._search, self._tolerance = search, tolerance
+        self._search, self._tolerance, self._start = search, tolerance, point
         self._origin, along = point.coordinates, problem.nuisances.prior.standard_deviations
         self._scale = np.concatenate([problem.parameters.reach, 10.0 * along])
         open_ends = np.full(len(along), np.inf)
@@ -168,7 +168,7 @@ class _Descent:
     def residuals(self, z: Floats) -> Floats:
         """At coordinates (k,): (n + k,), not finite where there is no stable equilibrium."""
         if not z.any():
-            return self._standardised(self.point)
+            return self._standardised(self._start)
         problem, here = self.problem, self.point.state
         x = self._origin + self._scale * z
         theta, nuisances = np.split(x, [len(problem.parameters)])
@@ -193,7 +193,7 @@ class _Descent:
             before, J = self._last
             share = float(np.linalg.norm(J @ (z - before))) / self.decrement
             self._search.record(objective, self.decrement, share, self._newton)
-            self._newton = 0
+            self._newton, self._better = 0, None
         white = self.point.noise.standardised(self.linearised.jacobian)
         J = np.concatenate([white, self._whitening]) * self._scale
         residuals = self._standardised(self.point)

@@ -43,19 +43,19 @@ def continued(values: Singles, known: Bools, voxel: Floats, length: float = LENG
     (i, j, k, c) float32 array
         The values where known, and the continuation elsewhere.
     """
-    given = np.where(known[..., None], values, np.float32(0.0)).astype(np.float32)
-    return _solved(given, known, np.asarray(voxel, dtype=np.float64), length, _ITERATIONS)
+    start = np.where(known[..., None], values, np.float32(0.0)).astype(np.float32)
+    return _solved(start, known, np.asarray(voxel, dtype=np.float64), length, _ITERATIONS)
 
 
-def _solved(given: Singles, known: Bools, voxel: Floats, length: float, iterations: int) -> Singles:
+def _solved(values: Singles, known: Bools, voxel: Floats, length: float, iterations: int) -> Singles:
     """Conjugate gradients from the solution on a grid of twice the edges."""
-    start = np.zeros_like(given)
+    start = np.zeros_like(values)
     if min(known.shape) > _COARSEST:
         more = min(2 * iterations, _MOST)
-        start = _finer(_solved(*_coarser(given, known), 2.0 * voxel, length, more), known.shape)
+        start = _finer(_solved(*_coarser(values, known), 2.0 * voxel, length, more), known.shape)
     else:
         iterations = _MOST
-    start[known] = given[known]
+    start[known] = values[known]
     weights = 1.0 / voxel**2
     factors = (weights / (2.0 * weights.sum() + 1.0 / length**2)).astype(np.float32)
     left = _neighbours(start, factors) - start
@@ -75,14 +75,14 @@ def _solved(given: Singles, known: Bools, voxel: Floats, length: float, iteratio
 
 def _neighbours(values: Singles, factors: Singles) -> Singles:
     """Sum of the six voxels around each, weighted by a factor for each axis; there is zero beyond the grid."""
-    found = np.zeros_like(values)
+    total = np.zeros_like(values)
     for axis, factor in enumerate(factors):
         ahead, behind = [slice(None)] * 3, [slice(None)] * 3
         ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
         scaled = factor * values
-        found[tuple(behind)] += scaled[tuple(ahead)]
-        found[tuple(ahead)] += scaled[tuple(behind)]
-    return found
+        total[tuple(behind)] += scaled[tuple(ahead)]
+        total[tuple(ahead)] += scaled[tuple(behind)]
+    return total
 
 
 def _dots(a: Singles, b: Singles) -> Floats:
@@ -90,13 +90,13 @@ def _dots(a: Singles, b: Singles) -> Floats:
     return np.einsum("nc,nc->c", a.reshape(-1, a.shape[3]), b.reshape(-1, b.shape[3]), dtype=np.float64)
 
 
-def _coarser(given: Singles, known: Bools) -> tuple[Singles, Bools]:
+def _coarser(values: Singles, known: Bools) -> tuple[Singles, Bools]:
     """Means of what is known in blocks of two voxels along each axis."""
     edges = [(0, n % 2) for n in known.shape]
     i, j, k = ((n + 1) // 2 for n in known.shape)
     blocks = (i, 2, j, 2, k, 2)
     counts = np.pad(known, edges).reshape(blocks).sum(axis=(1, 3, 5), dtype=np.float32)
-    sums = np.pad(given, [*edges, (0, 0)]).reshape(*blocks, given.shape[3]).sum(axis=(1, 3, 5))
+    sums = np.pad(values, [*edges, (0, 0)]).reshape(*blocks, values.shape[3]).sum(axis=(1, 3, 5))
     return sums / np.maximum(counts, 1.0)[..., None], counts > 0
 
 

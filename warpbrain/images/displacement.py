@@ -54,7 +54,7 @@ class DisplacementField:
         """Vectors (n, 3) [mm, RAS] at voxel numbers (n, 3), which need not be whole."""
         from scipy.ndimage import map_coordinates
 
-        found = np.empty((len(indices), 3))
+        vectors = np.empty((len(indices), 3))
         last = np.array(self.grid.shape) - 1
         for first in range(0, len(indices), _BATCH):
             part = slice(first, first + _BATCH)
@@ -62,9 +62,9 @@ class DisplacementField:
             at = np.clip(indices[part], 0.0, last).T
             outside = ((indices[part] < -0.5) | (indices[part] > last + 0.5)).any(axis=1)
             for axis in range(3):
-                found[part, axis] = map_coordinates(self.vectors[..., axis], at, order=1, mode="nearest")
-            found[part][outside] = 0.0
-        return found
+                vectors[part, axis] = map_coordinates(self.vectors[..., axis], at, order=1, mode="nearest")
+            vectors[part][outside] = 0.0
+        return vectors
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +133,9 @@ def _inverted(field: DisplacementField, voxels: Ints) -> tuple[Floats, int]:
     """The inverse (n, 3) at some voxels, and how many of them have none that is good enough."""
     grid = field.grid
     places = np.stack(np.unravel_index(voxels, grid.shape), axis=1).astype(np.float64)
-    found = -field.vectors.reshape(-1, 3)[voxels].astype(np.float64)
+    vectors = -field.vectors.reshape(-1, 3)[voxels].astype(np.float64)
     active: Ints = np.arange(len(voxels))
-    best = tried = found.copy()
+    best = tried = vectors.copy()
     error, step = np.full(len(voxels), np.inf), np.ones(len(voxels))
     residual = np.zeros_like(best)
     for _ in range(_ITERATIONS):
@@ -146,14 +146,14 @@ def _inverted(field: DisplacementField, voxels: Ints) -> tuple[Floats, int]:
         residual = np.where(better[:, None], left, residual)
         error = np.where(better, size, error)
         step = np.where(better, step, 0.5 * step)
-        found[active] = best
+        vectors[active] = best
         going = error > _TOLERANCE
         active, places, error, step = active[going], places[going], error[going], step[going]
         best, residual = best[going], residual[going]
         if not len(active):
             break
         tried = best - step[:, None] * residual
-    return found, len(active)
+    return vectors, len(active)
 
 
 def _errors(field: DisplacementField, back: DisplacementField, tissue: Bools) -> Floats:

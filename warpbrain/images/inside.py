@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Floats
 from warpbrain.images.grid import MILLIMETRES, Grid
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.quadratic import quadratic_interpolant
 
 Indices = NDArray[np.int64]
 
@@ -48,9 +48,9 @@ class VoxelsInside:
     @property
     def mask(self) -> NDArray[np.bool_]:
         """True for voxels inside, an array of the grid's shape."""
-        found = np.zeros(self.grid.count, dtype=bool)
-        found[self.voxels] = True
-        return found.reshape(self.grid.shape)
+        mask = np.zeros(self.grid.count, dtype=bool)
+        mask[self.voxels] = True
+        return mask.reshape(self.grid.shape)
 
     def interpolate(self, values: Floats, middles: Floats | None = None) -> Floats:
         """A field of the mesh at these voxels.
@@ -70,15 +70,13 @@ class VoxelsInside:
         corners = self.mesh.tetrahedra[self.elements]
         if middles is None:
             return np.asarray(np.einsum("ka,kac->kc", self.weights, values[corners]))
-        w = self.weights
-        found = np.einsum("ka,kac->kc", w * (2.0 * w - 1.0), values[corners])
-        return np.asarray(found + np.einsum("ka,kac->kc", 4.0 * w[:, EDGES].prod(axis=2), middles[self.elements]))
+        return quadratic_interpolant(self.weights, values[corners], middles[self.elements])
 
     def image(self, values: NDArray[Any]) -> NDArray[np.float32]:
         """Real or whole values (k, ...) of these voxels as an image, zero elsewhere."""
-        found = np.zeros((self.grid.count, *values.shape[1:]), dtype=np.float32)
-        found[self.voxels] = values
-        return found.reshape(*self.grid.shape, *values.shape[1:])
+        image = np.zeros((self.grid.count, *values.shape[1:]), dtype=np.float32)
+        image[self.voxels] = values
+        return image.reshape(*self.grid.shape, *values.shape[1:])
 
 
 def voxels_inside(mesh: TetMesh, grid: Grid) -> VoxelsInside:
@@ -86,7 +84,7 @@ def voxels_inside(mesh: TetMesh, grid: Grid) -> VoxelsInside:
     corners = grid.indices(MILLIMETRES * mesh.points)[mesh.tetrahedra]
     sides = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
     gradients: Floats = np.asarray(np.linalg.inv(sides), dtype=np.float64)
-    parts = list(_found(corners, gradients, np.array(grid.shape)))
+    parts = list(_batches(corners, gradients, np.array(grid.shape)))
     voxels = np.concatenate([voxel for voxel, _, _ in parts]) if parts else np.zeros(0, dtype=np.int64)
     voxels, first = np.unique(voxels, return_index=True)
     elements = np.concatenate([element for _, element, _ in parts])[first] if parts else voxels
@@ -94,7 +92,7 @@ def voxels_inside(mesh: TetMesh, grid: Grid) -> VoxelsInside:
     return VoxelsInside(grid, mesh, voxels, elements, weights)
 
 
-def _found(corners: Floats, gradients: Floats, shape: Indices) -> Iterator[tuple[Indices, Indices, Floats]]:
+def _batches(corners: Floats, gradients: Floats, shape: Indices) -> Iterator[tuple[Indices, Indices, Floats]]:
     """Voxels in the boxes around tetrahedra (m, 4, 3) that are in these, a batch of tetrahedra at a time."""
     low = np.maximum(np.ceil(corners.min(axis=1) - _WEIGHT), 0).astype(np.int64)
     high = np.minimum(np.floor(corners.max(axis=1) + _WEIGHT), shape - 1).astype(np.int64)

@@ -15,7 +15,7 @@ from warpbrain.errors import InputError
 from warpbrain.images.displacement import DisplacementField
 from warpbrain.images.grid import MILLIMETRES
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.quadratic import quadratic_interpolant
 from warpbrain.problems import Problems
 from warpbrain.recordings.electrodes import is_electrodes, read_electrodes
 from warpbrain.recordings.location import locate
@@ -148,8 +148,7 @@ def _quadratic(mesh: TetMesh, nodes: np.ndarray, weights: Floats, u: Floats, mid
     elements = np.array([rows[tuple(sorted(corners))] for corners in nodes.tolist()], dtype=np.int64)
     w = np.empty_like(weights)
     np.put_along_axis(w, order[elements], np.take_along_axis(weights, np.argsort(nodes, axis=1), axis=1), axis=1)
-    found = np.einsum("na,nac->nc", w * (2.0 * w - 1.0), u[mesh.tetrahedra[elements]])
-    return np.asarray(found + np.einsum("na,nac->nc", 4.0 * w[:, EDGES].prod(axis=2), middles[elements]))
+    return quadratic_interpolant(w, u[mesh.tetrahedra[elements]], middles[elements])
 
 
 def write_moved(folder: Path, moved: Sequence[MovedPoints]) -> list[str]:

@@ -130,7 +130,10 @@ def _with_nibabel(path: Path) -> Image:
 
 
 def _check_count(path: Path, shape: Iterable[int]) -> None:
-    if int(np.prod(list(shape), dtype=np.int64)) > MOST_VOXELS:
+    count = int(np.prod(list(shape), dtype=np.int64))
+    if count == 0:
+        raise InputError(f"{path}: found no voxels ({_times(shape)})")
+    if count > MOST_VOXELS:
         raise InputError(f"{path}: {_times(shape)} voxels are more than {MOST_VOXELS:.0e}: crop or resample the volume")
 
 
@@ -173,8 +176,8 @@ def _unit(path: Path, header: Any, notes: list[str]) -> float:
     try:
         unit = header.get_xyzt_units()[0]
     except KeyError:
-        found = int(header["xyzt_units"])
-        raise InputError(f"{path}: unknown unit of length (xyzt_units {found}); expected mm, meter or micron") from None
+        code = int(header["xyzt_units"])
+        raise InputError(f"{path}: unknown unit of length (xyzt_units {code}); expected mm, meter or micron") from None
     if unit not in ("mm", "unknown"):
         notes.append(f"{path.name} is in units of {unit}: converted to mm")
     return _MILLIMETRES[unit]

@@ -37,8 +37,10 @@ def resampled(
     from scipy.ndimage import map_coordinates
 
     after = back.grid
-    found = np.zeros(after.shape, dtype=values.dtype)
-    source = values if nearest else values.astype(np.float32 if values.dtype.itemsize <= 4 else np.float64)
+    moved = np.zeros(after.shape, dtype=values.dtype)
+    # single precision only where it holds every value
+    single = np.result_type(values.dtype, np.float32) == np.float32
+    source = values if nearest else values.astype(np.float32 if single else np.float64)
     last = np.array(grid.shape) - 1
     for first in range(0, after.shape[0], _SLICES):
         part = slice(first, min(first + _SLICES, after.shape[0]))
@@ -56,5 +58,5 @@ def resampled(
             if np.issubdtype(values.dtype, np.integer):
                 sampled = np.rint(sampled)
         shape = (part.stop - part.start, *after.shape[1:])
-        found[part] = np.where(inside, sampled, 0).astype(values.dtype).reshape(shape)
-    return found
+        moved[part] = np.where(inside, sampled, 0).astype(values.dtype).reshape(shape)
+    return moved

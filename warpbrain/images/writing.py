@@ -24,7 +24,7 @@ _ROUNDED = 2.0**-13
 
 
 def write_volume(path: Path, values: NDArray[np.generic], grid: Grid) -> None:
-    """Write one value a voxel."""
+    """Write one value a voxel; whole numbers that 32 bits do not hold become real ones."""
     _write(path, values, grid)
 
 
@@ -51,9 +51,7 @@ def _rounded(vectors: Singles) -> Singles:
 def _write(path: Path, values: NDArray[Any], grid: Grid, intent: int = 0) -> None:
     import nibabel
 
-    # what NIfTI has no name for in all readers
-    wide = {"bool": "uint8", "int64": "int32", "uint64": "int32", "float16": "float32"}
-    image: Any = nibabel.Nifti1Image(values.astype(wide.get(values.dtype.name, values.dtype)), grid.affine)
+    image: Any = nibabel.Nifti1Image(values.astype(_type_for(values)), grid.affine)
     image.header.set_xyzt_units("mm")
     image.header["intent_code"] = intent
     for place in (image.set_sform, image.set_qform):
@@ -65,3 +63,12 @@ def _write(path: Path, values: NDArray[Any], grid: Grid, intent: int = 0) -> Non
         gzip.GzipFile("", "wb", _EFFORT, stream, mtime=0) as packed,
     ):
         packed.write(image.to_bytes())
+
+
+def _type_for(values: NDArray[Any]) -> np.dtype[Any]:
+    """The type of values, or of all that hold them one that every reader of NIfTI has."""
+    if values.dtype.name in ("int64", "uint64"):
+        limits = np.iinfo(np.int32)
+        fits = not values.size or (values.min() >= limits.min and values.max() <= limits.max)
+        return np.dtype(np.int32 if fits else np.float64)
+    return np.dtype({"bool": "uint8", "float16": "float32"}.get(values.dtype.name, values.dtype))

@@ -114,6 +114,26 @@ class QuadraticMesh:
         return found
 
 
+def quadratic_interpolant(weights: Floats, corners: Floats, middles: Floats) -> Floats:
+    """A field of quadratic tetrahedra with straight sides at points in them.
+
+    Parameters
+    ----------
+    weights : (n, 4) array
+        Barycentric coordinates of each point.
+    corners : (n, 4, c) array
+        Values at the corners of its tetrahedron.
+    middles : (n, 6, c) array
+        Values in the middle of the edges, in the order of `warpbrain.mesh.quality.EDGES`.
+
+    Returns
+    -------
+    (n, c) array
+    """
+    of_corners = np.einsum("na,nac->nc", weights * (2.0 * weights - 1.0), corners)
+    return np.asarray(of_corners + np.einsum("na,nac->nc", 4.0 * weights[:, EDGES].prod(axis=2), middles))
+
+
 def _middles(corners: int, ends: Ints, edges: NDArray[np.integer]) -> NDArray[np.int64]:
     """Node in the middle of each edge (..., 2), its ends ascending, of all nodes with their `ends`, corners first."""
     factors = np.array([corners, 1])

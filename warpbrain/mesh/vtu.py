@@ -52,7 +52,7 @@ def read_vtu(path: Path) -> Any:
 
     data = path.read_bytes()
     head, rest = data[:_HEAD], data[_HEAD:]
-    plain = _FIELDS.sub(lambda found: _TEXT.sub(b"", found.group()), head, count=1)
+    plain = _FIELDS.sub(lambda fields: _TEXT.sub(b"", fields.group()), head, count=1)
     if plain == head:
         return meshio.read(path, file_format="vtu")
     with tempfile.TemporaryDirectory() as folder:
@@ -66,8 +66,8 @@ def axes_of_vtu(path: Path) -> str | None:
     with path.open("rb") as stream:
         head = stream.read(_HEAD)
     fields = _FIELDS.search(head)
-    for found in _TEXT.finditer(fields.group()) if fields else ():
-        if b'Name="SPACE"' in found.group() and b'format="ascii"' in found.group():
-            codes = re.sub(rb"<[^>]*>", b"", found.group()).split()
+    for field in _TEXT.finditer(fields.group()) if fields else ():
+        if b'Name="SPACE"' in field.group() and b'format="ascii"' in field.group():
+            codes = re.sub(rb"<[^>]*>", b"", field.group()).split()
             return bytes(int(code) for code in codes).strip(b"\0").decode("ascii", "replace")
     return None

@@ -122,7 +122,7 @@ def _unit(path: Path, problems: Problems) -> float | None:
         return _METRES["mm"]
     try:
         content: Any = json.loads(side.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         problems.add(side, "", f"found no valid JSON ({error})")
         return None
     if not isinstance(content, dict):
@@ -133,18 +133,18 @@ def _unit(path: Path, problems: Problems) -> float | None:
     if str(system).lower() in _ELSEWHERE:
         cure = "give positions in scanner coordinates (ScanRAS or ACPC) of the image"
         problems.add(side, f"{kind}CoordinateSystem", f"found {shown(system)}, expected one of an image", cure)
-    if unit not in _METRES:
+    if not isinstance(unit, str) or unit not in _METRES:
         problems.add(side, f"{kind}CoordinateUnits", f"found {shown(unit)}, expected one of {', '.join(_METRES)}")
         return None
-    return _METRES[str(unit)]
+    return _METRES[unit]
 
 
 def _coordinate_file(path: Path) -> Path | None:
     """The `coordsystem.json` with most of the entities of the file of electrodes, and no other."""
-    mine = set(path.name.lower().removesuffix(ENDING).strip("_").split("_"))
-    found = []
+    entities = set(path.name.lower().removesuffix(ENDING).strip("_").split("_"))
+    sides = []
     for side in path.parent.glob("*coordsystem.json"):
-        its = set(side.name.lower().removesuffix("coordsystem.json").strip("_").split("_")) - {""}
-        if its <= mine:
-            found.append((len(its), side))
-    return max(found)[1] if found else None
+        of_side = set(side.name.lower().removesuffix("coordsystem.json").strip("_").split("_")) - {""}
+        if of_side <= entities:
+            sides.append((len(of_side), side))
+    return max(sides)[1] if sides else None

@@ -15,13 +15,15 @@ from warpbrain.mesh.vtu import write_vtu
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.state_files import SavedState
 
+#: Names of the transforms: what they do to an image.
+FORTH, BACK = "transform-before-to-after.nii.gz", "transform-after-to-before.nii.gz"
 SCRIPT = "load_in_slicer.py"
 SURFACES = ("surface-before.vtu", "surface-after.vtu")
 
 _TEXT = '''\
 """Loads a result of warpbrain into 3D Slicer. In its Python console:
 
-    exec(open("{path}").read())
+    exec(open("{path}", encoding="utf-8").read())
 """
 
 import os
@@ -68,37 +70,53 @@ slicer.util.resetThreeDViews()
 
 
 def write_slicer_scene(
-    folder: Path, state: SavedState, image: Image | None, labels: Image | None, files: Sequence[str]
+    folder: Path,
+    state: SavedState,
+    image: Image | None,
+    image_after: str | None,
+    labels_after: str | None,
+    files: Sequence[str],
 ) -> list[str]:
-    """Write the surfaces and the script beside files that are there already; returns the names."""
+    """Write the surfaces and the script beside files that are there already.
+
+    Parameters
+    ----------
+    folder : Path
+    state : SavedState
+    image : Image or None
+        Before.
+    image_after, labels_after : str or None
+        Names of the files of the warped image and labels.
+    files : sequence of str
+        Names of all files.
+
+    Returns
+    -------
+    list of str
+        Names of the files that were added.
+    """
     size = MILLIMETRES * np.linalg.norm(state.u, axis=1)
     faces = state.mesh.boundary
     nodes, numbers = np.unique(faces, return_inverse=True)
     for name, moved in zip(SURFACES, (0.0, 1.0), strict=True):
         points = MILLIMETRES * (state.mesh.points + moved * state.u)[nodes]
         _write_surface(folder / name, points, numbers.reshape(-1, 3), size[nodes])
-    afters = [name for name in files if name.endswith("-after.nii.gz") and not name.startswith("transform-")]
-    points_after = [name for name in files if name.endswith(("-after.mrk.json", "-after.json", "-after.fcsv"))]
-    label_name = None if labels is None else afters[-1]
+    points_after = [name for name in files if name.lower().endswith(("-after.mrk.json", "-after.json", "-after.fcsv"))]
     volumes = [] if image is None else [image.path.resolve().as_posix()]
-    volumes += [name for name in afters if name != label_name]
+    volumes += [] if image_after is None else [image_after]
     script = _TEXT.format(
         path=(folder / SCRIPT).resolve().as_posix(),
         folder=json.dumps(folder.resolve().as_posix()),
-        volumes=json.dumps([name for name in volumes if not name.endswith((".mgz", ".mgh"))]),
-        labels=json.dumps([*([] if label_name is None else [label_name]), *_known(files, "trust.nii.gz")]),
+        volumes=json.dumps([name for name in volumes if not name.lower().endswith((".mgz", ".mgh"))]),
+        labels=json.dumps([name for name in (labels_after, "trust.nii.gz") if name in files]),
         surfaces=json.dumps([[SURFACES[0], 0.3], [SURFACES[1], 1.0]]),
         points=json.dumps([[name, [1.0, 0.5, 0.0]] for name in points_after]),
-        transform=json.dumps("transform-before-to-after.nii.gz"),
+        transform=json.dumps(FORTH),
         largest=json.dumps(max(float(size.max()), 1e-6)),
     )
     with whole_file(folder / SCRIPT) as scratch:
         scratch.write_text(script, encoding="utf-8")
     return [*SURFACES, SCRIPT]
-
-
-def _known(files: Sequence[str], name: str) -> list[str]:
-    return [name] if name in files else []
 
 
 def _write_surface(path: Path, points: Any, faces: Any, size: Any) -> None:

@@ -21,8 +21,8 @@ from warpbrain.report.files import MIDDLES, MILLIMETRES
 #: Files that hold a deformed body, in the order in which they are looked for: of `run`, of `estimate` and `diagnose`,
 #: and of `ensemble`.
 FILES = ("result.vtu", "state.vtu", "fields.vtu")
-#: What is known of a place, as `trust` says it.
-OUTSIDE, SEEN, UNSEEN, LEFT = 0, 1, 2, 3
+#: What is known of a place in the body, as `trust` says it; zero is outside of it.
+SEEN, UNSEEN, LEFT = 1, 2, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,15 +126,15 @@ def write_estimated_state(path: Path, posterior: Posterior) -> None:
     )
 
 
-def write_diagnosed_state(path: Path, found: Diagnosis) -> None:
+def write_diagnosed_state(path: Path, diagnosis: Diagnosis) -> None:
     """Write the last state of a diagnosis, with all that is named, as VTU with coordinates in mm.
 
     Point arrays: ``displacement`` [mm], ``significant`` and ``blind`` as in `map.vtu`.
     """
     from scipy.spatial import cKDTree
 
-    where, refit = found.map, found.best.refit
-    state = found.base.at if refit is None else refit.state
+    where, refit = diagnosis.map, diagnosis.best.refit
+    state = diagnosis.base.at if refit is None else refit.state
     mesh = state.system.model.mesh
     nearest = cKDTree(where.sites).query(mesh.points)[1]
     _write(

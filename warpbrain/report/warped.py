@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.images.continuation import LENGTH
 from warpbrain.images.displacement import DisplacementField, Inverse, displacement_field, inverse
@@ -20,7 +21,7 @@ from warpbrain.images.resampling import resampled
 from warpbrain.images.writing import write_displacement, write_transform, write_volume
 from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.slicer import write_slicer_scene
+from warpbrain.report.slicer import BACK, FORTH, write_slicer_scene
 from warpbrain.report.state_files import LEFT, SEEN, UNSEEN, SavedState
 
 #: Edges of voxels, and how far they reach beyond the body, where there is no image [mm].
@@ -36,8 +37,6 @@ TRUST = {
     UNSEEN: "recordings see nothing",
     LEFT: "recordings and the declared case disagree",
 }
-#: Names of the transforms: what they do to an image.
-FORTH, BACK = "transform-before-to-after.nii.gz", "transform-after-to-before.nii.gz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +130,8 @@ def write_warped(
     moved = [move_points(file, state.mesh, state.u, state.middles, field) for file in asked.points]
     if moved:
         files += write_moved(folder, moved)
-    files += write_slicer_scene(folder, state, asked.image, asked.labels, files)
+    image_after, labels_after = (None if each is None else _after(each.path) for each in (asked.image, asked.labels))
+    files += write_slicer_scene(folder, state, asked.image, image_after, labels_after, files)
     return [*_lines(asked, field, inside, back, moved), *_trust_lines(state)], files
 
 
@@ -151,16 +151,20 @@ def check_place(asked: Asked, mesh: TetMesh, path: Path) -> None:
     points = MILLIMETRES * mesh.points
     share = float(np.mean(image.grid.contains(points)))
     if share < _INSIDE:
-        corners = image.grid.positions(np.array([[0, 0, 0], np.array(image.grid.shape) - 1]))
+        # all eight: of an oblique image two opposite ones span less than the image
+        corners = image.grid.positions(np.indices((2, 2, 2)).reshape(3, -1).T * (np.array(image.grid.shape) - 1))
         raise InputError(
             f"{image.path}: affine: {100 * share:.0f} % of the body of {path} are in it: it spans "
-            f"{_span(np.sort(corners, axis=0))}, the body {_span(np.array([points.min(axis=0), points.max(axis=0)]))} "
+            f"{_span(corners)}, the body {_span(points)} "
             "mm RAS: is it the image that the mesh was made from?"
         )
 
 
-def _span(ends: np.ndarray) -> str:
-    return " x ".join(f"{low:.0f} to {high:.0f}" for low, high in ends.T)
+def _span(points: Floats) -> str:
+    """The box (n, 3) points are in, as text."""
+    return " x ".join(
+        f"{low:.0f} to {high:.0f}" for low, high in zip(points.min(axis=0), points.max(axis=0), strict=True)
+    )
 
 
 def _write_maps(folder: Path, state: SavedState, inside: VoxelsInside) -> list[str]:
@@ -189,8 +193,8 @@ def _trust_lines(state: SavedState) -> list[str]:
     if state.trust is not None:
         volumes = state.mesh.node_volumes
         shares = {value: volumes[state.trust == value].sum() / volumes.sum() for value in TRUST}
-        said = "; ".join(f"in {100.0 * share:.0f} % of the body {TRUST[value]}" for value, share in shares.items())
-        lines.append(f"trust     {said}")
+        meanings = "; ".join(f"in {100.0 * share:.0f} % of the body {TRUST[value]}" for value, share in shares.items())
+        lines.append(f"trust     {meanings}")
     return lines
 
 

@@ -44,14 +44,14 @@ def preset(name: str) -> Preset:
     tables = _tables()
     if name not in tables:
         raise InputError(f"--preset: found '{name}', expected one of {', '.join(tables)}")
-    found: dict[int, str] = {}
+    names: dict[int, str] = {}
     for tissue, labels in tables[name].items():
         if tissue in (_SOURCE, _UNSURE):
             continue
         for label in labels:
             first, _, last = str(label).partition("-")
-            found |= dict.fromkeys(range(int(first), int(last or first) + 1), tissue)
-    return Preset(found, {int(label): said for label, said in tables[name].get(_UNSURE, {}).items()})
+            names |= dict.fromkeys(range(int(first), int(last or first) + 1), tissue)
+    return Preset(names, {int(label): meaning for label, meaning in tables[name].get(_UNSURE, {}).items()})
 
 
 def _tables() -> dict[str, dict[str, Any]]:

@@ -1,0 +1,83 @@
+"""One fit on its way: the size of the mesh's unknown error, and the point that it is at."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sinking_block import OPTIONS, write_sinking
+
+from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.fit_search import FitSearch
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
+from warpbrain.worlds.body.nuisances import UNKNOWN_MESH, Family
+from warpbrain.worlds.body.screened import screened
+
+
+@pytest.fixture(scope="module")
+def sets(tmp_path_factory: pytest.TempPathFactory) -> HypothesisSearch:
+    """Everything weighed, nothing fitted."""
+    case = write_sinking(Path(tmp_path_factory.mktemp("fit")) / "case")
+    return screened(case, "cpu", mesh_error=False, mechanisms=OPTIONS.candidates)
+
+
+@pytest.fixture(scope="module")
+def base(sets: HypothesisSearch) -> Base:
+    """With an unknown error of the mesh of half the noise: the case as declared does not move, and has none."""
+    nuisances, noise = sets.base.nuisances, sets.base.noise
+    *others, last = nuisances.families
+    columns = 0.5 * noise[:, None] * np.random.default_rng(2).normal(size=last.columns.shape)
+    return replace(sets.base, nuisances=replace(nuisances, families=(*others, Family(UNKNOWN_MESH, columns))))
+
+
+@pytest.fixture
+def search(sets: HypothesisSearch, base: Base) -> FitSearch:
+    """A fit of the set with the weight, at the most probable point of the linear model."""
+    weighed = sets.get(("gravity",))
+    assert weighed is not None
+    columns = base.nuisances.at_fraction(weighed.columns, base.nuisances.fraction)
+    fit = FitSearch(base, None, weighed.effects, columns, weighed.marginal)
+    fit.start([weighed.coordinates], base.state)
+    return fit
+
+
+def test_a_result_says_the_point_in_its_own_columns(search):
+    result = search.result()
+    z = np.concatenate([result.nuisances, *result.coefficients])
+    np.testing.assert_allclose(result.residual + result.columns @ z, result.linear, atol=1e-12)
+
+
+def test_another_size_of_the_mesh_error_is_the_same_point(base, search):
+    nuisances = base.nuisances
+    fit = search.result()
+    part, fraction = nuisances.part(UNKNOWN_MESH), 3.0 * nuisances.fraction_of(fit.columns)
+    search.z[part] = np.linspace(-1.0, 1.0, part.stop - part.start)
+    linear = search.residual + search.columns @ search.z
+    other = replace(fit, columns=nuisances.at_fraction(fit.columns, fraction))
+    assert search.update_noise(other)
+    np.testing.assert_allclose(nuisances.fraction_of(search.columns), fraction)
+    np.testing.assert_allclose(search.residual + search.columns @ search.z, linear, atol=1e-12)
+    # now it is fitted with what the result has
+    assert not search.update_noise(other)
+
+
+def test_where_the_stiffness_field_stays_its_step_is_none(base, search):
+    field = search._layout.field
+    columns = np.random.default_rng(3).normal(size=search.columns[:, field].shape)
+    search.columns = search.columns.copy()
+    search.columns[:, field] = base.noise[:, None] * columns
+    step = search._gauss_newton_step(True)
+    assert not step[field].any()
+    assert np.delete(step, np.r_[field]).any()
+    assert search._gauss_newton_step(False)[field].any()
+
+
+def test_a_fit_begins_at_that_of_a_subset(sets, base, search):
+    search.minimise(relinearise=False)
+    fit = search.result()
+    weighed = sets.get(("gravity",))
+    again = FitSearch(base, None, weighed.effects, fit.columns, fit.marginal)
+    z = again.begin_at(fit)
+    again.start([z], fit.state)
+    np.testing.assert_allclose(z, np.concatenate([fit.nuisances, *fit.coefficients]))
+    np.testing.assert_allclose(again.residual, fit.residual, atol=1e-3 * base.typical_noise)
