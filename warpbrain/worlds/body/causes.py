@@ -76,6 +76,8 @@ def _length(cause: Cause, model: GaussianModel) -> float:
     """Of the largest change by one standard deviation of the largest size, in standard deviations of the model."""
     blocks = [float(np.max(cause.sizes)) * place.columns for place in cause.places]
     blocks += [place.mean[:, None] for place in cause.places if place.mean is not None]
+    if not blocks:
+        return 0.0
     return float(np.linalg.norm(model.standardised(np.concatenate(blocks, axis=1)), axis=0).max(initial=0.0))
 
 
