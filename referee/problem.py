@@ -39,7 +39,7 @@ class Problem:
     loads : tuple of Load
         Their derivatives are left to Newton's method, which converges a little more slowly for it.
     springs : callable or None
-        Stiffness (n, 3, 3) [N/m] at a displacement (n, 3) that ties each node to where it was.
+        Stiffness (n, 3, 3) [N/m] at a displacement (n, 3), and the displacement (n, 3) [m] to which it ties each node.
     stress : (m, q, 3, 3) array or None
         Second Piola-Kirchhoff stress [Pa] beside that of the law.
     factor : float
@@ -54,7 +54,7 @@ class Problem:
     held: Bools
     value: Floats
     loads: tuple[Load, ...] = ()
-    springs: Callable[[Floats], Floats] | None = None
+    springs: Callable[[Floats], tuple[Floats, Floats]] | None = None
     stress: Floats | None = None
     factor: float = 1.0
 
@@ -90,7 +90,8 @@ class Problem:
         for load in self.loads:
             out -= load(u)
         if self.springs is not None:
-            out += (self.springs(u) @ u[..., None])[..., 0]
+            stiffness, rest = self.springs(u)
+            out += (stiffness @ (u - rest)[..., None])[..., 0]
         return out
 
     def tangent(self, u: Floats, response: Response) -> bsr_matrix:
@@ -110,4 +111,4 @@ class Problem:
             A = (A * volumes[some, :, None, None]).reshape(-1, q, 3, 3, 3, 3).transpose(0, 1, 3, 2, 4, 5)
             blocks = ((g @ A.reshape(-1, q, 3, 27)).reshape(-1, q, 90, 3) @ np.swapaxes(g, 2, 3)).sum(axis=1)
             local[some] = blocks.reshape(-1, 10, 3, 3, 10).transpose(0, 1, 4, 2, 3)
-        return self.body.pattern.matrix(local, self.springs and self.springs(u))
+        return self.body.pattern.matrix(local, None if self.springs is None else self.springs(u)[0])

@@ -7,8 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from referee.body import Body
 from referee.effects.effect import Effect, Floats, Place
 from referee.problem import Problem
+from warpbrain.recordings.closest import closest_points
 
 #: Stiffness of the skull that stops the tissue, for each area [Pa/m]: a force of 1 N on 1 cm2 enters it by 0.05 mm.
 SKULL = 2e8
@@ -42,19 +44,48 @@ class Contact(Effect):
         loose = body.nodes(self.support) & within
         if self.support == "side":
             loose &= ~body.nodes("fixed")
-        vectors = body.outer.vectors(body.points)
-        areas = np.linalg.norm(body.outer.spread(vectors), axis=1)
-        # the mean of the faces about a node: of their areas a corner gets nothing, and nothing has no direction
-        outward = np.zeros_like(body.points)
-        np.add.at(outward, body.outer.nodes, vectors.sum(axis=1)[:, None])
-        lengths = np.linalg.norm(outward, axis=1)
-        normals = outward / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+        areas = np.linalg.norm(body.outer.spread(body.outer.vectors(body.points)), axis=1)
         # corners of quadratic triangles have no area of their own, but have neighbours that do
-        stiffness = SKULL * np.where(loose, np.maximum(areas, areas[loose].mean()), 0.0) if loose.any() else areas * 0.0
-        stiff = stiffness[:, None, None] * normals[:, :, None] * normals[:, None, :]
+        stiffness = SKULL * np.maximum(areas, areas[loose].mean())[loose] if loose.any() else np.zeros(0)
+        skull = Skull(body)
         held = problem.held & ~loose[:, None]
 
-        def springs(u: Floats) -> Floats:
-            return stiff * ((u * normals).sum(axis=1) > 0.0)[:, None, None]
+        def springs(u: Floats) -> tuple[Floats, Floats]:
+            normals, gap = skull.gap(body.points[loose] + u[loose])
+            pressed = gap > 0.0 if self.lifts else np.ones(len(gap), dtype=bool)
+            stiff, rest = np.zeros((len(u), 3, 3)), u.copy()
+            stiff[loose] = (stiffness * pressed)[:, None, None] * normals[:, :, None] * normals[:, None, :]
+            rest[loose] -= gap[:, None] * normals
+            return stiff, rest
 
-        return replace(problem, held=held, springs=springs if self.lifts else lambda u: stiff)
+        return replace(problem, held=held, springs=springs)
+
+
+class Skull:
+    """The surface of a body at rest, along which it slides however far.
+
+    Parameters
+    ----------
+    body : Body
+    """
+
+    def __init__(self, body: Body) -> None:
+        self._triangles = body.outer.nodes[:, :3]
+        self._points = body.points
+        corners = self._points[self._triangles]
+        vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = np.zeros_like(self._points)
+        np.add.at(normals, self._triangles, vectors[:, None])
+        lengths = np.linalg.norm(normals, axis=1)
+        #: At the corners (n, 3), the mean of the faces about each; zero elsewhere.
+        self._normals = normals / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+
+    def gap(self, places: Floats) -> tuple[Floats, Floats]:
+        """Outward normals (k, 3) at the points of the surface nearest to places (k, 3), and how far out these are."""
+        if not len(places):
+            return np.zeros((0, 3)), np.zeros(0)
+        nearest = closest_points(places, self._points, self._triangles)
+        # they change continuously from face to face
+        normals = (nearest.weights[:, :, None] * self._normals[self._triangles[nearest.face]]).sum(axis=1)
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        return normals, np.einsum("ki,ki->k", places - nearest.position, normals)
