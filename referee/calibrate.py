@@ -94,14 +94,19 @@ _KINDS = ("none", "effect", "two", "outside", "trap")
 
 
 def true_of(outcome: Outcome, tried: Tried) -> bool:
-    """Whether a set of causes is the true one; what is no physics may act beside what is."""
+    """Whether a set of causes is the true one; what is no physics may act beside what is.
+
+    In a trap that may also be noise or gross errors, which every set has.
+    """
+    if outcome.kind == "trap":
+        return not tried.physics and UNKNOWN not in tried.causes
     if tried.physics:
         named = all(map(outcome.right, tried.physics)) and UNKNOWN not in tried.causes
         return named and len(tried.physics) == len(outcome.label["names"])
     return tried.causes == frozenset(_NAMELESS.get(outcome.kind, ("-",)))
 
 
-_NAMELESS: Mapping[str, tuple[str, ...]] = {"none": (), "outside": (UNKNOWN,), "trap": (NOT_PHYSICS,)}
+_NAMELESS: Mapping[str, tuple[str, ...]] = {"none": (), "outside": (UNKNOWN,)}
 
 
 def known_of(file: Path) -> dict[str, Any]:

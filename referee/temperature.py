@@ -1,13 +1,15 @@
 """The temperature of sets of causes that makes the truth most likely.
 
-Weights of sets are not fitted: how often something is missing in a made set, and how often it is unknown, was chosen by
-who made it, and says nothing about anybody else's recordings.
+How often something is missing in a made set, and how often it is unknown, was chosen by who made it, and says nothing
+about anybody else's recordings: weights of sets are fitted beside the temperature, which would otherwise have to make
+up for them, and are not kept.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +21,8 @@ Bools = NDArray[np.bool_]
 
 #: Traits of a set that have a log weight.
 TRAITS = ("nothing", "another", UNKNOWN, NOT_PHYSICS)
-#: Weak normal prior of the logarithm of the temperature, about 0: a calibration set may not tell.
-_SPREAD = 0.7
+#: Weak normal prior of the logarithm of the temperature, about 0, and of the weights: a set may not tell.
+_SPREAD, _SPREAD_OF_WEIGHTS = 0.7, 2.0
 
 
 @dataclass(frozen=True)
@@ -39,11 +41,13 @@ class Scale:
 
     def probabilities(self, hypotheses: Sequence[Tried]) -> Floats:
         """Of each hypothesis of one case."""
+        return self.of_densities(np.array([tried.log_density for tried in hypotheses]), traits(hypotheses))
+
+    def of_densities(self, log_densities: Floats, traits: Floats) -> Floats:
+        """The same from log densities (k,) and `traits` (k, traits)."""
         from scipy.special import softmax
 
-        log = np.array([one.log_density for one in hypotheses])
-        found: Floats = softmax((log + traits(hypotheses) @ self.weights) / self.temperature)
-        return found
+        return np.asarray(softmax((log_densities + traits @ self.weights) / self.temperature))
 
 
 def traits(hypotheses: Sequence[Tried]) -> Floats:
@@ -68,24 +72,36 @@ class Ballot:
     hypotheses: tuple[Tried, ...]
     right: Bools
 
+    @cached_property
+    def densities(self) -> tuple[Floats, Floats]:
+        """Log densities (k,) and `traits` (k, traits) of its hypotheses."""
+        return np.array([tried.log_density for tried in self.hypotheses]), traits(self.hypotheses)
+
 
 def log_loss(scale: Scale, ballots: Sequence[Ballot]) -> float:
     """Mean of minus the logarithm of the probability of what is true."""
-    true = [scale.probabilities(b.hypotheses)[b.right].sum() for b in ballots]
+    true = [scale.of_densities(*ballot.densities)[ballot.right].sum() for ballot in ballots]
     return float(-np.log(np.maximum(true, 1e-300)).mean())
 
 
 def fit(ballots: Sequence[Ballot], weights: Sequence[float] = Scale().weights) -> Scale:
-    """The scale with the temperature of highest likelihood of the truth, with a weak prior to 1."""
-    from scipy.optimize import minimize_scalar
+    """The scale with the temperature of highest likelihood of the truth, and the weights as they are given.
 
-    def scale(logarithm: float) -> Scale:
-        return Scale(float(np.exp(logarithm)), tuple(weights))
+    The likelihood is that with weights of the set the cases are of.
+    """
+    from scipy.optimize import minimize
 
-    def cost(logarithm: float) -> float:
-        return len(ballots) * log_loss(scale(logarithm), ballots) + 0.5 * (logarithm / _SPREAD) ** 2
+    given = np.array(weights)
 
-    return scale(float(minimize_scalar(cost, bounds=(-3.0, 5.0), method="bounded").x))
+    def cost(point: Floats) -> float:
+        scale = Scale(float(np.exp(point[0])), tuple((given + point[1:]).tolist()))
+        prior = (point[0] / _SPREAD) ** 2 + np.sum((point[1:] / _SPREAD_OF_WEIGHTS) ** 2)
+        return len(ballots) * log_loss(scale, ballots) + 0.5 * float(prior)
+
+    best = minimize(
+        cost, np.zeros(1 + len(TRAITS)), method="L-BFGS-B", bounds=[(-3.0, 5.0), *[(-8.0, 8.0)] * len(TRAITS)]
+    )
+    return Scale(float(np.exp(best.x[0])), tuple(given.tolist()))
 
 
 def held_out(ballots: Sequence[Ballot], weights: Sequence[float] = Scale().weights, folds: int = 5) -> list[Floats]:
