@@ -57,6 +57,15 @@ class Patch:
     centre: Floats
     radius: float
 
+    @classmethod
+    def disc(cls, mesh: TetMesh, nodes: str, held: NDArray[np.bool_], centre: Floats, radius: float) -> Patch | None:
+        """Nodes of a held set `nodes` (n,) within a radius [m] of a point; None if they have no face."""
+        members = held & (np.linalg.norm(mesh.points - centre, axis=1) <= radius)
+        if not members[mesh.boundary].all(axis=1).any():
+            return None
+        x, y, z = 1000.0 * centre
+        return cls(f"{nodes}-{1000.0 * radius:.0f}-near-{x:.0f}-{y:.0f}-{z:.0f}", nodes, members, held, centre, radius)
+
 
 @dataclass(frozen=True, eq=False)
 class Situation:
@@ -148,7 +157,8 @@ class Proposal:
     patch : Patch or None
         What the case's own boundaries no longer hold.
     elsewhere : callable, or None
-        Of what acts in one place: from another centre (3,) [m] and radius [m] to the same there.
+        Of what acts in one place: from another centre (3,) [m] and radius [m] to the same there; a patch that would
+        have no face there stays as it is.
     on_surface : bool
         Whether that place is one of the surface.
     history : callable, or None

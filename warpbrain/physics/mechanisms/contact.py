@@ -40,7 +40,7 @@ from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
-from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
+from warpbrain.physics.proposal import Floats, NotTestableError, Patch, Proposal, Situation
 from warpbrain.physics.term import Body, Term
 from warpbrain.physics.words import Values, measured
 
@@ -126,7 +126,7 @@ class Contact(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """What is held slides or lifts off instead; what is free slides along a wall where it was, or meets it."""
-        released = [cls._let_go(state, patch) for patch in situation.held for state in STATES[1:]]
+        released = [cls._let_go(state, patch, situation.mesh) for patch in situation.held for state in STATES[1:]]
         walls = [cls._kept(state, surface) for surface in situation.free for state in STATES[1:]]
         if not released and not walls:
             raise NotTestableError("has no surface")
@@ -151,13 +151,18 @@ class Contact(Mechanism):
         )
 
     @classmethod
-    def _let_go(cls, state: str, patch: Patch) -> Proposal:
+    def _let_go(cls, state: str, patch: Patch, mesh: TetMesh) -> Proposal:
+        def elsewhere(centre: Floats, radius: float) -> Proposal:
+            return cls._let_go(state, Patch.disc(mesh, patch.surface, patch.held, centre, radius) or patch, mesh)
+
         return Proposal.of_one(
             lambda _share: cls(nodes=patch.name, state=state),
             1.0,
             0.5,
             "release",
             patch=patch,
+            elsewhere=None if patch.name == patch.surface else elsewhere,
+            on_surface=True,
             centre=patch.centre,
             radius=patch.radius,
             region=patch.name,

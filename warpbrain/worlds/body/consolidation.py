@@ -22,8 +22,10 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.physics.mechanism import Following
 from warpbrain.physics.term import Coupling, Term
 from warpbrain.simulation.symmetric_factors import symmetric_factors
+from warpbrain.simulation.system import System
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import Sensors
 
@@ -58,6 +60,19 @@ class Course:
             rows = self.sensors.times == time
             remaining[rows] = self.answers[rows] @ (self.first @ (np.exp(-pace * time / self.times) / self.times))
         return remaining
+
+
+def bound_term(system: System, mechanism: Following) -> Term:
+    """A mechanism's term that a system does not have, with arrays of its own, at its final scale."""
+    import warp as wp
+
+    term = mechanism.bind(system)
+    count, nodes = term.stencils.shape
+    p, device = system.precision, system.device
+    blocks = wp.zeros((count, nodes * (nodes + 1) // 2), dtype=p.mat33, device=device)
+    term.place(wp.zeros((count, nodes), dtype=p.vec3, device=device), blocks)
+    term.set_scale(term.factor(np.inf))
+    return term
 
 
 def consolidation(at: Linearisation, term: Term) -> Course:

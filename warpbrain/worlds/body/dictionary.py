@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.arrays import Ints
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
@@ -84,17 +84,8 @@ def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
     held = mesh.node_sets[nodes] & on_surface
     where = mesh.points[held]
     size = float(np.linalg.norm(np.ptp(where, axis=0))) / 2.0
-    parts = [patch_of(mesh, nodes, held, centre, r) for centre in where[spread_points(where, BETWEEN)] for r in RADII]
+    parts = [Patch.disc(mesh, nodes, held, centre, r) for centre in where[spread_points(where, BETWEEN)] for r in RADII]
     return [Patch(nodes, nodes, held, held, where.mean(axis=0), size), *(part for part in parts if part is not None)]
-
-
-def patch_of(mesh: TetMesh, nodes: str, held: Bools, centre: Floats, radius: float) -> Patch | None:
-    """Nodes of a held set within a radius [m] of a point; None if they have no face."""
-    members = held & (np.linalg.norm(mesh.points - centre, axis=1) <= radius)
-    if not members[mesh.boundary].all(axis=1).any():
-        return None
-    x, y, z = 1000.0 * centre
-    return Patch(f"{nodes}-{1000.0 * radius:.0f}-near-{x:.0f}-{y:.0f}-{z:.0f}", nodes, members, held, centre, radius)
 
 
 def dictionary_of(case: Case, kinds: Sequence[str] | None = None, instants: int = 1) -> Dictionary:
@@ -184,11 +175,15 @@ def candidates_at(
         except SolveError as error:
             rejected[kind] = f"{smooth[0].region}: cannot be simulated here: {error}"
         switches = [proposal for proposal in proposals if proposal.is_there_or_not]
-        for proposal, result in zip(switches, _switch_effects(effects, switches), strict=True):
+        for proposal, result in zip(switches, switch_effects(effects, switches), strict=True):
             if isinstance(result, Effect):
                 of_this_kind.append(result)
             else:
                 rejected[kind] = f"{proposal.region}: cannot be simulated here: {result}"
+        within = [effect for effect in of_this_kind if is_linear(effect, effects.at)]
+        if of_this_kind and not within:
+            rejected[kind] = "its effect is not linear here: its usual size would move the body by more than its own"
+        of_this_kind = within
         if of_this_kind:
             of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
             rejected.pop(kind, None)
@@ -199,7 +194,20 @@ def candidates_at(
     return Candidates(tuple(all_effects), of_kind, frozenset(alternatives), rejected, effects)
 
 
-def _switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | InputError | SolveError]:
+def is_linear(effect: Effect, at: Linearisation) -> bool:
+    """Whether an effect is finite and, if it is of no load, a standard deviation moves the body by less than its size.
+
+    A larger response is not linear: that of fibres that stiffen exponentially, in a strained state. Of a load, which is
+    in proportion, a small part may act.
+    """
+    if effect.proposal is None or effect.proposal.follows == "proportional":
+        return bool(np.isfinite(effect.columns).all())
+    largest = float(np.linalg.norm(np.ptp(at.system.model.mesh.points, axis=0)))
+    moved = effect.columns[at.sensors.is_displacement]
+    return bool(np.isfinite(effect.columns).all() and np.abs(moved).max(initial=0.0) < largest)
+
+
+def switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | InputError | SolveError]:
     """Effects of switches, or why there is none; patches that let go have a dense solution each, made in threads."""
 
     def attempt(proposal: Proposal) -> Effect | InputError | SolveError:
@@ -240,8 +248,6 @@ def candidates_about_fit(
     effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=mesh_errors)
     acting_mechanisms = [effect.proposed.make(effect.proposed.mean) for effect in acting]
     acting_kinds = {mechanism.kind for mechanism in acting_mechanisms if not mechanism.several}
-    largest = float(np.linalg.norm(np.ptp(state.system.model.mesh.points, axis=0)))
-    rows = state.sensors.is_displacement
     all_effects: list[Effect] = []
     of_kind: dict[str, Ints] = {}
     for kind, numbers in candidates.of_kind.items():
@@ -250,8 +256,7 @@ def candidates_about_fit(
         of_this_kind = [candidates.effects[k] for k in numbers.tolist()]
         smooth = [k for k in places[kind].tolist() if _is_smooth(of_this_kind[k])]
         for k, effect in zip(smooth, effects.of([of_this_kind[k].proposed for k in smooth]), strict=True):
-            # a response larger than the body is not linear: fibres that stiffen exponentially, in a strained state
-            if np.abs(effect.columns[rows]).max(initial=0.0) < largest:
+            if is_linear(effect, effects.at):
                 of_this_kind[k] = effect
         of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
         all_effects.extend(of_this_kind)

@@ -15,10 +15,9 @@ from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
 from warpbrain.physics.proposal import Proposal
-from warpbrain.physics.term import Term
 from warpbrain.simulation.assumed import substituted
 from warpbrain.simulation.system import System
-from warpbrain.worlds.body.consolidation import Course, consolidation
+from warpbrain.worlds.body.consolidation import Course, bound_term, consolidation
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer, volume_of
 from warpbrain.worlds.body.sensors import Sensors
@@ -139,7 +138,9 @@ class Effects:
     def _courses(self, proposals: Sequence[Proposal]) -> dict[str, Course]:
         """Courses of proposals by the mechanism at their starts, each computed once."""
         started = _started(proposals)
-        return {key: consolidation(self.at, self._bound(cast(Following, flow))) for key, flow in started.items()}
+        system = self.at.system
+        terms = {key: bound_term(system, cast(Following, flow)) for key, flow in started.items()}
+        return {key: consolidation(self.at, term) for key, term in terms.items()}
 
     def _instantaneous(self, proposals: Sequence[Proposal], present: Mechanism | None) -> dict[str, Floats]:
         """Effects (n,) of fading proposals at the instant of the load, by the mechanism at their starts."""
@@ -246,7 +247,7 @@ class Effects:
     def _following(self, mechanism: Following) -> Floats:
         """Internal forces (N, 3) of a term that the system does not have."""
         system = self.at.system
-        term = self._bound(mechanism)
+        term = bound_term(system, mechanism)
         # a term with memory has its instantaneous stress; how that fades follows from its history
         term.set_time_step(0.0 if term.forgets_in is not None else np.inf)
         system.u.assign(self.at.u)
@@ -254,19 +255,6 @@ class Effects:
         forces = np.zeros((system.size, 3))
         np.add.at(forces, term.stencils, term.forces.numpy())
         return forces
-
-    def _bound(self, mechanism: Following) -> Term:
-        """A term that the system does not have, with arrays of its own, at its final scale."""
-        import warp as wp
-
-        system = self.at.system
-        term = mechanism.bind(system)
-        count, nodes = term.stencils.shape
-        p, device = system.precision, system.device
-        blocks = wp.zeros((count, nodes * (nodes + 1) // 2), dtype=p.mat33, device=device)
-        term.place(wp.zeros((count, nodes), dtype=p.vec3, device=device), blocks)
-        term.set_scale(term.factor(np.inf))
-        return term
 
     def _substituting(self, mechanism: Substituting) -> Floats:
         """What other laws add to the internal forces (N, 3)."""

@@ -11,6 +11,7 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
 from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.dictionary import is_linear
 from warpbrain.worlds.body.effects import Effect, Effects, column_slices, parts_of, width_of
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
@@ -85,26 +86,32 @@ def columns_about(
         Those that were given if the state cannot be linearised.
     at : Linearisation or None
         If the state was linearised.
+
+    Raises
+    ------
+    SolveError
+        If a mechanism is not linear there.
     """
-    columns, at = columns.copy(), None
-    # a state that was followed over time has no one tangent
-    if all(effect.columns_at is None for effect in effects):
-        try:
-            at = Linearisation(state.system, state.u, state.reactions, state.sensors)
-        except SolveError:
-            return columns, None
-        relaxed = _relaxation_factor(effects, [z[part] for part in layout.effects], state.sensors)
-        tissue = relaxed * tissue_columns(at, base.states, state.hypothesis.theta, base.prior)
-        columns[:, layout.tissue] = tissue + mesh_by_tissue(state.sensors, mesh_errors)
-        columns[:, layout.field] = relaxed * field_columns(at, base.states)
+    try:
+        at = Linearisation(state.system, state.u, state.reactions, state.sensors)
+    except SolveError:
+        return columns, None
+    columns = columns.copy()
+    relaxed = _relaxation_factor(effects, [z[part] for part in layout.effects], state.sensors)
+    tissue = relaxed * tissue_columns(at, base.states, state.hypothesis.theta, base.prior)
+    columns[:, layout.tissue] = tissue + mesh_by_tissue(state.sensors, mesh_errors)
+    columns[:, layout.field] = relaxed * field_columns(at, base.states)
     first = layout.coefficients.start
     for effect, part in zip(effects, layout.effects, strict=True):
         c = effect.coefficients(z[part])
         if effect.columns_at is not None:
             columns[:, part] = effect.columns_at(c)
-        elif at is not None and not effect.proposed.is_there_or_not:
+        elif not effect.proposed.is_there_or_not:
             made = Effects(at, mesh_errors=mesh_errors)
-            columns[:, part] = made.of([_proposal_about(effect.proposed, c)], effect.proposed.make(c))[0].columns
+            about = made.of([_proposal_about(effect.proposed, c)], effect.proposed.make(c))[0]
+            if not is_linear(about, at):
+                raise SolveError(f"{effect.proposed.region or 'it'}: its effect is not linear here")
+            columns[:, part] = about.columns
         else:
             continue
         if mesh_share is not None:

@@ -7,6 +7,7 @@ its cell, and the best of these is where a fit begins.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +16,11 @@ from warpbrain.arrays import Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.gross_errors import with_gross_errors
 from warpbrain.inference.noise import outliers
-from warpbrain.physics.proposal import Proposal
+from warpbrain.physics.proposal import Patch, Proposal
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import scaled
+from warpbrain.worlds.body.dictionary import switch_effects
 from warpbrain.worlds.body.effects import Effect, Effects
 
 #: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
@@ -63,13 +65,20 @@ def best_in_cell(
 
     best, gain = effect, 0.0
     for step in (0.5, 0.25):
-        around = effects.of(_around(base, best, step * spacing))
+        around = _effects_of(effects, _around(base, best, step * spacing))
         tried = [best, *(scaled(other, size) for other in around)]
         logs = np.array(in_threads(log_density, tried))
         if step == 0.5:
             gain = float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs[0])
         best = tried[int(np.argmax(logs))]
     return BestInCell(best, gain)
+
+
+def _effects_of(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect]:
+    """Effects of places, less those where too little would hold the body."""
+    if not proposals[0].is_there_or_not:
+        return effects.of(proposals)
+    return [result for result in switch_effects(effects, proposals) if isinstance(result, Effect)]
 
 
 def _around(base: Base, effect: Effect, step: float) -> list[Proposal]:
@@ -81,16 +90,19 @@ def _around(base: Base, effect: Effect, step: float) -> list[Proposal]:
     for offset, radius in itertools.product(offsets, _RADII):
         centre = proposed.centre + offset
         if proposed.on_surface:
-            centre = _on_surface(base, centre)
+            centre = _on_surface(base, centre, proposed.patch)
         if offset.any() or radius != 1.0:
             proposals.append(proposed.elsewhere(centre, radius * proposed.radius))
     return proposals
 
 
-def _on_surface(base: Base, centre: Floats) -> Floats:
-    """The nearest middle of a face that is free."""
+def _on_surface(base: Base, centre: Floats, patch: Patch | None) -> Floats:
+    """The nearest middle of a face that is free, or that is of the held surface of a patch."""
     mesh = base.at.system.model.mesh
-    held = np.asarray(base.at.system.model.constrained.reshape(-1, 3).all(axis=1))
-    faces = mesh.boundary[~held[mesh.boundary].any(axis=1)]
+    if patch is None:
+        held = np.asarray(base.at.system.model.constrained.reshape(-1, 3).all(axis=1))
+        faces = mesh.boundary[~held[mesh.boundary].any(axis=1)]
+    else:
+        faces = mesh.boundary[patch.held[mesh.boundary].all(axis=1)]
     middles = mesh.points[faces].mean(axis=1)
     return np.asarray(middles[np.argmin(np.sum((middles - centre) ** 2, axis=1))])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.registration import realigned, registration_of
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.composition import CompositionError
-from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanism import Following, Mechanism
 from warpbrain.physics.proposal import Patch
 from warpbrain.simulation.assumed import all_substituted
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
@@ -28,6 +29,7 @@ from warpbrain.simulation.model import Material
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
+from warpbrain.worlds.body.consolidation import bound_term, consolidation
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import Sensors, sensors_at
 from warpbrain.worlds.body.stiffness_field import StiffnessField, stiffness_modes
@@ -174,11 +176,14 @@ class States:
         SolveError
             If there is none.
         """
-        self.solves += 1
         system = self._system(hypothesis)
+        flowing = self._flowing(hypothesis, system)
+        if flowing is not None:
+            return self._drained(hypothesis, flowing, start, expected, iterations, nearby)
+        self.solves += 1
         model, external = system.model, system.model.external_forces()
         options = EquilibriumOptions(tolerance=TOLERANCE, max_total_newton=iterations)
-        # relaxing stress or a fluid of its own: no other memory of a term changes a state in time
+        # relaxing stress or a fluid of the case's own: no other memory of a term changes a state in time
         in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
         if in_time and np.isfinite(self.times[0]):
             starts, factors = course or (() if start is None else (start,)), self._factors_of(system)
@@ -197,6 +202,34 @@ class States:
         reactions = [model.reactions(state.internal, external) for state in states]
         sensors = self._sensors([(state.u, R) for state, R in zip(states, reactions, strict=True)], expected)
         return SolvedState(hypothesis, system, states[-1].u, reactions[-1], sensors, tuple(course))
+
+    def _flowing(self, hypothesis: Hypothesis, system: System) -> Mechanism | None:
+        """The mechanism of a hypothesis whose fluid flows while recordings are made, where no stress relaxes, too."""
+        followed = np.isfinite(self.times[0]) and all(term.forgets_in is None for term in system.terms)
+        if not followed or all(term.coupling is None for term in system.terms):
+            return None
+        bound = ((m, bound_term(system, m)) for m in hypothesis.mechanisms if isinstance(m, Following))
+        return next((cast(Mechanism, m) for m, term in bound if term.coupling is not None), None)
+
+    def _drained(
+        self,
+        hypothesis: Hypothesis,
+        flowing: Mechanism,
+        start: Floats | None,
+        expected: Difference | None,
+        iterations: int,
+        nearby: Linearisation | None,
+    ) -> SolvedState:
+        """The state in the end, and sensors on the way to it, linear about it.
+
+        Step by step it takes minutes, and a fit has a hundred states. What is recorded on the way is 4 to 8 % off.
+        """
+        others = tuple(mechanism for mechanism in hypothesis.mechanisms if mechanism is not flowing)
+        end = self.solve(replace(hypothesis, mechanisms=others), start, expected, (), iterations, nearby)
+        at = Linearisation(end.system, end.u, end.reactions, end.sensors)
+        change = consolidation(at, bound_term(end.system, cast(Following, flowing))).at(1.0)
+        sensors = replace(end.sensors, residual=end.sensors.residual - change, computed=end.sensors.computed + change)
+        return replace(end, hypothesis=hypothesis, sensors=sensors)
 
     def corrected(self, state: SolvedState, expected: Difference) -> SolvedState:
         """A state that does not change in time, with sensors where it is without the error of the mesh."""

@@ -11,6 +11,7 @@ from warpbrain.inference.hypothesis import Hypothesis
 from warpbrain.inference.noise import scales
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses
+from warpbrain.worlds.body.dictionary import BETWEEN
 from warpbrain.worlds.body.effects import Effect, Effects, width_of
 from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.placing import best_in_cell
@@ -27,7 +28,8 @@ def weigh(
     """A hypothesis of screening in the linear model about the base, or about a fit, with gross errors of its own.
 
     Screening gives all hypotheses the gross errors of one model. What this one gains by having its own is added to its
-    log evidence.
+    log evidence: the mean over its likeliest places, since points that a local cause moves far are gross errors where
+    it is thought to be elsewhere.
 
     Parameters
     ----------
@@ -40,6 +42,21 @@ def weigh(
     about : WeightedSet, optional
         A fitted set, whose causes act beside those of the hypothesis; the base, where no cause acts, unless given.
     """
+    configurations = (hypothesis.best, *hypothesis.elsewhere)
+    weighed = [
+        _weigh_at(base, replace(hypothesis, best=configuration), causes, screened, about)
+        for configuration in configurations
+    ]
+    shares = np.array([configuration.log_density for configuration in configurations])
+    logs = np.array([candidate.hypothesis.log_evidence for candidate in weighed]) + shares
+    log_evidence = float(np.logaddexp.reduce(logs) - np.logaddexp.reduce(shares))
+    return weighed[int(np.argmax(logs))].with_evidence(log_evidence)
+
+
+def _weigh_at(
+    base: Base, hypothesis: Hypothesis, causes: BodyCauses, screened: GaussianModel, about: WeightedSet | None
+) -> WeightedSet:
+    """The same as if its best configuration stood for all places."""
     acting: tuple[Effect, ...]
     if about is None:
         start, model_columns, acting = base.residual, base.model.columns, ()
@@ -86,6 +103,7 @@ def with_refined_places(
         Effects, the first ones, whose places stay: those of the fit that the set is linear about.
     """
     effects = list(candidate.effects)
+    placed = len(effects) if candidate.refined else placed
     for number, (effect, part) in enumerate(zip(candidate.effects, candidate.slices, strict=True)):
         if number < placed or effect.proposal is None or effect.proposed.elsewhere is None:
             continue
@@ -95,7 +113,10 @@ def with_refined_places(
         usual = effect.proposed.elsewhere(effect.proposed.centre, effect.proposed.radius)
         size = float(np.max(effect.proposed.sd / usual.sd))
         residual = candidate.residual + effect.mean
-        best = best_in_cell(base, source, effect, size, spacing, without, residual)
+        # what lets go has its columns at the base; centres are as far apart as those of a scan's patches
+        at_base = effect.proposed.is_there_or_not
+        apart, about = (BETWEEN, base.effects) if at_base else (spacing, source)
+        best = best_in_cell(base, about, effect, size, apart, without, residual)
         columns = candidate.columns.copy()
         columns[:, part] = best.effect.columns
         residual = residual - best.effect.mean
@@ -104,4 +125,4 @@ def with_refined_places(
         candidate = replace(
             candidate, effects=tuple(effects), residual=residual, columns=columns, marginal=refined
         ).with_evidence(candidate.hypothesis.log_evidence + best.gain)
-    return candidate
+    return replace(candidate, refined=True)
