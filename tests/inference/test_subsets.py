@@ -140,3 +140,29 @@ def test_likely_places_are_those_of_the_greatest_density():
             for place in cause.places
         ]
         assert set(found[cause.name].tolist()) == set(np.argsort(density)[-2:].tolist())
+
+
+def test_a_single_cause_keeps_its_next_best_places():
+    random = np.random.default_rng(3)
+    given, causes = model(random), some_causes(random)
+    residual = given.draws(1, random)[:, 0] + causes[0].places[2].columns @ random.normal(size=3)
+    found = posterior(given, residual, causes, Search(SCALES.scales, SCALES.log_scale_prior, elsewhere=2))
+    for hypothesis in found.hypotheses:
+        if len(hypothesis.causes) != 1:
+            assert hypothesis.elsewhere == ()
+            continue
+        [cause] = [c for c in causes if (c.name,) == hypothesis.causes]
+        tried = [hypothesis.best, *hypothesis.elsewhere]
+        assert len(tried) == min(3, len(cause.places))
+        assert len({configuration.members[0].place for configuration in tried}) == len(tried)
+        logs = [configuration.log_density for configuration in tried]
+        assert logs == sorted(logs, reverse=True)
+        # each is the best of its place
+        for configuration in tried:
+            [member] = configuration.members
+            only = Cause(cause.name, (cause.places[member.place],), cause.log_prior, cause.sizes)
+            alone = posterior(given, residual, [only], SCALES)
+            best = next(h.best for h in alone.hypotheses if h.causes)
+            total = sum(place.weight for place in cause.places)
+            weight = np.log(cause.places[member.place].weight / total)
+            assert configuration.log_density == pytest.approx(best.log_density + weight)

@@ -43,6 +43,8 @@ class Hypothesis:
         Sum of the log odds of its causes.
     best : Configuration
         The most probable one.
+    elsewhere : tuple of Configuration
+        Of a single cause, the most probable ones at other places, the best first.
     """
 
     causes: tuple[str, ...]
@@ -50,6 +52,7 @@ class Hypothesis:
     log_evidence: float
     log_prior: float
     best: Configuration
+    elsewhere: tuple[Configuration, ...] = ()
 
     def of_kind(self, kind: Kind) -> tuple[str, ...]:
         """Its causes of a kind."""

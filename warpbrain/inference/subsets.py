@@ -34,6 +34,8 @@ class Search:
         Causes of a set at most.
     negligible : float
         Pairs and triples are left out at scales where every single cause is below this part of the greatest density.
+    elsewhere : int
+        Configurations of each single cause at other places than the best that are kept.
     """
 
     scales: Floats
@@ -42,14 +44,18 @@ class Search:
     beam: int = 30
     most: int = 3
     negligible: float = 1e-4
+    elsewhere: int = 0
 
 
 class _Sums:
     """Sums of densities by sets of causes, as logarithms, and the best configuration of each."""
 
-    def __init__(self) -> None:
+    def __init__(self, places: int = 0) -> None:
         self.logs: dict[frozenset[int], float] = {}
         self.best: dict[frozenset[int], Configuration] = {}
+        #: Of each single cause, the best configuration at each of so many places.
+        self.at_places: dict[int, dict[int, Configuration]] = {}
+        self._places = places
 
     def add(self, causes: frozenset[int], log: float, best: Configuration) -> None:
         self.logs[causes] = float(np.logaddexp(self.logs.get(causes, -np.inf), log))
@@ -67,11 +73,38 @@ class _Sums:
             if blocks.cause[low] in acting:
                 continue
             of_cause = logs[low - start : high - start]
-            row, size = np.unravel_index(int(np.argmax(of_cause)), of_cause.shape)
-            last = Member(int(blocks.cause[low]), int(blocks.place[low + row]), int(size))
-            best.append(Configuration((*members, last), scale, float(of_cause[row, size])))
-            self.add(frozenset(acting | {last.cause}), float(np.logaddexp.reduce(of_cause, axis=None)), best[-1])
+            greatest = of_cause.max(axis=1)
+            row = int(np.argmax(greatest))
+            best.append(self._configuration(blocks, low + row, of_cause[row], members, scale))
+            causes = frozenset(acting | {best[-1].members[-1].cause})
+            self.add(causes, float(np.logaddexp.reduce(of_cause, axis=None)), best[-1])
+            for other in np.argsort(-greatest)[: 0 if members else self._places].tolist():
+                self._add_place(self._configuration(blocks, low + other, of_cause[other], (), scale))
         return best
+
+    @staticmethod
+    def _configuration(
+        blocks: Blocks, number: int, logs: Floats, members: tuple[Member, ...], scale: float
+    ) -> Configuration:
+        """A block with its best size, of which there are log densities (s,), after other members."""
+        size = int(np.argmax(logs))
+        last = Member(int(blocks.cause[number]), int(blocks.place[number]), size)
+        return Configuration((*members, last), scale, float(logs[size]))
+
+    def _add_place(self, configuration: Configuration) -> None:
+        [member] = configuration.members
+        places = self.at_places.setdefault(member.cause, {})
+        if member.place not in places or configuration.log_density > places[member.place].log_density:
+            places[member.place] = configuration
+
+    def elsewhere(self, causes: frozenset[int]) -> tuple[Configuration, ...]:
+        """Of a single cause, the best configurations at other places than the best."""
+        if len(causes) != 1:
+            return ()
+        [cause] = causes
+        at_best = self.best[causes].members[0].place
+        others = [configuration for place, configuration in self.at_places[cause].items() if place != at_best]
+        return tuple(sorted(others, key=lambda configuration: -configuration.log_density)[: self._places - 1])
 
 
 def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], search: Search) -> Posterior:
@@ -85,7 +118,7 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
     causes : sequence of Cause
     search : Search
     """
-    sums = _Sums()
+    sums = _Sums(1 + search.elsewhere)
     by_scale: list[tuple[float, float, Blocks, Floats]] = []
     scales = search.scales.tolist()
     at_scales = Blocks.at_scales(model, scales, residual, causes) if causes else iter([None] * len(scales))
@@ -110,6 +143,7 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
             log,
             sum(causes[c].log_prior for c in members),
             sums.best[members],
+            sums.elsewhere(members),
         )
         for members, log in sums.logs.items()
     ]

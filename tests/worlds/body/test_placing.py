@@ -5,6 +5,8 @@ import numpy as np
 from warpbrain.inference.gross_errors import with_gross_errors
 from warpbrain.inference.noise import outliers
 from warpbrain.worlds.body.causes import scaled
+from warpbrain.worlds.body.dictionary import BETWEEN, dictionary_of, switch_effects
+from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.placing import best_in_cell
 
 
@@ -34,3 +36,24 @@ def test_a_cell_is_as_probable_as_the_mean_of_its_places_each_with_gross_errors_
     # the mean of 21 places is at most as probable as the best of them, and at least its share of that
     assert -np.log(21.0) <= best.gain <= better
     assert best.gain >= log_evidence(scaled(true, size)) - log_evidence(start) - np.log(21.0) - 1e-6
+
+
+def test_a_patch_that_lets_go_is_found_between_the_patches_of_a_scan(small_diagnosis):
+    base = small_diagnosis.search.base
+    proposals = dictionary_of(base.states.case, ("contact",)).proposals["contact"]
+    discs = [proposal for proposal in proposals if proposal.elsewhere is not None and proposal.make(np.ones(1)).lifts]
+    effects = [one for one in switch_effects(base.effects, discs) if isinstance(one, Effect)]
+    effect = max(effects, key=lambda effect: np.linalg.norm(effect.columns))
+    proposed = effect.proposed
+    assert proposed.patch.members.sum() < proposed.patch.held.sum()
+    true = switch_effects(base.effects, [proposed.elsewhere(proposed.centre, 1.25 * proposed.radius)])[0]
+    assert true.proposed.patch.members.sum() > proposed.patch.members.sum()
+    residual = true.mean
+    best = best_in_cell(base, base.effects, effect, 1.0, BETWEEN, base.model, residual)
+    assert best.effect.proposed.is_there_or_not
+
+    def log_evidence(tried):
+        model = base.model.with_columns(tried.columns)
+        return with_gross_errors(model, residual - tried.mean, base.points, outliers()).log_density
+
+    assert log_evidence(best.effect) >= max(log_evidence(true), log_evidence(effect)) - 1e-6

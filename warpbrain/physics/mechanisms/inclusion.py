@@ -24,7 +24,7 @@ from warpbrain.physics.values import Smallest
 from warpbrain.physics.words import Values, measured, number, radius_in_words
 
 #: Where it is looked for: standard deviation of the logarithm of the ratio, and radii of balls [m].
-_USUAL, _RADII = 1.2, (0.012, 0.018)
+_USUAL, _RADII = 1.2, (0.012, 0.018, 0.027)
 
 
 @dataclass(frozen=True, kw_only=True)

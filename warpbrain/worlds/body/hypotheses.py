@@ -35,6 +35,8 @@ from warpbrain.worlds.listener import Listener
 
 #: Places of each cause of which pairs are made, and sets that are weighed with gross errors of their own.
 _PLACES, _SETS = 20, 12
+#: Other places at which a single cause is weighed with gross errors of its own.
+_ELSEWHERE = 2
 #: Places of each cause whose columns are made anew about a fit.
 _PLACES_ABOUT_FIT = 8
 #: How often at most a set is fitted, or its supersets are weighed.
@@ -117,6 +119,13 @@ class HypothesisSearch:
                 known = self._sets.get(candidate.names)
                 if known is None or candidate.hypothesis.log_evidence > known.hypothesis.log_evidence:
                     self._sets[candidate.names] = candidate
+        # a local cause that has been missed by half a cell seems to do nothing
+        singles = [
+            candidate for candidate in self._sets.values() if len(candidate.mechanisms) == len(candidate.names) == 1
+        ]
+        refine = partial(with_refined_places, base, spacing=self.spacing, source=base.effects)
+        for candidate in in_threads(refine, singles):
+            self._sets[candidate.names] = candidate
 
     def fit(self, alone: bool = False) -> None:
         """Fit sets, and weigh supersets of those that are fitted, until no fit can be expected to change the verdict.
@@ -265,7 +274,12 @@ class HypothesisSearch:
         unscaled = GaussianModel(noise_factor / fitted.marginal.scale, fitted.columns)
         screened = posterior(unscaled, fitted.residual, causes.causes, _search(most=1))
         hypotheses = [hypothesis for hypothesis in _most_probable(screened, singles=False) if hypothesis.causes]
-        work = partial(weigh, self.base, causes=causes, screened=unscaled, about=fitted)
+        source, placed = candidates.source, len(fitted.effects)
+
+        def work(hypothesis: Hypothesis) -> WeightedSet:
+            candidate = weigh(self.base, hypothesis, causes, unscaled, fitted)
+            return with_refined_places(self.base, candidate, self.spacing, source, placed)
+
         for hypothesis, candidate in zip(hypotheses, in_threads(work, hypotheses), strict=True):
             # both with gross errors of their own
             gain = candidate.hypothesis.log_evidence - fitted.marginal.log_evidence
@@ -289,7 +303,7 @@ def _probabilities(sets: Iterable[WeightedSet]) -> Floats:
 
 def _search(most: int) -> Search:
     values, log_prior = scales()
-    return Search(values, log_prior, places=_PLACES, beam=0, most=most)
+    return Search(values, log_prior, places=_PLACES, beam=0, most=most, elsewhere=_ELSEWHERE)
 
 
 def _most_probable(screened: Posterior, singles: bool = True) -> list[Hypothesis]:

@@ -36,6 +36,8 @@ class WeightedSet:
     inherited_gain : float or None
         Part of its log evidence that the fit of some of its causes (or of none) has gained over the linear model, until
         it is fitted itself. None if its linear model is about a fit, whose gain it has already.
+    refined : bool
+        Whether its mechanisms are at the best places within their cells.
     """
 
     hypothesis: Hypothesis
@@ -46,6 +48,7 @@ class WeightedSet:
     refit: Refit | None = None
     failure: str = ""
     inherited_gain: float | None = 0.0
+    refined: bool = False
 
     @property
     def names(self) -> frozenset[str]:
