@@ -94,7 +94,12 @@ def _data(image: Any) -> str:
 
 
 def in_three_dimensions(
-    mesh: TetMesh, u: Floats, fields: Sequence[Field], moved: Moved, places: Sequence[float]
+    mesh: TetMesh,
+    u: Floats,
+    fields: Sequence[Field],
+    moved: Moved,
+    places: Sequence[float],
+    exaggeration: float | None = None,
 ) -> Section:
     """The view of a displaced body, with what was recorded and computed at points.
 
@@ -108,10 +113,12 @@ def in_three_dimensions(
     moved : Moved
     places : sequence of float
         Of the axial, the coronal and the sagittal cut [m].
+    exaggeration : float, optional
+        How many times as large motion is shown at first; chosen so that it is seen.
     """
     sizes = np.linalg.norm(u, axis=1)
     large, size = float(np.percentile(sizes, 99.5)), float(np.ptp(mesh.points, axis=0).max())
-    factor = round_factor(_MOVED * size, large)
+    factor = round_factor(_MOVED * size, large) if exaggeration is None else exaggeration
     shown = [Field("displacement", "displacement [mm]", MILLIMETRES * sizes, 0.0, MILLIMETRES * large or 1.0), *fields]
     arrows = []
     if len(moved.where):

@@ -37,10 +37,10 @@ def viewer(view: View, legend: str, note: str) -> str:
         else ""
     )
     ball = '<label><input type="checkbox" name="ball" checked>located ball</label>' if scene["ball"] else ""
+    factor = view.exaggeration
     moves = (
-        '<label>motion <input type="range" name="moves" min="0" '
-        f'max="{2.0 * view.exaggeration:g}" step="{view.exaggeration / 20.0:g}" value="{view.exaggeration:g}">'
-        f"<output>{view.exaggeration:g} times</output></label>"
+        f'<label>motion <input type="range" name="moves" min="0" max="{2.0 * factor or 2.0:g}" '
+        f'step="{factor / 20.0 or 0.1:g}" value="{factor:g}"><output>{factor:g} times</output></label>'
         if view.u is not None
         else ""
     )

@@ -63,8 +63,9 @@ def draw_after(plotter: Any, scene: Scene, exaggeration: float) -> None:
     body = body_of(scene, before=False)
     for part in cut_open(body, scene):
         _coloured(plotter, part.warp_by_vector(_U, factor=exaggeration), scene, **_matt(part))
-    # its far side, which the body hides but where it has left
-    plotter.add_mesh(_surface(body), color=GHOST, opacity=0.35, culling="front", lighting=False)
+    # the far side of its surface, which the body hides but where it has left
+    ghost = cut_open(body, scene)[0]
+    plotter.add_mesh(ghost, color=GHOST, opacity=0.35, culling="front", lighting=False)
 
 
 def body_of(scene: Scene, before: bool) -> Any:
@@ -203,3 +204,30 @@ def _thinned(points: Floats, width: float) -> Any:
     first = np.ones(len(order), dtype=bool)
     first[1:] = np.any(np.diff(cells[order], axis=0) != 0, axis=1)
     return np.sort(order[first])
+
+
+def interactive(scene: Scene, exaggeration: float | None, off_screen: bool) -> Any:
+    """A window with the body after, a slider for how far it moves, a scale and the directions of the patient."""
+    at_first = scene.exaggeration if exaggeration is None else exaggeration
+    plotter = pyvista.Plotter(off_screen=off_screen, window_size=(1200, 900))
+    shown: list[Any] = []
+
+    def show(factor: float) -> None:
+        for actor in shown:
+            plotter.remove_actor(actor, render=False)
+        before = set(plotter.renderer.actors)
+        draw_after(plotter, scene, factor)
+        shown[:] = [actor for name, actor in plotter.renderer.actors.items() if name not in before]
+
+    plotter.set_background("white")
+    show(at_first)
+    plotter.add_slider_widget(
+        show, (0.0, max(2.0 * at_first, 1.0)), value=at_first, title="motion: times as large as it is", fmt="%.3g",
+        color="#333333", pointa=(0.35, 0.92), pointb=(0.95, 0.92), interaction_event="end", style="modern",
+    )  # fmt: skip
+    plotter.add_scalar_bar(
+        title="displacement [mm]\n", mapper=shown[0].mapper, color="#333333", n_labels=5, fmt="%.3g", position_x=0.3
+    )
+    plotter.add_axes(xlabel="R", ylabel="A", zlabel="S", color="#333333")
+    plotter.view_vector(tuple(scene.side * (0.8, 0.85, 0.62)), viewup=(0.0, 0.0, 1.0))
+    return plotter
