@@ -172,13 +172,14 @@ def _cut(view: View, name: str, axis: int, place: float) -> dict[str, Any]:
     origin = np.zeros(3)
     origin[axis] = place
     section = grid.slice(normal=np.eye(3)[axis], origin=origin).triangulate()
-    triangles = section.faces.reshape(-1, 4)[:, 1:] if section.n_points else np.zeros((0, 3))
+    # a plane beside the body has neither points nor what they carry
+    there = section.point_data if section.n_points else dict.fromkeys(grid.point_data.keys(), np.zeros(0))
     return {
         "name": name,
         "points": _packed(MILLIMETRES * section.points),
-        "triangles": _packed(triangles, np.uint32),
-        "moves": None if view.u is None else _packed(MILLIMETRES * section.point_data["moves"]),
-        "values": [_packed(section.point_data[f"field {k}"]) for k in range(len(view.fields))],
+        "triangles": _packed(section.regular_faces if section.n_cells else np.zeros(0), np.uint32),
+        "moves": None if view.u is None else _packed(MILLIMETRES * there["moves"]),
+        "values": [_packed(there[f"field {k}"]) for k in range(len(view.fields))],
     }
 
 
