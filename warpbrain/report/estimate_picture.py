@@ -139,7 +139,7 @@ def write_residuals(path: Path, posterior: Posterior) -> None:
     figure = Figure(figsize=(13.5, 5.0), layout="constrained")
     axes = figure.subplots(1, 3)
     top = max(float(np.percentile(lengths, 98)), 1e-3) if len(lengths) else 1.0
-    shown = None
+    shown: Any = None
     order = np.argsort(lengths)
     for column, (view, place) in enumerate(
         zip(views.VIEWS, views.places(posterior.case.mesh, views.resected_elements(posterior.case.mesh)), strict=True)

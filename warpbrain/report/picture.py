@@ -139,7 +139,7 @@ def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], mo
     places[2] = corner[2]
     return Scene(
         points=MILLIMETRES * points,
-        tetrahedra=tetrahedra,
+        tetrahedra=tetrahedra.astype(np.int64),
         removed=gone,
         colours=np.round(255.0 * colours).astype(np.uint8),
         u=MILLIMETRES * np.concatenate([u, np.zeros((len(points) - len(u), 3))]),
@@ -239,9 +239,9 @@ def write_picture(path: Path, pictures: Pictures, title: str, subtitles: Sequenc
 
     scene, lines = pictures.scene, len(subtitles) + 1
     high = 9.8 + 0.24 * lines
-    figure = Figure(figsize=(13.8, high), layout="constrained", facecolor="white")
+    figure = Figure(figsize=(13.8, high), facecolor="white")
     # room for the title, which has any number of lines
-    figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, 1.0 - 0.24 * lines / high))
+    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - 0.24 * lines / high))
     axes = figure.subplots(2, 3).ravel()
     for panel, (name, image) in zip(axes, pictures.images.items(), strict=True):
         _show(panel, image, annotations_of(pictures, name))

@@ -37,8 +37,8 @@ def write_view_page(path: Path, state: SavedState, exaggeration: float | None) -
     fields = []
     if state.deviation is not None:
         known = MILLIMETRES * state.deviation
-        top = float(known.max()) or 1.0
-        fields.append(Field("standard deviation", "standard deviation of the displacement [mm]", known, 0.0, top))
+        highest = float(known.max()) or 1.0
+        fields.append(Field("standard deviation", "standard deviation of the displacement [mm]", known, 0.0, highest))
     if state.trust is not None:
         label = "1: recordings see it, 2: they do not, 3: something is left there"
         fields.append(Field("trust", label, state.trust.astype(np.float64), 1.0, float(LEFT)))
