@@ -42,7 +42,7 @@ def test_a_state_that_does_not_move_is_not_worse():
 def test_forces_are_not_lengths():
     said = explained([entry("cell", 0.1, 0.2, unit="N")])
     assert (said.verdict, said.before) == (UNKNOWN, None)
-    assert said.sentences == ("It explains 'cell' worse than no force at all: RMSE 0.200 N with it, 0.100 N without.",)
+    assert said.sentences == ("It explains 'cell' worse than no force at all: RMSE 0.2 N with it, 0.1 N without.",)
 
 
 def test_nothing_recorded():

@@ -14,7 +14,7 @@ from warpbrain.recordings.recording import PointsRecording
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, in_three_dimensions
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure
-from warpbrain.report.explained import Explained, explained
+from warpbrain.report.explained import Explained, explained, number
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.page.document import Section, document, header, listed, section, text, write_document
 from warpbrain.report.page.figures import inlined
@@ -170,10 +170,10 @@ def _recordings(said: Mapping[str, Any], posterior: Posterior) -> Section:
             [
                 text(one["name"]),
                 f"{one['count']}",
-                f"{one['root_mean_square_before']:.3f}",
-                f"{one['root_mean_square_after']:.3f}",
-                f"{one['root_mean_square_of_run']:.3f}",
-                "" if noise is None else f"{noise:.3f}",
+                number(one["root_mean_square_before"], one["unit"]),
+                number(one["root_mean_square_after"], one["unit"]),
+                number(one["root_mean_square_of_run"], one["unit"]),
+                "" if noise is None else number(noise, one["unit"]),
                 *(f"{100.0 * cover[key]:.0f} %" if key in cover else "" for key in ("50 %", "95 %")),
                 f"{len(one['gross_errors'])}",
                 text(one["unit"]),

@@ -52,7 +52,8 @@ def explained(entries: Sequence[Mapping[str, Any]], what: str = "this simulation
     worse = [one for one in entries if one["after"] > one["before"]]
     sentences += [
         f"It explains '{one['name']}' worse than {_NOTHING.get(one['unit'], 'nothing')} at all: RMSE "
-        f"{one['after']:.3f} {one['unit']} with it, {one['before']:.3f} {one['unit']} without."
+        f"{number(one['after'], one['unit'])} {one['unit']} with it, {number(one['before'], one['unit'])} "
+        f"{one['unit']} without."
         for one in worse
     ]
     verdict = NEARER
@@ -63,6 +64,11 @@ def explained(entries: Sequence[Mapping[str, Any]], what: str = "this simulation
     elif worse:
         verdict = IN_PART
     return Explained(verdict, before, after, tuple(sentences))
+
+
+def number(value: float, unit: str) -> str:
+    """An error as people read it: micrometres of lengths, three digits of what has any size."""
+    return f"{value:.3f}" if unit == "mm" else f"{value:.3g}"
 
 
 def _together(entries: Sequence[Mapping[str, Any]], key: str) -> float | None:

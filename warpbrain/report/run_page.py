@@ -10,7 +10,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, in_three_dimensions
 from warpbrain.report.comparison import explained_of
-from warpbrain.report.explained import IN_PART, NEARER, UNKNOWN, WORSE
+from warpbrain.report.explained import IN_PART, NEARER, UNKNOWN, WORSE, number
 from warpbrain.report.generative.page import BLACK, GREEN, ORANGE, QUIET, VERMILLION
 from warpbrain.report.mesh_error import mesh_error_lines
 from warpbrain.report.page.document import document, header, listed, section, text, write_document
@@ -84,11 +84,11 @@ def recordings_table(compared: Sequence[Mapping[str, Any]]) -> str:
             [
                 text(one["name"]),
                 f"{one['count']}",
-                f"{one['before']['root_mean_square']:.3f}",
-                f"{one['after']['root_mean_square']:.3f}",
-                f"{one['after']['percentile_95']:.3f}",
-                f"{one['after']['largest']:.3f}",
-                "" if noise is None else f"{noise:.3f}",
+                number(one["before"]["root_mean_square"], one["unit"]),
+                number(one["after"]["root_mean_square"], one["unit"]),
+                number(one["after"]["percentile_95"], one["unit"]),
+                number(one["after"]["largest"], one["unit"]),
+                "" if noise is None else number(noise, one["unit"]),
                 text(one["unit"]),
                 "check" if one["role"] == "check" else "",
             ]
