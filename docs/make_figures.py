@@ -21,10 +21,10 @@ FIGURES = Path(__file__).parent / "figures"
 RUNS = {"0529.png": ["--case", "0529"]}
 ENSEMBLES = {"0529-spread.png": ["--case", "0529", "--tissue", "single", "--grid"]}
 CASES = {"0529-case.png": ["0529"]}
-#: The diagnosis of which the top of the report is shown.
-DIAGNOSED = ["--case", "0529"]
 #: Colours that are left of a picture of curves, and its width [pixel]: a screen's, and a fraction of the bytes.
 PALETTE, WIDTH = 48, 1280
+#: Width of a picture of a body [pixel], which has shades and is kept in more colours.
+RENDERED = 1200
 #: Figures of an estimate and of a sweep of the same case, by file.
 ESTIMATES = {"estimate-0529-sweep.png": "sweep.png", "estimate-0529-residuals.png": "residuals.png"}
 
@@ -35,7 +35,11 @@ def main() -> None:
     for name, arguments in RUNS.items():
         with tempfile.TemporaryDirectory() as folder:
             _warpbrain("run", *arguments, "--out", folder)
-            shutil.copy(Path(folder) / "deformation.png", FIGURES / name)
+            with Image.open(Path(folder) / "deformation.png") as image:
+                size = (RENDERED, round(image.height * RENDERED / image.width))
+                small = image.convert("RGB").resize(size, Image.LANCZOS)
+            few = small.quantize(256, method=Image.Quantize.MAXCOVERAGE, kmeans=3, dither=Image.Dither.NONE)
+            few.save(FIGURES / name, optimize=True)
     for name, arguments in ENSEMBLES.items():
         with tempfile.TemporaryDirectory() as folder:
             _warpbrain("ensemble", *arguments, "--out", folder)
@@ -48,29 +52,6 @@ def main() -> None:
     for name, arguments in CASES.items():
         _warpbrain("cases", "show", *arguments, "--out", str(FIGURES / name))
     draw_generative_model()
-    draw_report()
-
-
-def draw_report() -> None:
-    """Photograph the top of a report; takes minutes, and a Chromium."""
-    with tempfile.TemporaryDirectory() as folder:
-        _warpbrain("diagnose", *DIAGNOSED, "--out", folder)
-        photograph(Path(folder) / "report.html", FIGURES / "diagnosis.png")
-
-
-def photograph(page: Path, picture: Path) -> None:
-    """Take a picture of what a screen shows of a page first."""
-    options = (
-        "--headless",
-        "--no-sandbox",
-        "--hide-scrollbars",
-        "--window-size=1200,900",
-        "--virtual-time-budget=5000",
-    )
-    subprocess.run(["chromium", *options, f"--screenshot={picture}", page.resolve().as_uri()], check=True)
-    with Image.open(picture) as image:
-        colours = image.convert("RGB").quantize(2 * PALETTE, dither=Image.Dither.NONE)
-    colours.save(picture, optimize=True)
 
 
 def draw_generative_model() -> None:

@@ -15,6 +15,7 @@ from command import run, warpbrain
 from folders import write_recorded
 
 from warpbrain.mesh.vtu import read_vtu
+from warpbrain.report.ensemble_text import ensemble_lines
 
 GREY, WHITE = (f"hyperelastic/{anatomy}" for anatomy in ("grey matter", "white matter"))
 SOFT = ("mu = 1000.0", f'mu = 1000.0\nprior = "{GREY}"')
@@ -89,12 +90,28 @@ def test_summary_and_print_agree(done):
     ran, out = done
     said = json.loads((out / "summary.json").read_text())
     assert said["result"]["done"] == 5 and said["result"]["failed"] == {}
-    assert "samples: 5 done, 0 failed of 5" in ran.out
+    assert "samples: 5 done, 0 failed of 5" in ran.out and "95 %   over 5 samples" in ran.out
+    assert said["result"]["percentiles_over_samples"] == 5 and "note" not in ran.out
     mean = said["result"]["mean_displacement_mm"]["all nodes"]["mean"]
     assert f"{mean:.3f}" in next(line for line in ran.out.splitlines() if line.startswith("  all nodes"))
     errors = [float(row["rmse_beads_after_mm"]) for row in table(out)]
     assert said["result"]["rmse_at_recordings"]["beads"]["nearest_sample"] == int(np.argmin(errors))
     assert said["samples_computed_in_these_seconds"] == 5
+
+
+def test_percentiles_say_of_how_many_samples_they_are(done):
+    said = json.loads((done[1] / "summary.json").read_text())["result"]
+    lines = ensemble_lines({**said, "done": 3, "samples": 5, "failed": {"1": "no rest", "4": "no rest"}})
+    assert any("all that follows is of the 3 that have an answer" in line for line in lines)
+    assert sum("over 3 samples" in line for line in lines) == 2
+
+
+def test_what_the_load_is_too_much_for_is_said_before_it_starts(tmp_path):
+    heavy = ("total = [0.01, 0.02, -0.05]", "total = [0.0, 0.0, -1.0]")
+    ran = ensemble(write_recorded(tmp_path / "case", SOFT, STIFF, heavy), "--samples", 2, "--out", tmp_path / "out")
+    before, note, after = ran.out.partition("  note      the load may be too much for ")
+    assert note and after.startswith("2 of 2 samples (0, 1): in a linear estimate it presses tissue to nothing")
+    assert "workers" not in before and "workers" in after
 
 
 def test_again_computes_nothing_and_says_the_same(folder, done):

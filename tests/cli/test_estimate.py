@@ -64,8 +64,17 @@ def test_tables_files_and_figures(folder, tmp_path):
     assert len(rows) == 1 + 60 + 40
     state = read_state(out)
     assert 0.0 < state.deviation.max() < np.linalg.norm(state.u, axis=1).max()
-    for picture in ("posterior.png", "predicted.png", "residuals.png"):
+    for picture in ("posterior.png", "predicted.png", "residuals.png", "deformation.png"):
         assert (out / picture).stat().st_size > 5000
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert not re.findall(r'(?:src|srcset|href)="(?!data:|#)', page) and not re.search(r">(nan|None|inf)<", page)
+    assert re.findall(r"<h2>(.*?)</h2>", page)[:4] == [
+        "Tissue",
+        "What else may act",
+        "What was recorded",
+        "Before and after",
+    ]
+    assert re.search(r"<dt>grey, shear modulus</dt><dd>[\d.]+ Pa \(", page) and "uncertainty" in page
 
 
 def nothing_else_acts(printed, said):

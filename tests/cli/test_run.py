@@ -16,7 +16,7 @@ from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh, write_mesh
 from warpbrain.mesh.vtu import read_vtu
 
-FILES = ["deformation.png", "result.vtu", "summary.json"]
+FILES = ["deformation.png", "report.html", "result.vtu", "summary.json"]
 RAN: dict[tuple[str, ...], tuple[Ran, Path]] = {}
 
 
@@ -72,7 +72,7 @@ def test_what_is_printed(block_run, folder):
     assert any(re.match(r"  top +9( +\d+\.\d{3}){4}$", line) for line in lines)
     for phase in ("pre-processing", "internal forces", "assemble system", "solve system"):
         assert any(re.match(rf"  {phase} +\d+ +\d+\.\d\d +\d+\.\d$", line) for line in lines)
-    assert lines[-1] == f"written to {out}: result.vtu, summary.json, deformation.png"
+    assert lines[-1] == f"written to {out}: result.vtu, summary.json, deformation.png, report.html"
     # not a stand-in for anybody
     assert "stand-in" not in ran.out
 

@@ -54,7 +54,7 @@ TABLES = {
     "slide.csv": "displacement,force\n0.0,0.0\n0.3,0.003\n",
     "twist.csv": "angle,torque\n0.0,0.0\n-0.2,-2e-5\n",
 }
-FILES = ["comparison.csv", "summary.json", "tests.png"]
+FILES = ["comparison.csv", "report.html", "summary.json", "tests.png"]
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -117,8 +117,14 @@ def test_what_is_printed(ran):
         row = rf"  {name} +{mode} +{count}  {role} +{number}{number}  {unit} +{number}{number}{number}{number}$"
         assert any(re.match(row, line) for line in lines), (row, lines)
     assert any(re.match(r"  solve system +\d+ +\d+\.\d\d +\d+\.\d$", line) for line in lines)
-    assert lines[-1] == f"written to {out}: summary.json, comparison.csv, tests.png"
+    assert lines[-1] == f"written to {out}: summary.json, comparison.csv, tests.png, report.html"
     assert sorted(path.name for path in out.iterdir()) == FILES
+
+
+def test_the_report_is_one_file(ran):
+    page = (ran[1] / "report.html").read_text(encoding="utf-8")
+    assert not re.findall(r'(?:src|srcset|href)="(?!data:|#)', page) and not re.search(r">(nan|None|inf)<", page)
+    assert "rate and history" in page and re.search(r"<td[^>]*>check</td>", page)
 
 
 def test_summary(ran):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from warpbrain import __version__
-from warpbrain.cli import cases, diagnose, ensemble, estimate, gp, run, warp
+from warpbrain.cli import cases, diagnose, ensemble, estimate, gp, run, view, warp
 from warpbrain.terminal.command import OneLineParser, exit_status
 
 
@@ -20,6 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     estimate.add_parser(commands)
     diagnose.add_parser(commands)
     ensemble.add_parser(commands)
+    view.add_parser(commands)
     warp.add_parser(commands)
     cases.add_parser(commands)
     gp.add_parser(commands)

@@ -19,9 +19,12 @@ if TYPE_CHECKING:
     from warpbrain.ensemble.sample import Sample
     from warpbrain.ensemble.store import Store
     from warpbrain.ensemble.workers import Workers
+    from warpbrain.simulation.model import Model
 
 #: Samples where the arguments do not say how many: as many as the paper's sweep has.
 _SAMPLES = 289
+#: Samples that are named one by one where something is said of many.
+_NAMED = 12
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -111,6 +114,8 @@ def _ensemble(options: argparse.Namespace) -> None:
     say(*(f"  left out  {sentence}" for sentence in tables.left_out(model, "an ensemble has no others")), sep="\n")
     say(f"  samples   {len(samples)}: {chosen}; {course}, {options.precision} precision")
 
+    if options.steps is None:
+        _warn(model, samples, options, say)
     out = options.out or Path(f"warpbrain-ensemble-{safe_name(case.name)}-{options.tissue}")
     with _workers(options) as workers:
         about = {"case": case.name, "samples": len(samples), "chosen": chosen, "course": course}
@@ -200,6 +205,20 @@ def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str
     samples = drawn_samples(case, count, seed, process, lambda n: progress.show(n / count))
     progress.clear()
     return samples, f"draws 0 to {count - 1} of seed {seed} by {by}"
+
+
+def _warn(model: Model, samples: list[Sample], options: argparse.Namespace, say: Callable[..., None]) -> None:
+    """Say what is likely to fail before it is computed."""
+    from warpbrain.ensemble.bearing import overloaded
+
+    device = None if options.dask is not None else options.device
+    soft = overloaded(model, samples, device)
+    if soft:
+        which = ", ".join(str(number) for number in soft[:_NAMED]) + (", ..." if len(soft) > _NAMED else "")
+        say(
+            f"  note      the load may be too much for {len(soft)} of {len(samples)} samples ({which}): in a linear "
+            "estimate it presses tissue to nothing. They may fail; percentiles are then of the rest (docs/ensembles.md)"
+        )
 
 
 def _job(options: argparse.Namespace, model: Any, samples: list[Sample]) -> Job:

@@ -34,7 +34,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "estimate",
         help="estimate tissue from a case's recordings",
         description="Estimates the laws of a case's tissues from its recordings, and says how well they are known. "
-        "Writes estimate.json, state.vtu, predictions and figures, or sweep.csv and its figure.",
+        "Writes report.html, estimate.json, state.vtu, predictions and figures, or sweep.csv and its figure.",
     )
     add = parser.add_argument
     add("--case", required=True, metavar="NAME", help="0529, ... (see warpbrain cases), or the path of a case folder")
@@ -191,11 +191,31 @@ def _estimate(
     estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)
     estimate_picture.write_observed_against_predicted(out / "predicted.png", posterior)
     estimate_picture.write_residuals(out / "residuals.png", posterior)
-    write_summary(out / "estimate.json", describe_estimate(posterior, find_device(options.device).alias, averaged))
+    described = describe_estimate(posterior, find_device(options.device).alias, averaged)
+    write_summary(out / "estimate.json", described)
     files = ["estimate.json", "predictions.csv", "state.vtu", "posterior.png", "predicted.png", "residuals.png"]
+    files += _illustrate(out, posterior, described, say)
     if images is not None:
         files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
     say("", f"written to {out}: {', '.join(files)}", sep="\n")
+
+
+def _illustrate(out: Path, posterior: Posterior, said: dict[str, Any], say: Callable[..., None]) -> list[str]:
+    """Write the picture of the estimated state and the page; returns the names of the files."""
+    from warpbrain.report.estimate_page import judged_of, moved_of, write_estimate_page
+    from warpbrain.report.picture import draw
+    from warpbrain.report.state_files import read_state
+
+    case, state = posterior.case, read_state(out / "state.vtu")
+    names = {label: tissue.name for label, tissue in case.tissues.items()}
+    lines = ["the most probable state of the estimate", *judged_of(said).sentences]
+    path = out / "deformation.png"
+    pictures = draw(path, case.mesh, state.mesh, state.u, names, moved_of(posterior), case.title, lines)
+    write_estimate_page(out / "report.html", said, posterior, state, pictures)
+    if isinstance(pictures, str):
+        say("", f"deformation.png is not drawn: {pictures}", sep="\n")
+        return ["report.html"]
+    return ["deformation.png", "report.html"]
 
 
 def _averaged(posterior: Posterior, device: str | None, on_stage: Callable[[str], None]) -> AveragedTissue | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import textwrap
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 #: Newton iterations that are printed one by one.
 _LONG_HISTORY = 16
+#: Letters of a line of a picture's title.
+_LINE = 150
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -33,8 +36,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     parser = commands.add_parser(
         "run",
         help="simulate a case",
-        description="Simulates a case and writes result.vtu, summary.json, deformation.png and comparison.csv. "
-        "Without --steps, --to-rest or --until it finds the static equilibrium.",
+        description="Simulates a case and writes result.vtu, summary.json, deformation.png, report.html and "
+        "comparison.csv. Without --steps, --to-rest or --until it finds the static equilibrium.",
     )
     add = parser.add_argument
     add(
@@ -169,11 +172,7 @@ def _run(options: argparse.Namespace) -> None:
         say("", *mesh_error_lines(doubt), sep="\n")
     say("", *tables.timing_lines(seconds, counts), sep="\n")
 
-    from warpbrain.report.picture import write_picture
-
     write_result(out / "result.vtu", result, None if estimated is None else estimated.u)
-    names = {label: tissue.name for label, tissue in case.tissues.items()}
-    write_picture(out / "deformation.png", result, case.mesh, names, case.title, _subtitle(case, outcome))
     summary = {
         "case": described,
         **({} if prior is None else {"prior": prior}),
@@ -188,7 +187,7 @@ def _run(options: argparse.Namespace) -> None:
         "versions": tables.machine(),
     }
     write_summary(out / "summary.json", summary)
-    files = ["result.vtu", "summary.json", "deformation.png"]
+    files = ["result.vtu", "summary.json", *_illustrate(out, case, result, observed, summary, say)]
     if observed.comparisons:
         write_comparisons(out / "comparison.csv", case, observed)
         files.append("comparison.csv")
@@ -495,6 +494,25 @@ def _mesh_error(
         progress.clear()
     without = observe_without(case, result, found, outcome.get("time_s"))
     return found, describe_mesh_error(found, elements, observed, without)
+
+
+def _illustrate(
+    out: Path, case: Case, result: Result, observed: Observed, summary: dict[str, Any], say: Callable[..., None]
+) -> list[str]:
+    """Write what people look at; returns the names of the files."""
+    from warpbrain.report.picture import Moved, draw
+    from warpbrain.report.run_page import write_run_page
+
+    moved = Moved.of(case.recordings, observed.comparisons)
+    names = {label: tissue.name for label, tissue in case.tissues.items()}
+    left_out = textwrap.wrap(f"Left out {summary['case']['left_out'][0]}", _LINE)
+    lines = [_subtitle(case, summary["solution"]), *summary["recordings"]["in_words"], *left_out]
+    pictures = draw(out / "deformation.png", case.mesh, result.mesh, result.u, names, moved, case.title, lines)
+    write_run_page(out / "report.html", summary, result, case.mesh, moved, pictures)
+    if isinstance(pictures, str):
+        say("", f"deformation.png is not drawn: {pictures}", sep="\n")
+        return ["report.html"]
+    return ["deformation.png", "report.html"]
 
 
 def _subtitle(case: Case, outcome: Mapping[str, Any]) -> str:

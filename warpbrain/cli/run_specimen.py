@@ -45,6 +45,7 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior
     from warpbrain.report.comparison import describe_comparisons
     from warpbrain.report.files import write_summary
     from warpbrain.report.prior_text import prior_lines
+    from warpbrain.report.specimen_page import write_specimen_page
     from warpbrain.report.specimen_picture import write_tests_picture
     from warpbrain.report.summary import machine, timing_lines
     from warpbrain.simulation.equilibrium import EquilibriumOptions
@@ -87,7 +88,8 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior
         "versions": machine(),
     }
     write_summary(out / "summary.json", summary)
-    say("", f"written to {out}: summary.json, comparison.csv, tests.png", sep="\n")
+    write_specimen_page(out / "report.html", summary, done)
+    say("", f"written to {out}: summary.json, comparison.csv, tests.png, report.html", sep="\n")
 
 
 def _tests(options: argparse.Namespace, case: Case) -> list[TestRecording]:

@@ -13,6 +13,7 @@ from warpbrain.atomic import whole_file
 from warpbrain.cases.case import Case
 from warpbrain.recordings.comparison import Comparison, Error
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
+from warpbrain.report.explained import Explained, explained
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.simulation.observation import Observed
 
@@ -22,10 +23,21 @@ SHOWN = {"m": (MILLIMETRES, "mm")} | {unit: (1.0, unit) for unit in ("N", "Pa", 
 
 def describe_comparisons(observed: Observed) -> dict[str, Any]:
     """Comparisons with units in their keys, and what could not be compared."""
+    compared = [_describe(comparison) for comparison in observed.comparisons]
     return {
-        "compared": [_describe(comparison) for comparison in observed.comparisons],
+        "compared": compared,
+        "in_words": list(explained_of(compared).sentences),
         "not_compared": list(observed.skipped),
     }
+
+
+def explained_of(compared: Sequence[Mapping[str, Any]], what: str = "this simulation") -> Explained:
+    """Whether a state explains what `describe_comparisons` compared it with."""
+    numbers = [
+        {**entry, "before": entry["before"]["root_mean_square"], "after": entry["after"]["root_mean_square"]}
+        for entry in compared
+    ]
+    return explained(numbers, what)
 
 
 def _describe(comparison: Comparison) -> dict[str, Any]:
@@ -83,6 +95,7 @@ def comparison_lines(said: Mapping[str, Any], legacy: bool) -> list[str]:
             lines.append(line + ("   check" if entry["role"] == "check" else ""))
     if said["compared"]:
         lines.append("  before: nothing moved; after: this simulation; noise: what the stated noise alone would leave")
+        lines += [f"  {sentence}" for sentence in said["in_words"]]
     lines += [f"  not compared: {reason}" for reason in said["not_compared"]]
     return lines
 

@@ -29,6 +29,7 @@ def describe_ensemble(result: EnsembleResult) -> dict[str, Any]:
         "samples": len(result.rows),
         "done": len(result.done),
         "failed": {str(row.outcome.number): row.outcome.reason for row in result.failed},
+        "percentiles_over_samples": len(result.done),
         "time_steps": sum(row.outcome.steps for row in result.rows),
         "cg_iterations": sum(row.outcome.cg_iterations for row in result.rows),
         "mean_displacement_mm": {name: _numbers(s, MILLIMETRES) for name, s in result.displacement.items()},
@@ -50,14 +51,20 @@ def ensemble_lines(described: Mapping[str, Any]) -> list[str]:
         lines.append(f"  sample {number} failed: {reason}")
     if len(failed) > _SHOWN_FAILURES:
         lines.append(f"  and {len(failed) - _SHOWN_FAILURES} more, each with its reason in samples.csv")
+    if failed and described["done"]:
+        lines.append(
+            f"  all that follows is of the {described['done']} that have an answer; those that failed are not in it, "
+            "and may be the softest"
+        )
+    over = f"over {described['done']} samples"
     if described["mean_displacement_mm"]:
-        lines += ["", "mean displacement [mm]        mean       sd      5 %     50 %     95 %   of the samples"]
+        lines += ["", f"mean displacement [mm]        mean       sd      5 %     50 %     95 %   {over}"]
     for name, s in described["mean_displacement_mm"].items():
         lines.append(f"  {SET_TITLES.get(name, name):<22}{_columns(s)}")
     if described["rmse_at_recordings"]:
         lines += [
             "",
-            "RMSE at recordings            mean       sd      5 %     50 %     95 %   before   nearest sample",
+            f"RMSE at recordings            mean       sd      5 %     50 %     95 %   before   nearest sample, {over}",
         ]
     for name, errors in described["rmse_at_recordings"].items():
         lines.append(

@@ -16,6 +16,7 @@ from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.page.figures import NARROW
 
 #: Of Okabe and Ito, who can be told apart by everybody and in grey print.
 PRIOR, POSTERIOR, GROSS = "#E69F00", "#0072B2", "#D55E00"
@@ -25,17 +26,23 @@ _COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
 
 def write_prior_and_posterior(path: Path, posterior: Posterior) -> None:
     """Draw the density of each parameter before and after."""
-    plt = _plotting()
+    _save(path, densities_figure(posterior, False), posterior)
+
+
+def densities_figure(posterior: Posterior, narrow: bool) -> Any:
+    """The density of each parameter before and after, one below the other for a narrow window."""
+    from matplotlib.figure import Figure
+
     marginals = posterior.marginals
-    figure, axes = plt.subplots(1, len(marginals), figsize=(max(4.6 * len(marginals), 6.4), 3.8), squeeze=False)
+    count = len(marginals)
+    size = (NARROW, 3.0 * count) if narrow else (max(4.6 * count, 6.4), 3.8)
+    figure = Figure(figsize=size, layout="constrained", facecolor="white")
+    axes = figure.subplots(*((count, 1) if narrow else (1, count)), squeeze=False).ravel()
     for column, marginal in enumerate(marginals):
         draws = None if posterior.chain is None else posterior.chain.theta[:, column]
-        _draw_marginal(axes[0, column], marginal, posterior.prior.theta[:, column], draws)
-    axes[0, 0].legend(fontsize=9, frameon=False)
-    figure.suptitle(posterior.case.title, parse_math=False, fontsize=10)
-    figure.tight_layout()
-    views.save(figure, path)
-    plt.close(figure)
+        _draw_marginal(axes[column], marginal, posterior.prior.theta[:, column], draws)
+    axes[0].legend(fontsize=9, frameon=False)
+    return figure
 
 
 def _draw_marginal(axes: Any, marginal: Marginal, prior: Floats, draws: Floats | None) -> None:
@@ -66,20 +73,32 @@ def _draw_marginal(axes: Any, marginal: Marginal, prior: Floats, draws: Floats |
 
 def write_observed_against_predicted(path: Path, posterior: Posterior) -> None:
     """Draw every component of every recording beside what the estimate makes of it; a panel for each unit."""
-    plt = _plotting()
+    _save(path, agreement_figure(posterior, False), posterior)
+
+
+def agreement_figure(posterior: Posterior, narrow: bool) -> Any:
+    """Components as they were observed and as they are predicted, one unit below the other for a narrow window."""
+    from matplotlib.figure import Figure
+
     # a distance to a surface has no sign that was recorded: before, after is all there is to compare
     shown = [one for one in posterior.predictions if one.kind != "surface"]
     units = list(dict.fromkeys(one.unit for one in shown)) or ["m"]
-    size = (5.4 * len(units), 6.2)
-    figure, axes = plt.subplots(1, len(units), figsize=size, squeeze=False, constrained_layout=True)
+    count = len(units)
+    size = (NARROW, 5.0 * count) if narrow else (5.4 * count, 6.2)
+    figure = Figure(figsize=size, layout="constrained", facecolor="white")
+    axes = figure.subplots(*((count, 1) if narrow else (1, count)), squeeze=False).ravel()
     for column, unit in enumerate(units):
-        _draw_pairs(axes[0, column], [one for one in shown if one.unit == unit], unit)
+        _draw_pairs(axes[column], [one for one in shown if one.unit == unit], unit, 1 if narrow else 2)
+    return figure
+
+
+def _save(path: Path, figure: Any, posterior: Posterior) -> None:
+    # the title is the user's free text, in which a dollar sign begins no formula
     figure.suptitle(posterior.case.title, parse_math=False, fontsize=10)
     views.save(figure, path)
-    plt.close(figure)
 
 
-def _draw_pairs(axes: Any, predictions: Sequence[Prediction], unit: str) -> None:
+def _draw_pairs(axes: Any, predictions: Sequence[Prediction], unit: str, columns: int) -> None:
     factor, name = SHOWN[unit]
     ends = [0.0]
     for number, one in enumerate(predictions):
@@ -105,20 +124,22 @@ def _draw_pairs(axes: Any, predictions: Sequence[Prediction], unit: str) -> None
     axes.set_xlabel(f"predicted {what}, each component [{name}]")
     axes.set_ylabel(f"observed {what}, each component [{name}]")
     if predictions:
-        axes.legend(fontsize=8, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncol=2)
+        axes.legend(fontsize=8, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncol=columns)
     else:
         axes.text(0.5, 0.5, "only surfaces were recorded", ha="center", transform=axes.transAxes)
 
 
 def write_residuals(path: Path, posterior: Posterior) -> None:
     """Draw how far each recorded point is from its prediction, on the outlines of the anatomy from three sides."""
-    plt = _plotting()
+    from matplotlib.figure import Figure
+
     mesh = posterior.case.remaining[0]
     faces = boundary_faces(mesh.tetrahedra)
     points, lengths = _places(posterior)
-    figure, axes = plt.subplots(1, 3, figsize=(13.5, 5.0), constrained_layout=True)
+    figure = Figure(figsize=(13.5, 5.0), layout="constrained")
+    axes = figure.subplots(1, 3)
     top = max(float(np.percentile(lengths, 98)), 1e-3) if len(lengths) else 1.0
-    shown = None
+    shown: Any = None
     order = np.argsort(lengths)
     for column, (view, place) in enumerate(
         zip(views.VIEWS, views.places(posterior.case.mesh, views.resected_elements(posterior.case.mesh)), strict=True)
@@ -135,7 +156,6 @@ def write_residuals(path: Path, posterior: Posterior) -> None:
     bar.set_label("distance between observed and predicted [mm], points of all depths")
     figure.suptitle(posterior.case.title, parse_math=False)
     views.save(figure, path)
-    plt.close(figure)
 
 
 def _places(posterior: Posterior) -> tuple[Floats, Floats]:
@@ -148,12 +168,3 @@ def _places(posterior: Posterior) -> tuple[Floats, Floats]:
             points.append(recording.points[one.rows])
             lengths.append(MILLIMETRES * np.linalg.norm(one.after, axis=1))
     return np.concatenate(points), np.concatenate(lengths)
-
-
-def _plotting() -> Any:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    return plt

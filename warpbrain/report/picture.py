@@ -1,76 +1,353 @@
-"""The picture of a run: the anatomy before, and the same cuts after, coloured by how far the tissue moved."""
+"""The picture of a run: the anatomy before, after, and what was recorded of it, as PyVista renders them."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats
-from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.mesh import TetMesh
+from warpbrain.recordings.comparison import Comparison
+from warpbrain.recordings.recording import PointsRecording, Recording
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.slices import cut
-from warpbrain.report.views import View
-from warpbrain.simulation.result import Result
+from warpbrain.report.rendering.offscreen import RenderingError, render
+from warpbrain.report.rendering.scene import (
+    AFTER,
+    AXIAL,
+    BEFORE,
+    COMPUTED,
+    CORONAL,
+    CUTS,
+    MOTION,
+    RECORDED,
+    SAGITTAL,
+    Camera,
+    Scene,
+)
 
-Ints = NDArray[np.int32]
+#: Pixels of one picture.
+_SIZE = (640, 560)
+#: A large displacement is drawn this long, and a large recorded one, as parts of the size of the body.
+_MOVED, _RECORDED = 0.11, 0.15
 
 
-def write_picture(path: Path, result: Result, whole: TetMesh, names: dict[int, str], title: str, subtitle: str) -> None:
-    """Draw a result.
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """Points that were recorded and where the simulation has them, all (k, 3) [m].
+
+    Attributes
+    ----------
+    where, recorded, computed : (k, 3) array
+        Positions before, displacements.
+    """
+
+    where: Floats
+    recorded: Floats
+    computed: Floats
+
+    @classmethod
+    def of(cls, recordings: Sequence[Recording], comparisons: Sequence[Comparison]) -> Moved:
+        """Of all recordings of displacements at points."""
+        by_name = {one.name: one for one in recordings}
+        found = [np.zeros((0, 9))]
+        for one in comparisons:
+            recording = by_name[one.name]
+            if isinstance(recording, PointsRecording):
+                moved = one.residuals_before - one.residuals_after
+                found.append(np.column_stack([recording.points[one.rows], one.residuals_before, moved]))
+        where, recorded, computed = np.split(np.concatenate(found), 3, axis=1)
+        return cls(where, recorded, computed)
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures:
+    """Renderings of a scene, and what makes a figure of them.
+
+    Attributes
+    ----------
+    scene : Scene
+    images : dict of str to (height, width, 3) uint8 array
+    cameras : dict of str to Camera
+    whole : TetMesh
+    names : dict of int to str
+        Of the tissues.
+    """
+
+    scene: Scene
+    images: dict[str, Any]
+    cameras: dict[str, Camera]
+    whole: TetMesh
+    names: dict[int, str]
+
+
+def pictures_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> Pictures:
+    """Render a deformed body.
+
+    Parameters
+    ----------
+    whole, mesh : TetMesh
+        The anatomy before anything was resected, and what is left of it.
+    u : (n, 3) array
+        Displacement of the nodes of `mesh` [m].
+    names : dict
+        Names of the tissues by label.
+    moved : Moved
+
+    Raises
+    ------
+    RenderingError
+        If nothing can be rendered here.
+    """
+    scene = scene_of(whole, mesh, u, names, moved)
+    cameras = cameras_of(scene)
+    return Pictures(scene, render(scene, cameras, _SIZE), cameras, whole, names)
+
+
+def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> Scene:
+    """What is drawn of a deformed body; see `pictures_of`."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_rgb
+
+    sizes = MILLIMETRES * np.linalg.norm(u, axis=1)
+    size = MILLIMETRES * float(np.ptp(whole.points, axis=0).max())
+    resected = views.resected_elements(whole)
+    removed = whole.without(resected)[0] if resected.any() else None
+    # nodes of what is left first, as in `mesh`; those that only what was removed has come after them
+    points, tetrahedra = mesh.points, mesh.tetrahedra
+    tissue, gone = mesh.tissue, np.zeros(len(tetrahedra), dtype=bool)
+    if removed is not None:
+        points = np.concatenate([points, whole.points])
+        tetrahedra = np.concatenate([tetrahedra, whole.tetrahedra[resected] + len(mesh.points)])
+        tissue = np.concatenate([tissue, whole.tissue[resected]])
+        gone = np.concatenate([gone, np.ones(int(resected.sum()), dtype=bool)])
+    by_label = {label: np.array(to_rgb(c)) for label, c in views.tissue_colours(names, whole).items()}
+    colours = np.array([by_label[label] for label in tissue.tolist()])
+    colours[gone] = to_rgb(views.RESECTED)
+    large = float(np.percentile(sizes, 99.5))
+    recorded = MILLIMETRES * np.linalg.norm(moved.recorded, axis=1)
+    places = np.array(views.places(whole, resected))[::-1]
+    ventricle = whole.node_sets.get("ventricle", np.zeros(len(whole.points), dtype=bool))
+    middle = 0.5 * (whole.points.min(axis=0) + whole.points.max(axis=0))
+    corner = whole.points[ventricle].mean(axis=0) if ventricle.any() else middle
+    # two cuts through what was resected and an axial one through the ventricles say more than three through one place
+    places[2] = corner[2]
+    return Scene(
+        points=MILLIMETRES * points,
+        tetrahedra=tetrahedra.astype(np.int64),
+        removed=gone,
+        colours=np.round(255.0 * colours).astype(np.uint8),
+        u=MILLIMETRES * np.concatenate([u, np.zeros((len(points) - len(u), 3))]),
+        exaggeration=round_factor(_MOVED * size, large),
+        corner=MILLIMETRES * corner,
+        places=MILLIMETRES * places,
+        where=MILLIMETRES * moved.where,
+        recorded=MILLIMETRES * moved.recorded,
+        computed=MILLIMETRES * moved.computed,
+        arrows=round_factor(_RECORDED * size, float(np.percentile(recorded, 95))) if len(recorded) else 1.0,
+        top=max(large, 1e-3),
+        table=np.round(255.0 * colormaps["viridis"](np.linspace(0.0, 1.0, 256))[:, :3]).astype(np.uint8),
+    )
+
+
+def round_factor(wanted: float, length: float) -> float:
+    """How many times as long as it is a length is drawn: 1, 2 or 5 and zeros, never less than 1, 1 of what is not."""
+    if length < 1e-6 * wanted:
+        return 1.0
+    factor = max(1.0, wanted / length)
+    decade = 10.0 ** math.floor(math.log10(factor))
+    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= factor * (1.0 + 1e-9))
+
+
+def cameras_of(scene: Scene) -> dict[str, Camera]:
+    """Where each picture is seen from: the body, before and after, fills it."""
+    moved = scene.points + scene.exaggeration * scene.u
+    everything = np.concatenate([scene.points, moved[np.unique(scene.tetrahedra[~scene.removed])]])
+    lateral = scene.side[0]
+    towards = np.array([lateral * 0.80, 0.85, 0.62])
+    towards /= np.linalg.norm(towards)
+    right = np.cross([0.0, 0.0, 1.0], towards)
+    right /= np.linalg.norm(right)
+    oblique = _fitted(everything, right, np.cross(towards, right))
+    tips = np.concatenate([everything, scene.where + scene.arrows * scene.recorded])
+    side = np.array([lateral, 0.25, 0.12])
+    side /= np.linalg.norm(side)
+    across = np.cross([0.0, 0.0, 1.0], side)
+    across /= np.linalg.norm(across)
+    cameras = {BEFORE: oblique, AFTER: oblique, MOTION: _fitted(tips, across, np.cross(side, across))}
+    x, y, z = np.eye(3)
+    for name, (right, up) in {AXIAL: (-x, y), CORONAL: (-x, z), SAGITTAL: (-y, z)}.items():
+        cameras[name] = _fitted(everything, right, up)
+    return cameras
+
+
+def _fitted(points: Floats, right: Floats, up: Floats) -> Camera:
+    flat = points @ np.column_stack([right, up])
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    towards = np.cross(right, up)
+    depth = points @ towards
+    centre = np.column_stack([right, up, towards]) @ [*(0.5 * (low + high)), 0.5 * (depth.min() + depth.max())]
+    across, high_ = 0.5 * (high - low)
+    # room for letters and a scale bar
+    return Camera(right, up, centre, 1.14 * float(max(high_, across * _SIZE[1] / _SIZE[0], 1e-3)))
+
+
+def draw(
+    path: Path,
+    whole: TetMesh,
+    mesh: TetMesh,
+    u: Floats,
+    names: dict[int, str],
+    moved: Moved,
+    title: str,
+    subtitles: Sequence[str],
+) -> Pictures | str:
+    """Render a deformed body and write the picture of it; see `pictures_of` and `write_picture`.
+
+    Returns
+    -------
+    Pictures or str
+        Or why nothing can be rendered here: no picture is then left at `path`, which would be one of something else.
+    """
+    try:
+        pictures = pictures_of(whole, mesh, u, names, moved)
+    except RenderingError as error:
+        path.unlink(missing_ok=True)
+        return str(error)
+    write_picture(path, pictures, title, subtitles)
+    return pictures
+
+
+def write_picture(path: Path, pictures: Pictures, title: str, subtitles: Sequence[str]) -> None:
+    """Write the pictures of a deformed body as one PNG file.
 
     Parameters
     ----------
     path : Path
-        PNG file.
-    result : Result
-    whole : TetMesh
-        The anatomy before anything was resected.
-    names : dict
-        Names of the tissues by label.
-    title, subtitle : str
+    pictures : Pictures
+    title : str
+    subtitles : sequence of str
+        Lines below it.
     """
-    import matplotlib
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    sizes = np.linalg.norm(result.u, axis=1) * MILLIMETRES
-    top = max(float(np.percentile(sizes, 99.5)), 1e-3)
-    figure, axes = plt.subplots(2, 3, figsize=(13.5, 9.4), constrained_layout=True)
-    resected = views.resected_elements(whole)
-    before, after = boundary_faces(whole.tetrahedra), boundary_faces(result.mesh.tetrahedra)
-    for column, (view, place) in enumerate(zip(views.VIEWS, views.places(whole, resected), strict=True)):
-        section = cut(whole.points, whole.tetrahedra, np.zeros(len(whole.points)), view.axis, place)
-        views.draw_tissue(axes[0, column], section, views.element_colours(whole, resected, names))
-        views.draw_outline(axes[0, column], before, whole.points, view, place)
-        shown = _draw_after(axes[1, column], result, after, sizes, view, place, top)
-        for row in (0, 1):
-            views.frame(axes[row, column], whole, view)
-        axes[0, column].set_title(views.heading(whole, view, place), fontsize=11)
-    axes[0, 0].set_ylabel("before", fontsize=13)
-    axes[1, 0].set_ylabel("after", fontsize=13)
-    bar = figure.colorbar(shown, ax=axes[1, :], location="bottom", shrink=0.6, aspect=40, pad=0.02)
-    bar.set_label("displacement [mm]   (dashed: where the surfaces were before)")
-    views.legend(figure, views.tissue_entries(names, whole, resected), loc="upper right", fontsize=9)
+    scene, lines = pictures.scene, len(subtitles) + 1
+    high = 9.8 + 0.24 * lines
+    figure = Figure(figsize=(13.8, high), facecolor="white")
+    # room for the title, which has any number of lines
+    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - 0.24 * lines / high))
+    axes = figure.subplots(2, 3).ravel()
+    for panel, (name, image) in zip(axes, pictures.images.items(), strict=True):
+        _show(panel, image, annotations_of(pictures, name))
+        panel.set_title(heading(pictures, name), fontsize=10)
+    shades = ScalarMappable(cmap="viridis")
+    shades.set_clim(0.0, scene.top)
+    bar = figure.colorbar(shades, ax=list(axes), location="bottom", shrink=0.7, aspect=45, pad=0.01)
+    bar.set_label("displacement [mm]; red: where it was before")
+    views.legend(figure, _entries(pictures), loc="outside lower center", fontsize=9, ncols=6)
     # the title is the user's free text, in which a dollar sign begins no formula
-    figure.suptitle(f"{title}\n{subtitle}", fontsize=13, parse_math=False)
+    figure.suptitle("\n".join([title, *subtitles]), fontsize=12, parse_math=False, y=1.0 - 0.08 / high, va="top")
     views.save(figure, path)
-    plt.close(figure)
 
 
-def _draw_after(axes: Any, result: Result, faces: Ints, sizes: Floats, view: View, place: float, top: float) -> Any:
-    from matplotlib.collections import PolyCollection
+def _entries(pictures: Pictures) -> list[tuple[Any, str]]:
+    from matplotlib.lines import Line2D
 
-    mesh, moved = result.mesh, result.mesh.points + result.u
-    section = cut(moved, mesh.tetrahedra, sizes, view.axis, place)
-    polygons = [views.in_view(p) for p in section.polygons]
-    shown = PolyCollection(polygons, array=section.values, cmap="viridis", edgecolors="face", linewidths=0.4)
-    shown.set_clim(0.0, top)
-    axes.add_collection(shown)
-    views.draw_outline(axes, faces, moved, view, place, "-", "#1d1d1d")
-    views.draw_outline(axes, faces, mesh.points, view, place, (0, (3, 2)), "#c0392b")
-    return shown
+    resected = views.resected_elements(pictures.whole)
+    entries = views.tissue_entries(pictures.names, pictures.whole, resected)
+    return entries + [
+        (Line2D([], [], color=colour, linewidth=2.5), name) for name, colour in arrow_colours(pictures.scene).items()
+    ]
+
+
+def arrow_colours(scene: Scene) -> dict[str, str]:
+    """What arrows of displacements mean, and their colours."""
+    computed = {"computed displacement": COMPUTED}
+    return {"recorded displacement": RECORDED, **computed} if len(scene.where) else computed
+
+
+def heading(pictures: Pictures, name: str) -> str:
+    """What stands above a picture, in two lines."""
+    scene = pictures.scene
+    if name == BEFORE:
+        return "before\n"
+    if name == AFTER:
+        return f"after\n{_times(scene.exaggeration)}"
+    if name == MOTION:
+        if len(scene.where):
+            return f"recorded and computed\n{_times(scene.arrows)}"
+        return f"how the surface moves\n{_times(scene.exaggeration)}"
+    view = next(view for view in views.VIEWS if view.axis == CUTS[name])
+    said = views.heading(pictures.whole, view, float(scene.places[view.axis]) / MILLIMETRES)
+    return f"{said}\n{_times(scene.exaggeration)}"
+
+
+def _times(factor: float) -> str:
+    return "motion as large as it is" if factor == 1.0 else f"motion {factor:g} times as large"
+
+
+@dataclass(frozen=True)
+class Annotations:
+    """Letters and lines on a picture, in mm from its middle to the right and up.
+
+    Attributes
+    ----------
+    across, high : float
+        Half the width and half the height of the picture.
+    letters : tuple of tuple of float, float and str
+        Where, and which direction of the patient that is.
+    lines : tuple of tuple of four floats
+        From and to: of the directions, where they are not those of the picture.
+    bar : tuple of three floats and str
+        Left end and height of the scale bar, its length, and the words.
+    """
+
+    across: float
+    high: float
+    letters: tuple[tuple[float, float, str], ...]
+    lines: tuple[tuple[float, float, float, float], ...]
+    bar: tuple[float, float, float, str]
+
+
+def annotations_of(pictures: Pictures, name: str) -> Annotations:
+    """What is written on a picture."""
+    camera, shape = pictures.cameras[name], pictures.images[name].shape
+    high = camera.half_height
+    across = high * shape[1] / shape[0]
+    letters, lines = [], []
+    if np.abs(camera.towards).max() > 0.999:
+        for x, y, direction in (
+            *((-0.88 * across, 0.0, -camera.right), (0.88 * across, 0.0, camera.right)),
+            *((0.0, -0.95 * high, -camera.up), (0.0, 0.95 * high, camera.up)),
+        ):
+            axis = int(np.argmax(np.abs(direction)))
+            letters.append((x, y, "RAS"[axis] if direction[axis] > 0.0 else "LPI"[axis]))
+    else:
+        x, y, length = 0.84 * across, -0.80 * high, 0.11 * high
+        for axis, letter in enumerate("RAS"):
+            right, up = length * float(camera.right[axis]), length * float(camera.up[axis])
+            # what points to the viewer has no direction here
+            if math.hypot(right, up) > 0.35 * length:
+                lines.append((x, y, x + right, y + up))
+                letters.append((x + 1.4 * right, y + 1.4 * up, letter))
+    length = views.scale_length(pictures.whole)
+    bar = (-0.94 * across, -0.93 * high, length, f"{length:g} mm")
+    return Annotations(across, high, tuple(letters), tuple(lines), bar)
+
+
+def _show(panel: Any, image: Any, notes: Annotations) -> None:
+    panel.imshow(image, extent=(-notes.across, notes.across, -notes.high, notes.high))
+    views.bare(panel)
+    for x, y, letter in notes.letters:
+        panel.text(x, y, letter, fontsize=10, color="#6a6a6a", va="center", ha="center")
+    for x, y, to_x, to_y in notes.lines:
+        panel.plot([x, to_x], [y, to_y], color="#6a6a6a", linewidth=1.2)
+    left, low, length, said = notes.bar
+    panel.plot([left, left + length], [low, low], color="#333333", linewidth=2.0)
+    panel.text(left + 0.5 * length, low + 0.03 * notes.high, said, fontsize=8, ha="center", color="#333333")

@@ -34,20 +34,27 @@ def write_tests_picture(path: Path, tests: Sequence[Tested], title: str, subtitl
         At least one.
     title, subtitle : str
     """
+    figure = tests_figure(tests, _COLUMNS)
+    # the title is the user's free text, in which a dollar sign begins no formula
+    figure.suptitle(f"{title}\n{subtitle}", fontsize=12, parse_math=False)
+    views.save(figure, path)
+
+
+def tests_figure(tests: Sequence[Tested], most: int) -> Any:
+    """Tests in up to so many columns."""
     from matplotlib.figure import Figure
 
-    columns = min(len(tests), _COLUMNS)
+    columns = min(len(tests), most)
     rows = math.ceil(len(tests) / columns)
-    figure = Figure(figsize=(4.8 * max(columns, 2), 3.9 * rows + 1.1), layout="constrained")
+    width = 4.8 if most == 1 else 4.8 * max(columns, 2)
+    figure = Figure(figsize=(width, 3.9 * rows + 1.1), layout="constrained", facecolor="white")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, test in zip(panels, tests, strict=False):
         _draw(axes, test)
     for axes in panels[len(tests) :]:
         axes.set_axis_off()
-    _draw_legend(figure, {test.recording.role for test in tests})
-    # the title is the user's free text, in which a dollar sign begins no formula
-    figure.suptitle(f"{title}\n{subtitle}", fontsize=12, parse_math=False)
-    views.save(figure, path)
+    _draw_legend(figure, {test.recording.role for test in tests}, 1 if most == 1 else 3)
+    return figure
 
 
 def _draw(axes: Any, test: Tested) -> None:
@@ -86,7 +93,7 @@ def _readable(response: Floats, unit: str) -> tuple[float, str]:
     return (1e3, f"m{unit}") if largest >= 1e-3 else (1e6, f"µ{unit}")
 
 
-def _draw_legend(figure: Any, roles: set[str]) -> None:
+def _draw_legend(figure: Any, roles: set[str], columns: int) -> None:
     from matplotlib.lines import Line2D
 
     entries: list[tuple[Any, str]] = [
@@ -95,4 +102,4 @@ def _draw_legend(figure: Any, roles: set[str]) -> None:
         if role in roles
     ]
     entries.append((Line2D([], [], color=_SIMULATED, marker=".", linewidth=1.5), "simulated (dots: computed states)"))
-    views.legend(figure, entries, loc="outside lower center", ncols=len(entries), fontsize=9)
+    views.legend(figure, entries, loc="outside lower center", ncols=columns, fontsize=9)

@@ -26,7 +26,7 @@ SET_TITLES = {
 
 #: What no model of this version holds, said with every run.
 _LEFT_OUT = (
-    "unless assumed above: contact with the skull away from the nodes that are fixed; falx and tentorium; pressure of "
+    "unless assumed: contact with the skull away from the nodes that are fixed; falx and tentorium; pressure of "
     "fluid in ventricles and cavity; viscosity other than damping; direction of fibres; flow of fluid through tissue"
 )
 

@@ -227,6 +227,32 @@ class EquilibriumSolver:
         self.system.forget()
         return self._follow(u, full)
 
+    def linear_estimate(self) -> Floats:
+        """Displacement (n, 3) [m] at full load if the body kept the stiffness that it has at rest.
+
+        Raises
+        ------
+        InputError
+            If nothing holds the body, or a part of it.
+        SolveError
+            If the stiffness at rest is not positive definite.
+        """
+        model, system = self.system.model, self.system
+        require_held(model)
+        system.set_time_step(math.inf)
+        system.forget()
+        system.set_load(1.0)
+        rest = np.zeros_like(model.prescribed)
+        system.u.assign(rest)
+        system.evaluate_tangents()
+        system.gather_forces()
+        r = self._free * (model.external_forces() - system.internal.numpy().astype(np.float64))
+        prescribed = np.where(model.constrained, model.prescribed, 0.0)
+        d, linear = self._direction(r, prescribed, bool(np.any(prescribed)), self.options.cg_tolerance, 0.0)
+        if linear.indefinite or not np.isfinite(d).all():
+            raise SolveError("the stiffness of the body at rest is not positive definite")
+        return d
+
     def step(self, start: Floats, time_step: float, time: float = math.inf) -> Equilibrium:
         """Go on from a state to the equilibrium a time step later, slowly: without inertia, but with memory.
 

@@ -4,24 +4,10 @@ import html
 import itertools
 import json
 import re
-import shutil
-import subprocess
 
-import pytest
+from browser import LISTEN, needs_browser, opened
 
-CHROMIUM = next(
-    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
-)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
-
-#: Runs before all else in the page, and collects what goes wrong.
-_LISTEN = """<script>
-window.wrong = [];
-window.addEventListener("error", (e) => window.wrong.push(String(e.message)));
-console.error = console.warn = (...said) => window.wrong.push(said.join(" "));
-// without a display Chromium draws frames now and then: here it draws when it is asked
-window.requestAnimationFrame = (draw) => setTimeout(draw, 0);
-</script>"""
+pytestmark = needs_browser
 
 #: Runs after all else: pixels of the canvas, what switches change, what was fetched.
 _LOOK = """<script>
@@ -68,23 +54,9 @@ window.addEventListener("load", () => {
 </script>"""
 
 
-def opened(page, tmp_path):
-    """The document after its scripts ran."""
-    path = tmp_path / "page.html"
-    path.write_text(page, encoding="utf-8")
-    options = (
-        *("--headless", "--no-sandbox", "--disable-dev-shm-usage", f"--user-data-dir={tmp_path / 'profile'}"),
-        *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=1200,900"),
-        *("--virtual-time-budget=8000", "--dump-dom"),
-    )
-    arguments = [CHROMIUM, *options, path.as_uri()]
-    done = subprocess.run(arguments, capture_output=True, text=True, timeout=120, check=True)
-    return done.stdout
-
-
 def test_the_view_draws_and_switches(diagnosed, tmp_path):
     page = (diagnosed / "report.html").read_text(encoding="utf-8")
-    page = page.replace("<head>", "<head>" + _LISTEN).replace("</body>", _LOOK + "</body>")
+    page = page.replace("<head>", "<head>" + LISTEN).replace("</body>", _LOOK + "</body>")
     document = opened(page, tmp_path)
     found = json.loads(html.unescape(re.search(r'<pre id="found">(.*?)</pre>', document, re.S)[1]))
     assert found["wrong"] == [] and found["fetched"] == [] and found["error"] == 0
@@ -104,6 +76,6 @@ def test_without_webgl_the_page_says_so(diagnosed, tmp_path):
     document.body.dataset.wrong = window.wrong.length;
     document.body.dataset.shown = getComputedStyle(document.querySelector(".missing")).display;
     </script>"""
-    page = page.replace("<head>", "<head>" + _LISTEN + blind)
+    page = page.replace("<head>", "<head>" + LISTEN + blind)
     document = opened(page.replace("</body>", look + "</body>"), tmp_path)
     assert 'data-wrong="0"' in document and 'data-shown="block"' in document

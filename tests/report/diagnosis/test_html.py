@@ -37,7 +37,7 @@ def change(folder, **keys):
 def test_it_is_one_file_without_a_network(diagnosed):
     page = (diagnosed / "report.html").read_text(encoding="utf-8")
     assert len(page) < 6e6
-    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    assert not re.findall(r'(?:src|srcset|href)="(?!data:|#)', page)
     assert "http://" not in page and "https://" not in page and "url(" not in page and "@import" not in page
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from warpbrain.atomic import whole_file
 from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
 from warpbrain.inference.probability import percent
 from warpbrain.report.diagnosis.figures.agreement import agreement_figure
@@ -14,6 +13,7 @@ from warpbrain.report.diagnosis.figures.curves import curves_figure
 from warpbrain.report.diagnosis.figures.map import map_figure
 from warpbrain.report.diagnosis.figures.residuals import residuals_figure
 from warpbrain.report.diagnosis.saved import Saved, read_saved, unit_of
+from warpbrain.report.diagnosis.scene import view_of
 from warpbrain.report.diagnosis.tables import (
     aside_table,
     candidates_table,
@@ -21,13 +21,13 @@ from warpbrain.report.diagnosis.tables import (
     next_table,
     rejected_table,
     smallest_table,
-    table,
-    text,
 )
 from warpbrain.report.diagnosis.text import when_in_words
-from warpbrain.report.diagnosis.viewer import asset, viewer
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.generative.page import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY
+from warpbrain.report.page.document import Section, document, header, listed, section, text, write_document
+from warpbrain.report.page.tables import table
+from warpbrain.report.page.viewer import viewer
 
 #: Ground and text of each verdict's badge; the word says it too.
 _BADGES = {
@@ -55,53 +55,28 @@ def write_page(folder: Path) -> None:
     InputError
         If there is none in it.
     """
-    page = page_of(read_saved(folder))
-    with whole_file(folder / "report.html") as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_document(folder / "report.html", page_of(read_saved(folder)))
 
 
 def page_of(saved: Saved) -> str:
     """The page."""
     summary = saved.summary
-    ground, letters = _BADGES[summary["verdict"]]
+    smallest = (
+        "<p>The smallest effect that nine of ten times would raise an alarm, at a middling place.</p>",
+        smallest_table(summary),
+    )
     sections = [
-        _verdict(summary),
         _before_and_after(saved),
-        _view(saved),
-        _section("Candidates", _CANDIDATES, candidates_table(summary)),
+        section("In three dimensions", _view(saved)),
+        section("Candidates", _CANDIDATES, candidates_table(summary)),
         _where(saved),
         _apart(summary),
-        _section("What to measure next", _next(summary)),
-        _section(
-            "What these data would have shown",
-            "<p>The smallest effect that nine of ten times would raise an alarm, at a middling place.</p>",
-            smallest_table(summary),
-        )
-        if summary["smallest_detectable"]
-        else "",
+        section("What to measure next", _next(summary)),
+        section("What these data would have shown", *(smallest if summary["smallest_detectable"] else ())),
         _assumptions(saved),
     ]
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,">
-<title>{text(summary["verdict"])}: {text(summary["case"]["title"])}</title>
-<style>{asset("page.css")}
-:root {{ --badge: {ground}; --badge-text: {letters}; }}</style>
-</head>
-<body>
-<main>
-{"".join(sections)}
-</main>
-</body>
-</html>
-"""
-
-
-def _section(title: str, *parts: str) -> str:
-    return f"<section><h2>{text(title)}</h2>{''.join(parts)}</section>\n"
+    verdict = summary["verdict"]
+    return document(f"{verdict}: {summary['case']['title']}", _verdict(summary), sections, _BADGES[verdict])
 
 
 def _verdict(summary: dict[str, Any]) -> str:
@@ -121,16 +96,10 @@ def _verdict(summary: dict[str, Any]) -> str:
     if improvement is not None:
         low, high = (100.0 * value for value in improvement["interval_95"])
         facts.append(("of it gone (95 %)", f"{100.0 * improvement['part']:.0f} % ({low:.0f} to {high:.0f})"))
-    shown = "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in facts)
-    return (
-        f'<header><h1>{text(summary["case"]["title"])}</h1><div class="verdict">'
-        f'<span class="badge">{text(summary["verdict"])}</span><p class="sentence">'
-        f"{text(summary['sentence'])}</p>"
-        f'<dl class="facts">{shown}</dl></div></header>\n'
-    )
+    return header(summary["case"]["title"], summary["verdict"], [summary["sentence"]], facts)
 
 
-def _before_and_after(saved: Saved) -> str:
+def _before_and_after(saved: Saved) -> Section:
     summary = saved.summary
     parts = []
     if saved.anatomy is not None and saved.rows is not None and saved.rows.lengths.any():
@@ -146,17 +115,18 @@ def _before_and_after(saved: Saved) -> str:
     parts += [f"<p>{whose} pattern that means nothing does as well with p = {p:.2g}.</p>" for whose, p in known]
     if saved.rows is not None and saved.rows.lengths.any():
         parts.append(agreement_figure(summary, saved.rows))
-    return _section("Before and after", *parts)
+    return section("Before and after", *parts)
 
 
 def _view(saved: Saved) -> str:
     if saved.anatomy is None:
         return ""
     rows = saved.rows if saved.rows is not None and saved.rows.lengths.any() else None
-    return _section("In three dimensions", viewer(saved.summary, saved.anatomy, rows))
+    note = "Arrows go from the computed to the observed place."
+    return viewer(view_of(saved.summary, saved.anatomy, rows), "what is left", note)
 
 
-def _where(saved: Saved) -> str:
+def _where(saved: Saved) -> Section:
     summary, where = saved.summary, saved.summary["where"]
     parts = []
     if where is None:
@@ -177,10 +147,10 @@ def _where(saved: Saved) -> str:
         parts.append(f"<p>When: {text(when_in_words(summary['when']))}.</p>")
     if saved.anatomy is not None:
         parts.append(map_figure(summary, saved.anatomy))
-    return _section("Where", *parts)
+    return section("Where", *parts)
 
 
-def _apart(summary: dict[str, Any]) -> str:
+def _apart(summary: dict[str, Any]) -> Section:
     if len(summary["group"]) > 1:
         chances = {one["mechanism"]: one["probability"] for one in summary["ranking"]}
         members = "".join(
@@ -189,7 +159,7 @@ def _apart(summary: dict[str, Any]) -> str:
         first = f"<p>These data do not tell these apart:</p><ul>{members}</ul>"
     else:
         first = "<p>No few mechanisms share the probability among them.</p>"
-    return _section("What cannot be told apart", first, _confusion(summary), rejected_table(summary))
+    return section("What cannot be told apart", first, _confusion(summary), rejected_table(summary))
 
 
 def _confusion(summary: dict[str, Any]) -> str:
@@ -209,20 +179,19 @@ def _next(summary: dict[str, Any]) -> str:
     )
 
 
-def _assumptions(saved: Saved) -> str:
+def _assumptions(saved: Saved) -> Section:
     summary = saved.summary
-    assumed = "".join(f"<li>{text(one)}</li>" for one in summary["assumptions"])
-    remarks = "".join(f"<li>{text(one)}</li>" for one in summary["remarks"])
+    remarks = listed(summary["remarks"])
     files = table(
         ("file", "SHA-256"), [[text(k), f"<code>{text(v)}</code>"] for k, v in summary["inputs_sha256"].items()]
     )
     options = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in summary["options"].items())
     versions = ", ".join(f"{key} {value}" for key, value in summary["versions"].items())
     seconds = sum(summary["seconds"].values())
-    return _section(
+    return section(
         "What was assumed",
-        f"<ul>{assumed}</ul>",
-        f"<h3>Remarks</h3><ul>{remarks}</ul>" if remarks else "",
+        listed(summary["assumptions"]),
+        f"<h3>Remarks</h3>{remarks}" if remarks else "",
         aside_table(saved.rows),
         "<h3>How it was made</h3>",
         f"<p>Options: {text(options)}.<br>Versions: {text(versions)}.<br>{seconds:.0f} s on "

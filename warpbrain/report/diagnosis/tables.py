@@ -1,9 +1,7 @@
-"""The tables of a report, as HTML."""
+"""The tables of a diagnosis, as HTML."""
 
 from __future__ import annotations
 
-import html
-from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,23 +10,8 @@ from warpbrain.inference.probability import percent
 from warpbrain.physics.sizes import size_in_words
 from warpbrain.physics.values import Value
 from warpbrain.report.diagnosis.saved import STATES, Rows, unit_of
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = (), caption: str = "") -> str:
-    """A table of HTML cells; columns of numbers are set to the right."""
-    kinds = ["number" if k in numbers else "" for k in range(len(head))]
-    top = "".join(f'<th scope="col" class="{kind}">{name}</th>' for name, kind in zip(head, kinds, strict=True))
-    lines = [
-        "<tr>" + "".join(f'<td class="{kind}">{cell}</td>' for cell, kind in zip(row, kinds, strict=True)) + "</tr>"
-        for row in rows
-    ]
-    title = f"<caption>{caption}</caption>" if caption else ""
-    return f'<div class="wide"><table>{title}<thead><tr>{top}</tr></thead><tbody>{"".join(lines)}</tbody></table></div>'
-
-
-def text(value: Any) -> str:
-    """Words of a case or a diagnosis as HTML."""
-    return html.escape(str(value))
+from warpbrain.report.page.document import text
+from warpbrain.report.page.tables import table
 
 
 def candidates_table(summary: dict[str, Any]) -> str:
@@ -120,8 +103,6 @@ def smallest_table(summary: dict[str, Any]) -> str:
         # of what is there or not there is no size
         of_size = named is not None and one["unit"] != "of being there"
         rows.append([text(kind), text(one.get("says", size)), text(f"{named:.2g} {one['unit']}") if of_size else ""])
-    if not any(row[2] for row in rows):
-        return table(("mechanism", "is seen"), [row[:2] for row in rows])
     return table(("mechanism", "is seen", "half are named from"), rows)
 
 

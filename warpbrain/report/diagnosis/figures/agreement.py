@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from warpbrain.physics.words import length
-from warpbrain.report.diagnosis.figures.drawing import COLOURS, MARKERS, TEXT, inlined, panels
+from warpbrain.report.diagnosis.figures.states import COLOURS, MARKERS
 from warpbrain.report.diagnosis.saved import STATES, Rows
 from warpbrain.report.generative.page import BLACK
+from warpbrain.report.page.figures import TEXT, inlined, panels
 
 
 def agreement_figure(summary: dict[str, Any], rows: Rows) -> str:
@@ -18,37 +19,35 @@ def agreement_figure(summary: dict[str, Any], rows: Rows) -> str:
 
     shown = [state for state in STATES if rows.has(state)]
     counted = rows.lengths & ~(rows["set_aside"] > 0.0)
-    figure, axes = panels(3.6, len(shown), sharex=True, sharey=True, width=2.75 * len(shown))
     observed = rows["observed"][counted]
     computed = {state: rows[state][counted] for state in shown}
     ends = np.concatenate([observed, *computed.values()])
     margin = 0.05 * float(np.ptp(ends)) or 1.0
     low, high = float(ends.min()) - margin, float(ends.max()) + margin
-    errors = []
-    for panel, state in zip(axes, shown, strict=True):
-        colour = COLOURS[state]
-        panel.plot(
-            computed[state],
-            observed,
-            MARKERS[state],
-            markersize=4.0,
-            color=colour,
-            fillstyle="none",
-            markeredgewidth=0.8,
-        )
-        panel.plot([low, high], [low, high], color=BLACK, linewidth=0.8)
-        panel.set_xlim(low, high)
-        panel.set_ylim(low, high)
-        panel.set_aspect("equal")
-        for axis in (panel.xaxis, panel.yaxis):
-            axis.set_major_locator(MaxNLocator(5))
-        rmse = length(summary["fit"]["rmse_m"][state])
-        errors.append(f"{STATES[state]} {rmse}")
-        panel.set_title(f"{STATES[state]}\nRMSE {rmse}", fontsize=TEXT)
-        panel.set_xlabel("computed [mm]", fontsize=TEXT)
-    axes[0].set_ylabel("observed [mm]", fontsize=TEXT)
+    errors = {state: length(summary["fit"]["rmse_m"][state]) for state in shown}
+
+    def draw(narrow: bool) -> Any:
+        figure, axes = panels(narrow, 3.6, len(shown), sharex=True, sharey=True, width=2.75 * len(shown))
+        for panel, state in zip(axes, shown, strict=True):
+            panel.plot(
+                computed[state], observed, MARKERS[state], markersize=4.0, color=COLOURS[state], fillstyle="none",
+                markeredgewidth=0.8,
+            )  # fmt: skip
+            panel.plot([low, high], [low, high], color=BLACK, linewidth=0.8)
+            panel.set_xlim(low, high)
+            panel.set_ylim(low, high)
+            panel.set_aspect("equal")
+            for axis in (panel.xaxis, panel.yaxis):
+                axis.set_major_locator(MaxNLocator(5))
+            panel.set_title(f"{STATES[state]}\nRMSE {errors[state]}", fontsize=TEXT)
+            panel.set_xlabel("computed [mm]", fontsize=TEXT)
+        for panel in axes if narrow else axes[:1]:
+            panel.set_ylabel("observed [mm]", fontsize=TEXT)
+        return figure
+
     caption = (
         "Every component of displacement that was recorded, beside what was computed of it; on the line they agree. "
         "The refitted ones have registration and the error of the mesh taken off."
     )
-    return inlined(figure, f"Observed beside computed displacements; RMSE {', '.join(errors)}.", caption)
+    said = ", ".join(f"{STATES[state]} {error}" for state, error in errors.items())
+    return inlined(draw, f"Observed beside computed displacements; RMSE {said}.", caption)

@@ -1,4 +1,4 @@
-// The 3-D view of a report: surface, recorded points with residual arrows, the located ball. WebGL 2, no library.
+// The 3-D view of a report: surface and cuts, before and after, recorded points with arrows, a ball. WebGL 2, no library.
 "use strict";
 (() => {
   const holder = document.getElementById("scene");
@@ -100,26 +100,40 @@
     };
   };
 
-  // the anatomy
-  const anatomy = body(), normals = new Float32Array(points.length);
-  const at = (i) => [points[3 * i], points[3 * i + 1], points[3 * i + 2]];
+  // the anatomy and planes through it, all of triangles that move
   const minus = (a, b) => a.map((value, k) => value - b[k]);
-  for (let f = 0; f < triangles.length; f += 3) {
-    const [a, b, c] = [0, 1, 2].map((k) => at(triangles[f + k])), n = cross(minus(b, a), minus(c, a));
-    for (let k = 0; k < 3; k++) for (let j = 0; j < 3; j++) normals[3 * triangles[f + k] + j] += n[j];
-  }
-  for (let i = 0; i < normals.length; i += 3) normals.set(unit([...normals.slice(i, i + 3)]), i);
-  anatomy.places(points);
-  anatomy.normals(normals);
-  anatomy.faces(triangles);
+  const skin = (points, triangles, moves, values) => {
+    const shown = body(), moved = new Float32Array(points), normals = new Float32Array(points.length);
+    const at = (i) => [moved[3 * i], moved[3 * i + 1], moved[3 * i + 2]];
+    const move = (factor) => {
+      if (moves) for (let i = 0; i < points.length; i++) moved[i] = points[i] + factor * moves[i];
+      normals.fill(0);
+      for (let f = 0; f < triangles.length; f += 3) {
+        const [a, b, c] = [0, 1, 2].map((k) => at(triangles[f + k])), n = cross(minus(b, a), minus(c, a));
+        for (let k = 0; k < 3; k++) for (let j = 0; j < 3; j++) normals[3 * triangles[f + k] + j] += n[j];
+      }
+      for (let i = 0; i < normals.length; i += 3) normals.set(unit([...normals.slice(i, i + 3)]), i);
+      shown.places(moved);
+      shown.normals(normals);
+    };
+    shown.faces(triangles);
+    return { move, values, colours: shown.colours, draw: shown.draw, shown: false };
+  };
+  const anatomy = skin(points, triangles, said.moves && floats(said.moves), fields.map((field) => field.values));
+  const cuts = said.cuts.map((cut) =>
+    skin(floats(cut.points), new Uint32Array(bytes(cut.triangles)), cut.moves && floats(cut.moves), cut.values.map(floats)));
+  const move = (factor) => { for (const one of [anatomy, ...cuts]) one.move(factor); };
   const shade = (part) => {
     const stops = said.colours, at = Math.max(0, Math.min(1, part)) * (stops.length - 1), k = Math.min(stops.length - 2, Math.floor(at));
     return stops[k].map((value, j) => value + (at - k) * (stops[k + 1][j] - value));
   };
   const paint = (number) => {
-    const field = fields[number], span = field.high - field.low || 1, colours = new Uint8Array((points.length / 3) * 4);
-    for (let i = 0; i < field.values.length; i++) colours.set([...shade((field.values[i] - field.low) / span), 255], 4 * i);
-    anatomy.colours(colours);
+    const field = fields[number], span = field.high - field.low || 1;
+    for (const one of [anatomy, ...cuts]) {
+      const values = one.values[number], colours = new Uint8Array(4 * values.length);
+      for (let i = 0; i < values.length; i++) colours.set([...shade((values[i] - field.low) / span), 255], 4 * i);
+      one.colours(colours);
+    }
     const bar = holder.querySelector(".bar");
     bar.querySelector(".low").textContent = field.low_text;
     bar.querySelector(".high").textContent = field.high_text;
@@ -220,6 +234,7 @@
     gl.disable(gl.CULL_FACE);
     gl.disable(gl.BLEND);
     if (where.length) shapes.draw(1);
+    for (const cut of cuts) if (cut.shown) cut.draw(1);
     const solid = state.opacity > 0.995;
     if (solid) anatomy.draw(1);
     gl.enable(gl.BLEND);
@@ -288,9 +303,12 @@
   const on = (name, act) => holder.querySelector(`input[name=${name}]`)?.addEventListener("input", (e) => { act(e.target); redraw(); });
   on("opacity", (input) => { state.opacity = +input.value; });
   on("enlarged", (input) => { enlarged = +input.value; input.nextElementSibling.textContent = `${enlarged} times`; fill(); });
+  on("moves", (input) => { input.nextElementSibling.textContent = `${input.value} times`; move(+input.value); });
+  holder.querySelectorAll("input[name=cuts]").forEach((input) => input.addEventListener("change", () => { cuts[+input.value].shown = input.checked; redraw(); }));
   on("ball", (input) => { state.ball = input.checked; });
   new ResizeObserver(redraw).observe(canvas);
   holder.classList.add("ready");
+  move(said.exaggeration);
   paint(0);
   fill();
   draw();

@@ -1,0 +1,33 @@
+"""The frame of every report: nothing of a user's words is markup, and its contents lead somewhere."""
+
+import re
+
+from warpbrain.report.page.document import document, header, listed, section
+from warpbrain.report.page.tables import table
+
+EVIL = '</title><script>alert("1")</script>'
+
+
+def test_words_are_no_markup():
+    page = document(EVIL, header(EVIL, EVIL, [EVIL], []), [section(EVIL, listed([EVIL]))], ("#000", "#fff"))
+    assert "<script>" not in page and page.count("&lt;script&gt;") == 7
+
+
+def test_contents_lead_to_sections_that_have_something():
+    sections = [section("Before & after", "<p>a</p>"), section("Empty"), section("What was assumed", "<p>b</p>")]
+    page = document("title", header("title", "badge", [], [("x", "1 mm")]), sections, ("#000", "#fff"))
+    links = re.findall(r'<a href="#([^"]*)">', page)
+    assert links == ["before-after", "what-was-assumed"] == re.findall(r'<section id="([^"]*)">', page)
+    assert "Empty" not in page
+
+
+def test_a_column_in_which_nothing_stands_is_left_out():
+    page = table(("name", "check", "role"), [["a", "", "fit"], ["b", "", ""]], numbers=(1, 2))
+    assert "check" not in page and "role" in page
+    # all rows have as many cells as there are heads
+    assert page.count("<th ") == 2 and page.count("<td") == 4 and page.count('class="number"') == 3
+
+
+def test_a_filled_column_stays_where_it_is():
+    page = table(("name", "check"), [["a", ""], ["b", "1.0"]], numbers=(1,))
+    assert re.findall(r"<td[^>]*>(.*?)</td>", page) == ["a", "", "b", "1.0"]

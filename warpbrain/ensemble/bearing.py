@@ -1,0 +1,67 @@
+"""Which samples a load is likely to be too much for, before any of them is computed: a linear estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from warpbrain.ensemble.sample import Sample
+from warpbrain.errors import SolveError
+from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.system import System
+
+#: How exact the estimate has to be: it decides on a sign.
+_TOLERANCE = 1e-2
+
+
+def least_stretch(model: Model, device: str | None = None) -> float:
+    """The least principal stretch of any element in linear elasticity; below zero no tissue is left of one.
+
+    ``min eig(I + (H + H^T) / 2)`` with the displacement gradient H of the body under its full load, with the stiffness
+    that it has at rest. A body stiffens as it is compressed, so it may bear what this says it does not.
+
+    Raises
+    ------
+    InputError, SolveError
+        As `EquilibriumSolver.linear_estimate`.
+    """
+    system = System(model, device)
+    solver = EquilibriumSolver(system, EquilibriumOptions(cg_tolerance=_TOLERANCE))
+    system.u.assign(solver.linear_estimate())
+    F = system.deformation_gradients()
+    return float(np.linalg.eigvalsh(0.5 * (F + F.transpose(0, 2, 1))).min())
+
+
+def overloaded(model: Model, samples: Sequence[Sample], device: str | None = None) -> list[int]:
+    """Numbers of the samples that are too soft for the load, by `least_stretch`.
+
+    Samples are taken in the order of their stiffness and the first that bears the load is found by bisection: a few
+    linear solves, however many samples there are.
+
+    Raises
+    ------
+    InputError, SolveError
+        As `least_stretch`.
+    """
+    known = [(_stiffness(sample), sample) for sample in samples if sample.materials is not None]
+    ordered = [sample for _, sample in sorted(known, key=lambda one: one[0])]
+    first, last = 0, len(ordered)
+    while first < last:
+        middle = (first + last) // 2
+        materials = ordered[middle].materials
+        assert materials is not None
+        try:
+            bears = least_stretch(replace(model, materials=materials), device) > 0.0
+        except SolveError:
+            bears = False
+        first, last = (first, middle) if bears else (middle + 1, last)
+    return sorted(sample.number for sample in ordered[:first])
+
+
+def _stiffness(sample: Sample) -> float:
+    """Mean logarithm of the shear moduli [Pa]."""
+    materials = sample.materials or {}
+    return float(np.mean([np.log(one.law.shear_modulus) for one in materials.values()]))

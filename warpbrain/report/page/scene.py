@@ -1,0 +1,188 @@
+"""What a 3-D view shows, as JSON that its script reads: a surface with fields, cuts, points, arrows, a ball.
+
+Lengths are in mm, axes RAS; arrays are 32-bit numbers in base64.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from warpbrain.arrays import Floats
+from warpbrain.mesh import TetMesh
+from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.page.figures import shades
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """Numbers at the nodes of a body, and how they become colours.
+
+    Attributes
+    ----------
+    name, label : str
+        Of the switch, and of the bar of colours, with its unit.
+    values : (n,) array
+    low, high : float
+        Values of the first and the last colour.
+    mark : float or None
+        A value that is marked in the bar.
+    note : str
+        What is said below the bar: of the mark, if there is one.
+    """
+
+    name: str
+    label: str
+    values: Floats
+    low: float
+    high: float
+    mark: float | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Arrows:
+    """Arrows at the recorded points.
+
+    Attributes
+    ----------
+    name, colour : str
+        The colour as ``#rrggbb``.
+    vectors : (k, 3) array
+        [m]
+    shown : bool
+        At first.
+    """
+
+    name: str
+    colour: str
+    vectors: Floats
+    shown: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What is in a view.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+    fields : sequence of Field
+    recorded : (k, 3) array
+        Points [m].
+    arrows : sequence of Arrows
+    ball : tuple of (3,) array and float, or None
+        Centre and radius [m].
+    u : (n, 3) array or None
+        Displacement of the nodes [m]: the view then shows the body before and after.
+    exaggeration : float
+        How many times as far as it moves the body is shown after, at first.
+    cuts : mapping of str to tuple of int and float
+        Planes that can be shown: name, axis and place [m].
+    """
+
+    mesh: TetMesh
+    fields: Sequence[Field]
+    recorded: Floats
+    arrows: Sequence[Arrows] = ()
+    ball: tuple[Floats, float] | None = None
+    u: Floats | None = None
+    exaggeration: float = 1.0
+    cuts: Mapping[str, tuple[int, float]] | None = None
+
+
+def describe_scene(view: View) -> dict[str, Any]:
+    """The scene of a view."""
+    mesh = view.mesh
+    used, triangles = np.unique(mesh.boundary, return_inverse=True)
+    stops = shades()(np.linspace(0.0, 1.0, 9))[:, :3]
+    ball = None
+    if view.ball is not None:
+        centre, radius = view.ball
+        ball = {"centre": [MILLIMETRES * float(value) for value in centre], "radius": MILLIMETRES * radius}
+    return {
+        "points": _packed(MILLIMETRES * mesh.points[used]),
+        "triangles": _packed(triangles.reshape(-1, 3), np.uint32),
+        "moves": None if view.u is None else _packed(MILLIMETRES * view.u[used]),
+        "exaggeration": view.exaggeration,
+        "cuts": [_cut(view, name, axis, place) for name, (axis, place) in (view.cuts or {}).items()],
+        "fields": [_field(field, used) for field in view.fields],
+        "recorded": _packed(MILLIMETRES * view.recorded),
+        "arrows": [
+            {
+                "name": one.name,
+                "colour": [int(one.colour[k : k + 2], 16) for k in (1, 3, 5)],
+                "vectors": _packed(MILLIMETRES * one.vectors),
+                "shown": one.shown,
+            }
+            for one in view.arrows
+        ],
+        "enlarged": _enlarged(view.arrows, mesh),
+        "ball": ball,
+        "colours": np.round(255.0 * stops).astype(int).tolist(),
+    }
+
+
+def scene_json(scene: dict[str, Any]) -> str:
+    """As text that can stand in a page: nothing of it ends the element that it is in."""
+    return json.dumps(scene, allow_nan=False).replace("</", "<\\/")
+
+
+def _enlarged(arrows: Sequence[Arrows], mesh: TetMesh) -> int:
+    """How many times as long as they are arrows are drawn at first: a large one is a tenth of the body."""
+    if not arrows or not len(arrows[0].vectors):
+        return 1
+    large = float(np.quantile(np.linalg.norm(arrows[0].vectors, axis=1), 0.95))
+    size = float(np.ptp(mesh.points, axis=0).max())
+    return int(np.clip(round(0.1 * size / max(large, 1e-9)), 1, 40))
+
+
+def _field(field: Field, used: Any) -> dict[str, Any]:
+    values = np.asarray(field.values)[used]
+    beyond = "≥ " if float(values.max()) > field.high else ""
+    return {
+        "name": field.name,
+        "label": field.label,
+        "values": _packed(values),
+        "low": field.low,
+        "high": field.high,
+        "low_text": f"{field.low:.3g}",
+        "high_text": f"{beyond}{field.high:.3g}",
+        "mark": field.mark,
+        "mark_text": "" if field.mark is None else field.note,
+        "note": "" if field.mark is not None else field.note,
+    }
+
+
+def _cut(view: View, name: str, axis: int, place: float) -> dict[str, Any]:
+    """A plane through the body with what its fields and its displacement are there."""
+    import pyvista
+
+    mesh = view.mesh
+    grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: mesh.tetrahedra}, np.array(mesh.points))
+    for k, field in enumerate(view.fields):
+        grid.point_data[f"field {k}"] = np.asarray(field.values, dtype=np.float64)
+    if view.u is not None:
+        grid.point_data["moves"] = view.u
+    origin = np.zeros(3)
+    origin[axis] = place
+    section = grid.slice(normal=np.eye(3)[axis], origin=origin).triangulate()
+    # a plane beside the body has neither points nor what they carry
+    there = section.point_data if section.n_points else dict.fromkeys(grid.point_data.keys(), np.zeros(0))
+    return {
+        "name": name,
+        "points": _packed(MILLIMETRES * section.points),
+        "triangles": _packed(section.regular_faces if section.n_cells else np.zeros(0), np.uint32),
+        "moves": None if view.u is None else _packed(MILLIMETRES * there["moves"]),
+        "values": [_packed(there[f"field {k}"]) for k in range(len(view.fields))],
+    }
+
+
+def _packed(values: Any, kind: Any = np.float32) -> str:
+    """The bytes of an array, little end first, in base64."""
+    return base64.b64encode(np.ascontiguousarray(values, np.dtype(kind).newbyteorder("<")).tobytes()).decode()
