@@ -17,11 +17,20 @@ from warpbrain.cases.building.label_image import read_labels
 from warpbrain.cases.building.labels import LabelMesh, mesh_labels
 from warpbrain.cases.building.plausible import check_volume_in, cm3
 from warpbrain.cases.building.presets import Preset, preset
-from warpbrain.cases.building.tissue_names import OUTSIDE, RESECTION, VENTRICLE, Assignment, assign, parse_names
+from warpbrain.cases.building.tissue_names import (
+    OUTSIDE,
+    RESECTION,
+    VENTRICLE,
+    Assignment,
+    assign,
+    parse_names,
+    usual_name,
+)
 from warpbrain.cases.case_template import case_text
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
-from warpbrain.mesh import Quality, TetMesh, components, measure, ordered, read_mesh, split_boundary, write_mesh
+from warpbrain.mesh import Quality, TetMesh, components, measure, ordered, split_boundary, write_mesh
+from warpbrain.mesh.regions import read_regions
 from warpbrain.mesh.surface import face_vectors
 
 # how far the volume of a tissue may be from that of its labels before it is said
@@ -155,13 +164,14 @@ def start_from_mesh(
     folder : Path
         Must not be there yet, or be empty.
     file : Path
-        Any tetrahedral mesh that meshio reads; its node and element sets are kept.
+        Any tetrahedral mesh that meshio reads; its tissues are those of `read_regions`, its node and element sets are
+        kept.
     frame : Frame
         Unit and axes of the file.
     names : sequence of str
         Arguments of `--tissue`: names of the labels of the mesh.
     array : str, optional
-        Cell array of the labels; by default `tissue`, and one tissue if there is none.
+        Cell array of the labels, where several could be it.
 
     Raises
     ------
@@ -172,7 +182,8 @@ def start_from_mesh(
     given = parse_names(names)
     # meshio prints lines of its own where it gives up; the error says it
     with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-        raw = read_mesh(file, frame.unit, array)
+        named = read_regions(file, frame.unit, array)
+    raw = named.mesh
     check_volume_in(f"{file}: the mesh", raw.volume, frame.unit)
     pieces = int(components(raw.tetrahedra).max()) + 1
     if pieces > 1:
@@ -182,17 +193,18 @@ def start_from_mesh(
         raise BuildError(f"{file}: expected tissue labels of 0 or more, found {numbers[0]}")
     if absent := [str(label) for label in given if label not in numbers]:
         raise InputError(f"--tissue: the mesh has no tissue {', '.join(absent)}; it has {', '.join(map(str, numbers))}")
-    for label, name in given.items():
+    called = _names_in(file, named.names, given)
+    for label, name in called.items():
         if name == VENTRICLE or name in OUTSIDE:
             raise InputError(f"--tissue: {label}={name}: the cells of a mesh are all tissue, name what they are")
     points = raw.points * frame.signs
-    notes = []
-    if len(numbers) == 1 and array is None:
+    notes = list(named.notes)
+    if len(numbers) == 1 and array is None and not named.names:
         notes.append("one tissue: if there are more, --array names the cell array of their labels")
     sets = {**first_sets(points, raw.tetrahedra), **raw.node_sets}
     vectors = {name: values * frame.signs for name, values in raw.element_vectors.items()}
     mesh = ordered(TetMesh(points, raw.tetrahedra, raw.tissue, sets, raw.element_sets, vectors))
-    tissues = {label: given.get(label, f"tissue {label}") for label in numbers}
+    tissues = {label: called.get(label, f"tissue {label}") for label in numbers}
     _write(folder, mesh, tissues, file)
     return StartedCase(folder, mesh, tissues, measure(mesh), None, None, _cavity_volume(mesh), 0.0, tuple(notes))
 
@@ -236,6 +248,18 @@ def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path
         text = case_text(name, source.name, tissues, "ventricle" in mesh.node_sets, RESECTION in mesh.element_sets)
         (place / "case.toml").write_text(text, encoding="utf-8")
         (place / "recordings").mkdir()
+
+
+def _names_in(file: Path, names: Mapping[int, str], given: Mapping[int, str]) -> dict[int, str]:
+    """What the tissues of a mesh are called: as the user says, else as the file does."""
+    called = dict(given)
+    for label, name in names.items():
+        if label not in given:
+            try:
+                called[label] = usual_name(name)
+            except InputError as error:
+                raise InputError(f"{file}: {error}; --tissue {label}=NAME says what it is") from None
+    return called
 
 
 def _left_out(

@@ -38,7 +38,7 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
     mesh = parser.add_argument_group("with --mesh")
     mesh.add_argument("--units", choices=("mm", "m"), help="unit of the mesh (default: mm)")
     mesh.add_argument("--axes", choices=("RAS", "LPS"), help="axes of the mesh (default: RAS)")
-    mesh.add_argument("--array", metavar="NAME", help="cell array of the tissue labels (default: tissue)")
+    mesh.add_argument("--array", metavar="NAME", help="cell array of the tissues, where several could be it")
     parser.set_defaults(call=_new)
 
 
