@@ -232,7 +232,7 @@ def test_a_folder_that_is_not_empty_stays_as_it_is(tmp_path):
         lambda: start_from_mesh(tmp_path / "full", source, Frame()),
         lambda: start_from_labels(tmp_path / "full", tmp_path / "none.nii"),
     ):
-        with pytest.raises(InputError, match="full: there is a folder of that name that is not empty"):
+        with pytest.raises(InputError, match="full: has a case already: choose another folder, or --overwrite it"):
             begin()
     assert [path.read_text() for path in (tmp_path / "full").iterdir()] == ["mine"]
     (tmp_path / "empty").mkdir()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpbrain.atomic import check_new_folder, whole_folder
+from warpbrain.atomic import check_new_folder, check_writable, whole_file, whole_folder
 from warpbrain.cases.building.errors import BuildError, require_extra
 from warpbrain.cases.building.first_sets import first_sets
 from warpbrain.cases.building.label_image import read_labels
@@ -33,6 +33,7 @@ from warpbrain.mesh import Quality, TetMesh, components, measure, ordered, split
 from warpbrain.mesh.regions import read_regions
 from warpbrain.mesh.surface import face_vectors
 
+CASE_FILE = "case.toml"
 # how far the volume of a tissue may be from that of its labels before it is said
 FAITHFUL = 0.10
 # what share of the voxels of a tissue must lie in that tissue of the mesh before it is said that most do not
@@ -82,6 +83,7 @@ def start_from_labels(
     progress: Callable[[str], None] = lambda line: None,
     *,
     program: str | None = None,
+    overwrite: bool = False,
 ) -> StartedCase:
     """Make a case folder from a label volume.
 
@@ -101,13 +103,15 @@ def start_from_labels(
         Called with one line of text whenever something is begun.
     program : str, optional
         Whose labels they are, see `preset`; `names` take precedence, and labels that the volume lacks are no mistake.
+    overwrite : bool
+        Whether mesh and `case.toml` of a case that is in the folder may be replaced.
 
     Raises
     ------
     InputError
         If the folder is not empty, or anything is wrong with the labels or their names; nothing is written then.
     """
-    check_new_folder(folder)
+    _check_folder(folder, overwrite)
     if size is not None and not 0 < size < np.inf:
         raise InputError(f"--size: found {size:g}, expected a positive length [mm]")
     chosen = parse_names(names)
@@ -140,7 +144,7 @@ def start_from_labels(
             f"{VENTRICLE}: {cm3(cavity)} closed in the mesh, {cm3(wanted)} in the labels: it is in part thinner than "
             "an element, or opens to the outside; a smaller --size shows more of it"
         )
-    _write(folder, mesh, tissues, labels)
+    _write(folder, mesh, tissues, labels, overwrite)
     return StartedCase(
         folder,
         mesh,
@@ -155,7 +159,13 @@ def start_from_labels(
 
 
 def start_from_mesh(
-    folder: Path, file: Path, frame: Frame, names: Sequence[str] = (), array: str | None = None
+    folder: Path,
+    file: Path,
+    frame: Frame,
+    names: Sequence[str] = (),
+    array: str | None = None,
+    *,
+    overwrite: bool = False,
 ) -> StartedCase:
     """Make a case folder from a volume mesh.
 
@@ -172,13 +182,15 @@ def start_from_mesh(
         Arguments of `--tissue`: names of the labels of the mesh.
     array : str, optional
         Cell array of the labels, where several could be it.
+    overwrite : bool
+        Whether mesh and `case.toml` of a case that is in the folder may be replaced.
 
     Raises
     ------
     InputError
         If the folder is not empty or the mesh cannot be used; nothing is written then.
     """
-    check_new_folder(folder)
+    _check_folder(folder, overwrite)
     given = parse_names(names)
     # meshio prints lines of its own where it gives up; the error says it
     with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
@@ -205,7 +217,7 @@ def start_from_mesh(
     vectors = {name: values * frame.signs for name, values in raw.element_vectors.items()}
     mesh = ordered(TetMesh(points, raw.tetrahedra, raw.tissue, sets, raw.element_sets, vectors))
     tissues = {label: called.get(label, f"tissue {label}") for label in numbers}
-    _write(folder, mesh, tissues, file)
+    _write(folder, mesh, tissues, file, overwrite)
     return StartedCase(folder, mesh, tissues, measure(mesh), None, None, _cavity_volume(mesh), 0.0, tuple(notes))
 
 
@@ -239,14 +251,34 @@ def summary(case: StartedCase) -> list[str]:
     ]
 
 
-def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path) -> None:
+def _check_folder(folder: Path, overwrite: bool) -> None:
+    """`InputError` if a case cannot be begun there."""
+    if overwrite and (folder / CASE_FILE).is_file():
+        check_writable(folder / CASE_FILE)
+        return
+    try:
+        check_new_folder(folder)
+    except InputError as error:
+        if (folder / CASE_FILE).is_file():
+            raise InputError(f"{folder}: has a case already: choose another folder, or --overwrite it") from None
+        raise error
+
+
+def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path, overwrite: bool) -> None:
     if not mesh.node_sets["base"].any():
         raise BuildError(f"{source}: found no outer nodes that face down in the lower third: is its z axis up?")
     name = folder.resolve().name
+    text = case_text(name, source.name, tissues, "ventricle" in mesh.node_sets, RESECTION in mesh.element_sets)
+    if overwrite and (folder / CASE_FILE).is_file():
+        # what its user wrote into it, and recordings, are not ours to lose
+        (folder / CASE_FILE).replace(folder / f"{CASE_FILE}.old")
+        write_mesh(folder / "mesh.vtu", mesh, unit="mm")
+        with whole_file(folder / CASE_FILE) as scratch:
+            scratch.write_text(text, encoding="utf-8")
+        return
     with whole_folder(folder) as place:
         write_mesh(place / "mesh.vtu", mesh, unit="mm")
-        text = case_text(name, source.name, tissues, "ventricle" in mesh.node_sets, RESECTION in mesh.element_sets)
-        (place / "case.toml").write_text(text, encoding="utf-8")
+        (place / CASE_FILE).write_text(text, encoding="utf-8")
         (place / "recordings").mkdir()
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
+import sys
 from collections.abc import Sequence
 
 from warpbrain import __version__
-from warpbrain.cli import cases, diagnose, ensemble, estimate, gp, run, warp
+from warpbrain.cli import cases, compare, diagnose, ensemble, estimate, gp, run, warp
 from warpbrain.terminal.command import OneLineParser, exit_status
+from warpbrain.terminal.record import Record
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -21,7 +24,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     diagnose.add_parser(commands)
     ensemble.add_parser(commands)
     warp.add_parser(commands)
+    compare.add_parser(commands)
     cases.add_parser(commands)
     gp.add_parser(commands)
-    options = parser.parse_args(arguments)
-    return exit_status(parser.prog, lambda: options.call(options))
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    options = parser.parse_args(given)
+    options.record = Record(given, getattr(options, "quiet", False))
+    return exit_status(parser.prog, lambda: _call(options))
+
+
+def _call(options: argparse.Namespace) -> None:
+    with options.record.warnings_kept():
+        options.call(options)

@@ -90,7 +90,7 @@ def read_asked(image: Path | None, labels: Path | None, points: Sequence[Path]) 
 
 
 def write_warped(
-    folder: Path, state: SavedState, asked: Asked, progress: Callable[[str], None] = lambda line: None
+    folder: Path, state: SavedState, asked: Asked, progress: Callable[[float, str], None] = lambda share, stage: None
 ) -> tuple[list[str], list[str]]:
     """Write everything that a state and what is asked for give.
 
@@ -109,13 +109,13 @@ def write_warped(
     source = asked.grid_of
     check_place(asked, state.mesh, state.path)
     grid = Grid.around(state.mesh, _SPACING, _MARGIN) if source is None else source.grid
-    progress("displacement on the grid of the image")
+    progress(0.0, "displacement on the grid of the image")
     fine = grid.with_edges(_EDGE)
     inside = voxels_inside(state.mesh, fine)
     field = displacement_field(inside, state.u, state.middles)
-    progress("its inverse")
+    progress(0.3, "its inverse")
     back = inverse(field, inside.mask)
-    progress("files")
+    progress(0.8, "files")
     write_displacement(folder / "displacement.nii.gz", field.on(grid))
     write_transform(folder / FORTH, back.field)
     write_transform(folder / BACK, field)
@@ -133,6 +133,14 @@ def write_warped(
     image_after, labels_after = (None if each is None else _after(each.path) for each in (asked.image, asked.labels))
     files += write_slicer_scene(folder, state, asked.image, image_after, labels_after, files)
     return [*_lines(asked, field, inside, back, moved), *_trust_lines(state)], files
+
+
+def in_the_way(folder: Path, asked: Asked) -> list[str]:
+    """Names of files in a folder that what is asked for would be written over."""
+    names = ["displacement.nii.gz", FORTH, BACK]
+    names += [_after(image.path) for image in (asked.image, asked.labels) if image is not None]
+    names += [file.moved_name for file in asked.points]
+    return [name for name in names if (folder / name).exists()]
 
 
 def _after(path: Path) -> str:
