@@ -83,7 +83,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    asked, registration = _options(options), _registration(options)
+    settings, registration = _options(options), _registration(options)
     record: Record = options.record
     say = record.say
 
@@ -108,8 +108,8 @@ def _run(options: argparse.Namespace) -> None:
         case = replace(case, registration=registration)
     usual = f"warpbrain-estimate-{safe_name(case.name)}-{options.tissue}"
     # a sweep goes on where it was left, and draws the estimate that lies beside it
-    beside = ("estimate.json", "sweep.csv") if options.method == "grid" else ("sweep.csv",)
-    out = choose_folder(options.out, usual, options.overwrite, beside)
+    allowed = ("estimate.json", "sweep.csv") if options.method == "grid" else ("sweep.csv",)
+    out = choose_folder(options.out, usual, options.overwrite, allowed)
     output.note_case(record, case, device)
     say(case.title)
     if case.origin == "stand-in":
@@ -117,7 +117,7 @@ def _run(options: argparse.Namespace) -> None:
     if options.method == "grid":
         _sweep(options, case, out)
     else:
-        _estimate(options, asked, case, images, out)
+        _estimate(options, settings, case, images, out)
 
 
 def _registration(options: argparse.Namespace) -> Registration | None:
@@ -151,7 +151,7 @@ def _options(options: argparse.Namespace) -> EstimationOptions:
 
 def _estimate(
     options: argparse.Namespace,
-    asked: EstimationOptions,
+    settings: EstimationOptions,
     case: Case,
     images: Asked | None,
     out: Path,
@@ -185,7 +185,7 @@ def _estimate(
     model = find_model(options.gp or "hierarchical")
     listener = Listener(on_stage, on_step, progress.show)
     try:
-        posterior = Estimation(case, model, asked, options.device, listener).run()
+        posterior = Estimation(case, model, settings, options.device, listener).run()
     finally:
         progress.clear()
     averaged = None
@@ -194,14 +194,14 @@ def _estimate(
     elif options.causes is None:
         say("", f"what else may act is left out on more than {_LARGEST} nodes; --causes computes it", sep="\n")
     say("", *estimate_lines(posterior, averaged), sep="\n")
-    said = describe_estimate(posterior, find_device(options.device).alias, averaged)
+    described = describe_estimate(posterior, find_device(options.device).alias, averaged)
     with results_in(out, record, options.overwrite):
         write_predictions(out / "predictions.csv", posterior)
         write_estimated_state(out / "state.vtu", posterior)
         estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)
         estimate_picture.write_observed_against_predicted(out / "predicted.png", posterior)
         estimate_picture.write_residuals(out / "residuals.png", posterior)
-        write_summary(out / "estimate.json", said)
+        write_summary(out / "estimate.json", described)
         record.files += ["estimate.json", "predictions.csv", "state.vtu"]
         record.files += ["posterior.png", "predicted.png", "residuals.png"]
         if images is not None:
@@ -249,21 +249,21 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
     total = len(VALUES) ** len(parameters.tissues)
     say(f"sweep of {total} equilibria" + (f", {len(known)} of which are there already" if known else ""))
     progress = Progress("sweep", options.quiet)
-    found = dict(known)
+    points = dict(known)
 
     def on_point(point: SweepPoint) -> None:
-        found[point.k] = point
+        points[point.k] = point
         output_folder(out)
-        write_sweep(path, header, found.values())
-        progress.show(len(found) / total, ", ".join(f"k = {k:+.2f}" for k in point.k))
+        write_sweep(path, header, points.values())
+        progress.show(len(points) / total, ", ".join(f"k = {k:+.2f}" for k in point.k))
 
     try:
         finished = sweep(case, model, VALUES, known, options.device, on_point)
     finally:
         progress.clear()
     say(*sweep_lines(finished), sep="\n")
-    beside = out / "estimate.json"
-    estimate = json.loads(beside.read_text(encoding="utf-8")) if beside.exists() else None
+    estimate_file = out / "estimate.json"
+    estimate = json.loads(estimate_file.read_text(encoding="utf-8")) if estimate_file.exists() else None
     # beside an estimate, and of points that were there before
     with results_in(out, record, replace=False):
         write_sweep_picture(out / "sweep.png", finished, case.title, estimate)
