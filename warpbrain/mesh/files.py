@@ -14,6 +14,7 @@ Conventions of the files
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +33,8 @@ from warpbrain.mesh.vtu import read_vtu, write_vtu
 ELEMENT_SET_PREFIX = "set_"
 #: A larger file [bytes] is refused, not read: the largest meshes that are worth a simulation are a tenth of it.
 LARGEST_FILE = 512 << 20
+#: A file with the numbers of an XDMF file.
+_COMPANION = re.compile(rb"<DataItem\b[^>]*\bFormat\s*=\s*[\"'](?:HDF|Binary)[\"'][^>]*>([^<]*)", re.IGNORECASE)
 # cells of lower dimension are other people's boundary markers: they take nothing away from the volume
 TETRAHEDRA = ("tetra", "tetra10")
 _IGNORED = ("vertex", "line", "line3", "triangle", "triangle6", "quad", "quad8", "quad9", "polygon", "polyline")
@@ -101,6 +104,7 @@ def read_raw(path: Path) -> Any:
         raise MeshError(f"{path}: not a mesh that meshio can read (the file is empty)")
     if size > LARGEST_FILE:
         raise MeshError(f"{path}: found {size / 1e6:.0f} MB, expected a mesh of at most {LARGEST_FILE / 1e6:.0f} MB")
+    _check_companions(path)
     try:
         with patience(path):
             reader = {".vtu": read_vtu, ".inp": read_abaqus}.get(path.suffix.lower(), meshio.read)
@@ -112,6 +116,26 @@ def read_raw(path: Path) -> Any:
     except Exception as error:  # its readers raise whatever their parsers do
         detail = " ".join(str(error).split())[:200] or type(error).__name__
         raise MeshError(f"{path}: not a mesh that meshio can read ({detail})") from error
+
+
+def _check_companions(path: Path) -> None:
+    """`MeshError` if an XDMF file names data in another folder than its own."""
+    if path.suffix.lower() not in (".xdmf", ".xmf"):
+        return
+    for item in _COMPANION.finditer(path.read_bytes()):
+        name = item.group(1).decode("utf-8", "replace").strip().partition(":")[0]
+        if not (path.parent / name).resolve().is_relative_to(path.parent.resolve()):
+            raise MeshError(f"{path}: names '{name[:200]}', which leaves its folder")
+
+
+def ends_inside_a_number(path: Path) -> bool:
+    """Whether a text ends in a digit and not in a line break: cut off there, its last number is another one."""
+    with path.open("rb") as file:
+        file.seek(0, os.SEEK_END)
+        file.seek(max(0, file.tell() - 256))
+        end = file.read()
+    # of a binary file the last byte may be that of a digit by chance
+    return end[-1:].isdigit() and end.isascii() and b"\0" not in end
 
 
 def mesh_of(path: Path, raw: Any, unit: str) -> TetMesh:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, mesh_of, read_raw
+from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, ends_inside_a_number, mesh_of, read_raw
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 
 #: Array that is made of sets of elements, and what `--array` calls them.
@@ -70,6 +70,8 @@ def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithReg
     if not any(block.type in TETRAHEDRA for block in raw.cells):
         return MeshWithRegions(mesh_of(path, raw, unit), {}, ())
     notes: list[str] = []
+    if ends_inside_a_number(path):
+        notes.append(f"{path.name} ends in a number without a line break: is it cut off?")
     physical = {(int(dim), int(tag)): name for name, (tag, dim) in _groups(raw).items()}
     parts = _partition(raw)
     if parts is not None:
