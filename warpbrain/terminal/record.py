@@ -29,7 +29,7 @@ class Record:
     """
 
     def __init__(self, arguments: Sequence[str] = (), quiet: bool = False) -> None:
-        self._command = shlex.join(["warpbrain", *arguments])
+        self.arguments = tuple(arguments)
         self._quiet = quiet
         self._begun = datetime.now(UTC)
         self._clock = time.perf_counter()
@@ -44,6 +44,12 @@ class Record:
         self._lines.append(sep.join(map(str, values)))
         if not self._quiet:
             print(*values, sep=sep, flush=flush)
+
+    @property
+    def doing(self) -> str:
+        """The last line that was said."""
+        lines = [line.strip() for text in self._lines[-3:] for line in text.splitlines() if line.strip()]
+        return lines[-1][:80] if lines else ""
 
     def note(self, **facts: str) -> None:
         """What the log should say and nobody needs to read: device, versions, files."""
@@ -76,7 +82,7 @@ class Record:
             Whether it takes the place of the log that is there, or is written after it.
         """
         head = {
-            "command": self._command,
+            "command": shlex.join(["warpbrain", *self.arguments]),
             "in": str(Path.cwd()),
             "begun": self._begun.isoformat(timespec="seconds"),
             **self._facts,
