@@ -39,7 +39,7 @@ _PLACE, _MESSAGE = 120, 800
 
 def _shortened(text: str, most: int) -> str:
     one_line = " ".join(text.split())
-    return one_line if len(one_line) <= most else f"{one_line[:most]}..."
+    return one_line if len(one_line) <= most else f"{one_line[: most - 20]}...{one_line[-20:]}"
 
 
 class Problems:

@@ -133,7 +133,8 @@ def _verdict(summary: dict[str, Any]) -> str:
 def _before_and_after(saved: Saved) -> str:
     summary = saved.summary
     parts = []
-    if saved.anatomy is not None and saved.rows is not None and saved.rows.lengths.any():
+    # nothing is drawn of points that are all set aside
+    if saved.anatomy is not None and saved.rows is not None and not saved.rows.vectors.aside.all():
         parts.append(residuals_figure(summary, saved.anatomy, saved.rows))
     if saved.curves is not None:
         parts.append(curves_figure(saved.curves))
@@ -144,7 +145,7 @@ def _before_and_after(saved: Saved) -> str:
     placebos += [(f"{text(one['mechanism'])}: a", one["placebo_p"]) for one in fit.get("confirmations", ())]
     known = [(whose, p) for whose, p in placebos if p is not None]
     parts += [f"<p>{whose} pattern that means nothing does as well with p = {p:.2g}.</p>" for whose, p in known]
-    if saved.rows is not None and saved.rows.lengths.any():
+    if saved.rows is not None and (saved.rows.lengths & ~(saved.rows["set_aside"] > 0.0)).any():
         parts.append(agreement_figure(summary, saved.rows))
     return _section("Before and after", *parts)
 
