@@ -13,7 +13,7 @@ from warpbrain.report.diagnosis.figures.confusion import confusion_figure
 from warpbrain.report.diagnosis.figures.curves import curves_figure
 from warpbrain.report.diagnosis.figures.map import map_figure
 from warpbrain.report.diagnosis.figures.residuals import residuals_figure
-from warpbrain.report.diagnosis.saved import Saved, read_saved, unit_of
+from warpbrain.report.diagnosis.saved import Rows, Saved, read_saved, unit_of
 from warpbrain.report.diagnosis.tables import (
     aside_table,
     candidates_table,
@@ -133,8 +133,7 @@ def _verdict(summary: dict[str, Any]) -> str:
 def _before_and_after(saved: Saved) -> str:
     summary = saved.summary
     parts = []
-    # nothing is drawn of points that are all set aside
-    if saved.anatomy is not None and saved.rows is not None and not saved.rows.vectors.aside.all():
+    if saved.anatomy is not None and saved.rows is not None and _has_points(saved.rows):
         parts.append(residuals_figure(summary, saved.anatomy, saved.rows))
     if saved.curves is not None:
         parts.append(curves_figure(saved.curves))
@@ -150,10 +149,15 @@ def _before_and_after(saved: Saved) -> str:
     return _section("Before and after", *parts)
 
 
+def _has_points(rows: Rows) -> bool:
+    """Whether there are points to draw: recorded ones that are not all set aside."""
+    return bool(rows.lengths.any()) and not rows.vectors.aside.all()
+
+
 def _view(saved: Saved) -> str:
     if saved.anatomy is None:
         return ""
-    rows = saved.rows if saved.rows is not None and saved.rows.lengths.any() else None
+    rows = saved.rows if saved.rows is not None and _has_points(saved.rows) else None
     return _section("In three dimensions", viewer(saved.summary, saved.anatomy, rows))
 
 
