@@ -42,10 +42,10 @@ def resampled(
     # single precision only where it holds every value
     single = np.result_type(values.dtype, np.float32) == np.float32
     source = values if nearest else values.astype(np.float32 if single else np.float64)
-    known: NDArray[np.generic] | None = None
+    known: NDArray[np.float32] | None = None
     if not nearest and values.dtype.kind == "f" and not np.isfinite(source).all():
         known = np.isfinite(source).astype(np.float32)
-        source = np.where(known > 0.0, source, 0.0)
+        source = np.where(known > 0, source, 0)
     last = np.array(grid.shape) - 1
     for first in range(0, after.shape[0], _SLICES):
         part = slice(first, min(first + _SLICES, after.shape[0]))

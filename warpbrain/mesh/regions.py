@@ -165,7 +165,8 @@ def _partition(raw: Any) -> list[str] | None:
         # one set of all, if it is the only one
         whole = [name for name, each in members.items() if each.all()]
         return whole if len(whole) == 1 else None
-    return list(parts) if (sum(each.astype(int) for each in parts.values()) == 1).all() else None
+    memberships = np.sum([each.astype(int) for each in parts.values()], axis=0)
+    return list(parts) if (memberships == 1).all() else None
 
 
 def _members(raw: Any, name: str) -> list[Bools]:
