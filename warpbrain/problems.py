@@ -72,10 +72,14 @@ class Problems:
         """Note what is not wrong and should be known."""
         self.remarks.append(f"{file}: {' '.join(message.split())}")
 
-    def stop(self) -> None:
-        """Raise `InputError` with the first problem, and the number of the others, if there is any."""
+    def stop(self, folder: Path | None = None) -> None:
+        """Raise `InputError` with the first problem, and the number of the others in `folder`, if there is any."""
         if not self.found:
             return
         others = len(self.found) - 1
-        more = f"; {others} more: `warpbrain cases check {self.found[0].file.parent}` lists them" if others else ""
+        more = (
+            f"; {others} more: `warpbrain cases check {folder or self.found[0].file.parent}` lists them"
+            if others
+            else ""
+        )
         raise InputError(f"{self.found[0]}{more}")

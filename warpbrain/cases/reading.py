@@ -44,7 +44,7 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     """
     problems = Problems()
     case = examine_case(Path(path), problems)
-    problems.stop()
+    problems.stop(Path(path) if Path(path).is_dir() else Path(path).parent)
     assert case is not None  # nothing was wrong
     return case
 
