@@ -1,9 +1,11 @@
 """`warpbrain run` inside the test's own process, where its kernels are loaded already."""
 
 import io
+import math
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
+from unittest.mock import patch
 
 from warpbrain.cli import main
 
@@ -19,7 +21,8 @@ class Ran:
 
 def warpbrain(*arguments: str | Path) -> Ran:
     out, err = io.StringIO(), io.StringIO()
-    with redirect_stdout(out), redirect_stderr(err):
+    # on a busy machine any test may take long enough for a line of progress
+    with redirect_stdout(out), redirect_stderr(err), patch("warpbrain.terminal.progress.EVERY", math.inf):
         try:
             status = main([str(argument) for argument in arguments])
         except SystemExit as usage:  # argparse's own way out

@@ -86,7 +86,10 @@ WRONG = {
     "tissue unused": ((SECOND_LAW, "mu = 3.0\n[tissue.7]\nmu = 1.0"), r"\[tissue.7\]: the mesh has no tissue 7"),
     "tissue word": (("[tissue.2]", "[tissue.grey]"), r"\[tissue.grey\]: tissue labels are whole numbers"),
     "tissue 02": (("[tissue.2]", "[tissue.02]"), r"\[tissue.02\]: tissue labels are whole numbers"),
-    "tissue huge": (("[tissue.2]", f"[tissue.{'2' * 5000}]"), r"\[tissue.2+\]: tissue labels are whole numbers"),
+    "tissue huge": (
+        ("[tissue.2]", f"[tissue.{'2' * 5000}]"),
+        r"\[tissue.2+\.\.\.2+\]: tissue labels are whole numbers",
+    ),
     "tissue squared": (("[tissue.2]", '[tissue."²"]'), r"\[tissue.²\]: tissue labels are whole numbers"),
     "tissue value": (
         ('[tissue.2]\nname = "stiff"\nmu', "[tissue]\n2"),

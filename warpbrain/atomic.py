@@ -127,3 +127,14 @@ def output_folder(path: Path) -> Path:
     if not os.access(path, os.W_OK | os.X_OK):
         raise InputError(f"{path}: cannot be written to")
     return path
+
+
+def check_output_folder(path: Path) -> None:
+    """As `output_folder`, and leave no folder that was not there: to know it before long work, not after."""
+    made = [folder for folder in (path, *path.parents) if not folder.exists()]
+    try:
+        output_folder(path)
+    finally:
+        for folder in made:
+            if folder.is_dir():
+                folder.rmdir()

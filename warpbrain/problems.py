@@ -33,29 +33,53 @@ class Problem:
         return head + self.message + (f" ({self.cure})" if self.cure else "")
 
 
-class Problems:
-    """A list of problems that readers add to and go on reading."""
+#: Characters of the place and of the message of a problem, at most: a file can have names of any length.
+_PLACE, _MESSAGE = 120, 800
 
-    def __init__(self) -> None:
+
+def _shortened(text: str, most: int) -> str:
+    one_line = " ".join(text.split())
+    return one_line if len(one_line) <= most else f"{one_line[: most - 20]}...{one_line[-20:]}"
+
+
+class Problems:
+    """A list of problems that readers add to and go on reading.
+
+    Parameters
+    ----------
+    most : int, optional
+        From how many on a reader may stop, see `enough`.
+    """
+
+    def __init__(self, most: int | None = None) -> None:
+        self._most = most
         self.found: list[Problem] = []
         self.remarks: list[str] = []
 
     def __bool__(self) -> bool:
         return bool(self.found)
 
+    @property
+    def enough(self) -> bool:
+        """Whether to look for more problems is worth nobody's time."""
+        return self._most is not None and len(self.found) >= self._most
+
     def add(self, file: Path, place: str, message: str, cure: str = "") -> None:
-        """Note a problem; text that came with line breaks is put on one line."""
-        one_line = " ".join(message.split())
-        self.found.append(Problem(file, place, one_line, cure))
+        """Note a problem; text that came with line breaks is put on one line, and one without an end is given one."""
+        self.found.append(Problem(file, _shortened(place, _PLACE), _shortened(message, _MESSAGE), cure))
 
     def remark(self, file: Path, message: str) -> None:
         """Note what is not wrong and should be known."""
         self.remarks.append(f"{file}: {' '.join(message.split())}")
 
-    def stop(self) -> None:
-        """Raise `InputError` with the first problem, and the number of the others, if there is any."""
+    def stop(self, folder: Path | None = None) -> None:
+        """Raise `InputError` with the first problem, and the number of the others in `folder`, if there is any."""
         if not self.found:
             return
         others = len(self.found) - 1
-        more = f"; {others} more: `warpbrain cases check {self.found[0].file.parent}` lists them" if others else ""
+        more = (
+            f"; {others} more: `warpbrain cases check {folder or self.found[0].file.parent}` lists them"
+            if others
+            else ""
+        )
         raise InputError(f"{self.found[0]}{more}")

@@ -171,8 +171,8 @@ def test_labels_of_a_mesh_may_have_another_name(tmp_path):
     meshio.write(tmp_path / "b.vtu", raw)
     assert start_from_mesh(tmp_path / "a", tmp_path / "b.vtu", Frame(), array="region").tissues.keys() == {1, 7}
     alone = start_from_mesh(tmp_path / "c", tmp_path / "b.vtu", Frame())
-    assert alone.tissues == {1: "tissue 1"}
-    assert "--array names the cell array" in alone.notes[0]
+    assert alone.tissues.keys() == {1, 7}
+    assert alone.notes == ("tissues are the values of the cell array 'region': 1, 7",)
     with pytest.raises(InputError, match="no cell array 'zone'"):
         start_from_mesh(tmp_path / "d", tmp_path / "b.vtu", Frame(), array="zone")
 
@@ -232,7 +232,7 @@ def test_a_folder_that_is_not_empty_stays_as_it_is(tmp_path):
         lambda: start_from_mesh(tmp_path / "full", source, Frame()),
         lambda: start_from_labels(tmp_path / "full", tmp_path / "none.nii"),
     ):
-        with pytest.raises(InputError, match="full: there is a folder of that name that is not empty"):
+        with pytest.raises(InputError, match="full: has a case already: choose another folder, or --overwrite it"):
             begin()
     assert [path.read_text() for path in (tmp_path / "full").iterdir()] == ["mine"]
     (tmp_path / "empty").mkdir()

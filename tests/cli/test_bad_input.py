@@ -207,3 +207,22 @@ def test_names_with_any_characters_are_only_shown(tmp_path, monkeypatch):
     assert (ran.status, ran.err) == (0, "")
     assert sorted(os.listdir(tmp_path)) == ["case", "warpbrain-..-a-b-c-multi"]
     assert "written to warpbrain-..-a-b-c-multi" in ran.out
+
+
+def test_results_are_overwritten_only_if_that_is_asked_for(folder, tmp_path):
+    out = tmp_path / "out"
+    assert run(folder, "--out", out).status == 0
+    before = (out / "summary.json").read_bytes()
+    assert refusal(run(folder, "--out", out)) == f"{out}: has results already (summary.json): --overwrite replaces them"
+    assert (out / "summary.json").read_bytes() == before
+    assert run(folder, "--out", out, "--overwrite").status == 0
+    assert (out / "summary.json").read_bytes() != before
+
+
+def test_the_same_command_twice_writes_two_folders(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for expected in ("warpbrain-block-multi", "warpbrain-block-multi-2"):
+        ran = run(folder)
+        assert (ran.status, ran.err) == (0, "")
+        assert f"written to {expected}: " in ran.out
+    assert sorted(os.listdir(tmp_path)) == ["warpbrain-block-multi", "warpbrain-block-multi-2"]

@@ -275,3 +275,15 @@ def test_the_table_as_parquet(folder, tmp_path):
     rows = parquet.read_table(tmp_path / "samples.parquet").to_pylist()
     for row, line in zip(rows, table(tmp_path), strict=True):
         assert {name: "" if value is None else str(value) for name, value in row.items()} == line
+
+
+def test_overwriting_computes_all_anew(folder, tmp_path):
+    out = tmp_path / "out"
+    assert ensemble(folder, "--samples", 2, "--out", out).status == 0
+    again = ensemble(folder, "--samples", 2, "--out", out)
+    assert again.status == 0 and "resumed   2 of 2 samples are there" in again.out
+    other = ensemble(folder, "--samples", 2, "--seed", 1, "--out", out)
+    assert other.status == 2 and other.err.endswith("choose another folder, or --overwrite it\n")
+    anew = ensemble(folder, "--samples", 2, "--seed", 1, "--out", out, "--overwrite")
+    assert anew.status == 0 and "resumed" not in anew.out
+    assert "warpbrain.log" in {path.name for path in out.iterdir()}

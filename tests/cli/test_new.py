@@ -63,3 +63,23 @@ def test_a_folder_that_is_not_empty(tmp_path, block):
     assert ran.status == 2
     assert "there is a folder of that name that is not empty" in ran.err
     assert list(tmp_path.iterdir()) == [block]
+
+
+def test_a_case_that_is_there_is_overwritten_only_if_that_is_asked_for(tmp_path, block):
+    """Its case.toml is kept, and recordings stay."""
+    case = tmp_path / "case"
+    assert warpbrain("cases", "new", case, "--mesh", block).status == 0
+    (case / "case.toml").write_text("mine")
+    (case / "recordings" / "beads.csv").write_text("x,y,z\n")
+    ran = warpbrain("cases", "new", case, "--mesh", block)
+    assert ran.status == 2
+    assert ran.err == f"warpbrain: error: {case}: has a case already: choose another folder, or --overwrite it\n"
+    assert (case / "case.toml").read_text() == "mine"
+    assert warpbrain("cases", "new", case, "--mesh", block, "--overwrite").status == 0
+    assert set(read_case(case).tissues) == {1}
+    assert (case / "case.toml.old").read_text() == "mine"
+    assert (case / "recordings" / "beads.csv").read_text() == "x,y,z\n"
+    # what is no case is never replaced
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("mine")
+    assert warpbrain("cases", "new", tmp_path / "mine", "--mesh", block, "--overwrite").status == 2

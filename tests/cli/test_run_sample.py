@@ -56,7 +56,7 @@ def test_a_draw_is_printed_written_and_the_same_twice(folder, tmp_path, law):
 def test_seed_and_model_choose_another_draw(folder, tmp_path):
     moduli = set()
     for arguments in ([], ["--seed", "1"], ["--gp", "coregionalised"]):
-        done = run(folder, "--sample", "0", "--out", tmp_path / "out", *arguments)
+        done = run(folder, "--sample", "0", "--out", tmp_path / "out", "--overwrite", *arguments)
         assert done.status == 0, done.err
         said = summary(tmp_path / "out")
         moduli.add(said["case"]["tissues"]["1"]["shear_modulus_Pa"])
@@ -82,7 +82,7 @@ def test_the_prior_of_a_tissue_is_its_middle_curve(tmp_path):
     prior = summary(tmp_path / "out")["prior"]
     assert prior["draw"] is None and list(prior["tissues"]) == ["1"]
     # with a modulus of its own the generative model is not asked
-    done = run(folder, "--mu", "1=900", "--out", tmp_path / "out")
+    done = run(folder, "--mu", "1=900", "--out", tmp_path / "out", "--overwrite")
     assert "generative" not in done.out and "prior" not in summary(tmp_path / "out")
 
 

@@ -54,7 +54,7 @@ TABLES = {
     "slide.csv": "displacement,force\n0.0,0.0\n0.3,0.003\n",
     "twist.csv": "angle,torque\n0.0,0.0\n-0.2,-2e-5\n",
 }
-FILES = ["comparison.csv", "report.html", "summary.json", "tests.png"]
+FILES = ["comparison.csv", "report.html", "summary.json", "tests.png", "warpbrain.log"]
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -68,7 +69,7 @@ def test_run_and_warp_write_the_same(folder, warped, tmp_path):
     names = {path.name for path in (tmp_path / "again").iterdir()}
     for name in ("displacement.nii.gz", "T1-after.nii.gz", "seg-after.nii.gz", "F-after.mrk.json", "G-after.fcsv"):
         assert name in names
-    for name in names - {"load_in_slicer.py"}:
+    for name in names - {"load_in_slicer.py", "warpbrain.log"}:
         assert (tmp_path / "again" / name).read_bytes() == (warped / name).read_bytes(), name
 
 
@@ -186,6 +187,53 @@ def test_images_that_cannot_be_of_the_body(folder, warped, tmp_path, change, mes
     assert done.status == 2
     assert message in done.err
     assert not (tmp_path / "out").exists()
+
+
+def _moved(values):
+    """In the place of the body nothing, and something beside it."""
+    shifted = np.zeros_like(values)
+    shifted[:2, :2, :2] = 3
+    return shifted
+
+
+@pytest.mark.parametrize(
+    ("values", "shift", "message"),
+    [
+        (np.zeros_like, 0.0, "seg.nii.gz: all its voxels are 0: there are no labels to warp"),
+        (_moved, 0.0, "mm RAS: no label is of it"),
+        (np.asarray, 500.0, "seg.nii.gz: affine: 0 % of the body"),
+    ],
+)
+def test_labels_that_are_elsewhere_are_refused(folder, warped, tmp_path, values, shift, message):
+    """Beside an image that is in place they gave zeros, silently."""
+    labels = nibabel.load(folder / "seg.mgz")
+    affine = labels.affine.copy()
+    affine[:3, 3] += shift
+    nibabel.save(nibabel.Nifti1Image(values(np.asarray(labels.dataobj)), affine), tmp_path / "seg.nii.gz")
+    given = ("--image", folder / "T1.nii.gz", "--labels", tmp_path / "seg.nii.gz")
+    done = warpbrain("warp", warped, "--out", tmp_path / "out", *given)
+    assert done.status == 2
+    assert message in done.err and done.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_outside_an_image_is_said(folder, warped, tmp_path):
+    image = nibabel.load(folder / "T1.nii.gz")
+    # the upper half alone, with a little more
+    half = image.slicer[:, :, image.shape[2] // 2 - 3 :]
+    nibabel.save(half, tmp_path / "T1.nii.gz")
+    done = warpbrain("warp", warped, "--out", tmp_path / "out", "--image", tmp_path / "T1.nii.gz")
+    assert done.status == 0, done.err
+    assert re.search(r"^note      T1\.nii\.gz: \d+ % of the body are outside of it$", done.out, re.MULTILINE)
+
+
+def test_what_was_warped_before_is_not_overwritten(folder, warped, tmp_path):
+    given = ("--out", tmp_path / "out", "--points", folder / "F.mrk.json")
+    assert warpbrain("warp", warped, *given).status == 0
+    done = warpbrain("warp", warped, *given)
+    assert done.status == 2
+    assert "transform-after-to-before.nii.gz, F-after.mrk.json already: --overwrite replaces them" in done.err
+    assert warpbrain("warp", warped, *given, "--overwrite").status == 0
 
 
 @pytest.mark.parametrize(

@@ -162,6 +162,23 @@ def test_resampling_by_a_translation_is_exact():
     np.testing.assert_array_equal(resampled(values, grid, back, nearest=True), found)
 
 
+def test_what_is_no_number_does_not_spread():
+    """A voxel that is none stays alone where nothing moves; half a voxel away most of a neighbour decides."""
+    grid = Grid((6, 6, 6), np.eye(4))
+    values = np.random.default_rng(0).normal(size=grid.shape)
+    values[3, 3, 3], values[1, 1, 1] = np.nan, np.inf
+    still = DisplacementField(grid, np.zeros((*grid.shape, 3), dtype=np.float32))
+    found = resampled(values, grid, still, nearest=False)
+    known = np.isfinite(values)
+    np.testing.assert_array_equal(np.isfinite(found), known)
+    np.testing.assert_allclose(found[known], values[known], atol=1e-12)
+    aside = DisplacementField(grid, np.tile(np.float32([0.25, 0, 0]), (*grid.shape, 1)))
+    found = resampled(values, grid, aside, nearest=False)
+    assert np.isnan(found[3, 3, 3]) and np.count_nonzero(np.isnan(found)) == 2
+    # of the other neighbour there is three quarters: its value alone
+    assert found[2, 3, 3] == pytest.approx(values[2, 3, 3])
+
+
 @pytest.mark.parametrize("nearest", [True, False])
 def test_large_whole_numbers_stay_as_they_are(nearest):
     grid = Grid((3, 3, 3), np.eye(4))

@@ -22,3 +22,16 @@ def test_positions_and_indices_are_inverse():
     np.testing.assert_allclose(grid.indices(grid.positions(at)), at)
     np.testing.assert_allclose(grid.steps(grid.positions(at) - grid.positions(0 * at)), at)
     assert grid.contains(grid.positions([[-0.4, 0, 0], [-0.6, 0, 0]])).tolist() == [True, False]
+
+
+def test_transforms_of_a_large_box_have_larger_voxels():
+    """What a header says of a box does not decide how much memory is taken."""
+    from warpbrain.report import warped
+
+    coarse = turned_grid((200, 200, 200), (100.0, 100.0, 100.0))
+    assert coarse.with_edges(1.0).count > 10**12
+    bounded = warped._for_transforms(coarse)
+    assert 10**6 < bounded.count <= warped._MOST_VOXELS
+    np.testing.assert_allclose(bounded.voxel * bounded.shape, coarse.voxel * coarse.shape, rtol=0.1)
+    brain = turned_grid((90, 100, 90), (2.0, 2.0, 2.0))
+    np.testing.assert_allclose(warped._for_transforms(brain).voxel, 1.0)

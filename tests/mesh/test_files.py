@@ -119,7 +119,7 @@ def test_errors_say_what_was_found(tmp_path):
 @pytest.mark.parametrize("ending", ["bdf", "ele", "dat"])
 def test_a_reader_that_would_wait_for_ever_is_stopped(tmp_path, monkeypatch, ending):
     """meshio's readers of these formats look for the end of a file that is cut off until somebody ends them."""
-    monkeypatch.setattr("warpbrain.mesh.patience.PATIENCE", 0.5)
+    monkeypatch.setattr("warpbrain.mesh.patience.SECONDS", 0.5)
     path = tmp_path / f"mesh.{ending}"
     content = {"bdf": "BEGIN BULK\nGRID,1,,0.0,0.0,0.0\n", "ele": "", "dat": 'VARIABLES = "X"'}[ending]
     path.write_text(content or "# cut off\n")

@@ -3,6 +3,7 @@
 import meshio
 import numpy as np
 import pytest
+from damage.kinds import KINDS
 from landmark_files import START, TAG, fcsv, markup
 from recording_files import messages, read
 from surface_files import POINTS, TRIANGLES, vtp
@@ -20,19 +21,7 @@ FILES = {
 
 
 def damaged(content: bytes, rng: np.random.Generator) -> bytes:
-    """Cut off, with a piece taken out or doubled, or with some bytes changed."""
-    at, to = sorted(rng.integers(0, len(content) + 1, 2))
-    kind = rng.integers(4)
-    if kind == 0:
-        return content[:at]
-    if kind == 1:
-        return content[:at] + content[to:]
-    if kind == 2:
-        return content[:to] + content[at:]
-    changed = bytearray(content)
-    for place in rng.integers(0, len(content), 3):
-        changed[place] = rng.choice(list(b'\x00\n\r\t ,;"#%=[]{}-.0e9x\xff'))
-    return bytes(changed)
+    return KINDS[rng.integers(len(KINDS))](content, rng)
 
 
 def check(file, kind, **keys):

@@ -1,11 +1,12 @@
-"""The progress bar: on a terminal only, and gone when the work is done."""
+"""Progress: a bar on a terminal, gone when the work is done; lines now and then where there is none."""
 
 import io
 import sys
 
 import pytest
 
-from warpbrain.terminal.progress import Progress
+from warpbrain.terminal import progress as module
+from warpbrain.terminal.progress import EVERY, Progress
 
 
 class Terminal(io.StringIO):
@@ -48,8 +49,22 @@ def test_quiet(monkeypatch):
 
 
 def test_in_a_file(monkeypatch):
+    """Lines at most every half minute, so that short work says nothing, and no carriage returns."""
+    now = [100.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
     stream = look_at(monkeypatch, io.StringIO())
     progress = Progress("motion")
-    progress.show(0.5)
+    for second in range(100):
+        now[0] = 100.0 + second
+        progress.show(second / 100, f"{second} ms")
     progress.clear()
+    assert stream.getvalue().splitlines() == [f"motion {k * EVERY:.0f} % {k * EVERY:.0f} ms" for k in (1, 2, 3)]
+    assert "\r" not in stream.getvalue()
+
+
+def test_in_a_file_and_quiet(monkeypatch):
+    now = iter(range(0, 1000, 100))
+    monkeypatch.setattr(module.time, "monotonic", lambda: float(next(now)))
+    stream = look_at(monkeypatch, io.StringIO())
+    Progress("motion", quiet=True).show(0.5)
     assert stream.getvalue() == ""

@@ -24,6 +24,7 @@ from warpbrain.frame import Frame
 from warpbrain.physics.composition import CompositionError, require_composable, require_left
 from warpbrain.problems import Problems
 from warpbrain.recordings.inside import check_points_inside, check_surface_near
+from warpbrain.recordings.possible import check_possible
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.recordings.registration import Registration
 
@@ -43,7 +44,7 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     """
     problems = Problems()
     case = examine_case(Path(path), problems)
-    problems.stop()
+    problems.stop(Path(path) if Path(path).is_dir() else Path(path).parent)
     assert case is not None  # nothing was wrong
     return case
 
@@ -121,6 +122,8 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     left = case.remaining[0]
     check_faces(context, left, boundaries)
     for recording in recordings:
+        if isinstance(recording, PointsRecording | SurfaceRecording):
+            check_possible(recording, left, file.parent / recording.file, problems)
         if isinstance(recording, PointsRecording):
             check_points_inside(recording, left, file.parent / recording.file, problems)
         elif isinstance(recording, SurfaceRecording):

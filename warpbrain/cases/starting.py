@@ -10,20 +10,30 @@ from pathlib import Path
 
 import numpy as np
 
-from warpbrain.atomic import check_new_folder, whole_folder
+from warpbrain.atomic import check_new_folder, check_writable, whole_file, whole_folder
 from warpbrain.cases.building.errors import BuildError, require_extra
 from warpbrain.cases.building.first_sets import first_sets
 from warpbrain.cases.building.label_image import read_labels
 from warpbrain.cases.building.labels import LabelMesh, mesh_labels
 from warpbrain.cases.building.plausible import check_volume_in, cm3
 from warpbrain.cases.building.presets import Preset, preset
-from warpbrain.cases.building.tissue_names import OUTSIDE, RESECTION, VENTRICLE, Assignment, assign, parse_names
+from warpbrain.cases.building.tissue_names import (
+    OUTSIDE,
+    RESECTION,
+    VENTRICLE,
+    Assignment,
+    assign,
+    parse_names,
+    usual_name,
+)
 from warpbrain.cases.case_template import case_text
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
-from warpbrain.mesh import Quality, TetMesh, components, measure, ordered, read_mesh, split_boundary, write_mesh
+from warpbrain.mesh import Quality, TetMesh, components, measure, ordered, split_boundary, write_mesh
+from warpbrain.mesh.regions import read_regions
 from warpbrain.mesh.surface import face_vectors
 
+CASE_FILE = "case.toml"
 # how far the volume of a tissue may be from that of its labels before it is said
 FAITHFUL = 0.10
 # what share of the voxels of a tissue must lie in that tissue of the mesh before it is said that most do not
@@ -73,6 +83,7 @@ def start_from_labels(
     progress: Callable[[str], None] = lambda line: None,
     *,
     program: str | None = None,
+    overwrite: bool = False,
 ) -> StartedCase:
     """Make a case folder from a label volume.
 
@@ -92,13 +103,15 @@ def start_from_labels(
         Called with one line of text whenever something is begun.
     program : str, optional
         Whose labels they are, see `preset`; `names` take precedence, and labels that the volume lacks are no mistake.
+    overwrite : bool
+        Whether mesh and `case.toml` of a case that is in the folder may be replaced.
 
     Raises
     ------
     InputError
         If the folder is not empty, or anything is wrong with the labels or their names; nothing is written then.
     """
-    check_new_folder(folder)
+    _check_folder(folder, overwrite)
     if size is not None and not 0 < size < np.inf:
         raise InputError(f"--size: found {size:g}, expected a positive length [mm]")
     chosen = parse_names(names)
@@ -131,7 +144,7 @@ def start_from_labels(
             f"{VENTRICLE}: {cm3(cavity)} closed in the mesh, {cm3(wanted)} in the labels: it is in part thinner than "
             "an element, or opens to the outside; a smaller --size shows more of it"
         )
-    _write(folder, mesh, tissues, labels)
+    _write(folder, mesh, tissues, labels, overwrite)
     return StartedCase(
         folder,
         mesh,
@@ -146,7 +159,13 @@ def start_from_labels(
 
 
 def start_from_mesh(
-    folder: Path, file: Path, frame: Frame, names: Sequence[str] = (), array: str | None = None
+    folder: Path,
+    file: Path,
+    frame: Frame,
+    names: Sequence[str] = (),
+    array: str | None = None,
+    *,
+    overwrite: bool = False,
 ) -> StartedCase:
     """Make a case folder from a volume mesh.
 
@@ -155,24 +174,28 @@ def start_from_mesh(
     folder : Path
         Must not be there yet, or be empty.
     file : Path
-        Any tetrahedral mesh that meshio reads; its node and element sets are kept.
+        Any tetrahedral mesh that meshio reads; its tissues are those of `read_regions`, its node and element sets are
+        kept.
     frame : Frame
         Unit and axes of the file.
     names : sequence of str
         Arguments of `--tissue`: names of the labels of the mesh.
     array : str, optional
-        Cell array of the labels; by default `tissue`, and one tissue if there is none.
+        Cell array of the labels, where several could be it.
+    overwrite : bool
+        Whether mesh and `case.toml` of a case that is in the folder may be replaced.
 
     Raises
     ------
     InputError
         If the folder is not empty or the mesh cannot be used; nothing is written then.
     """
-    check_new_folder(folder)
+    _check_folder(folder, overwrite)
     given = parse_names(names)
     # meshio prints lines of its own where it gives up; the error says it
     with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-        raw = read_mesh(file, frame.unit, array)
+        named = read_regions(file, frame.unit, array)
+    raw = named.mesh
     check_volume_in(f"{file}: the mesh", raw.volume, frame.unit)
     pieces = int(components(raw.tetrahedra).max()) + 1
     if pieces > 1:
@@ -182,18 +205,19 @@ def start_from_mesh(
         raise BuildError(f"{file}: expected tissue labels of 0 or more, found {numbers[0]}")
     if absent := [str(label) for label in given if label not in numbers]:
         raise InputError(f"--tissue: the mesh has no tissue {', '.join(absent)}; it has {', '.join(map(str, numbers))}")
-    for label, name in given.items():
+    called = _names_in(file, named.names, given)
+    for label, name in called.items():
         if name == VENTRICLE or name in OUTSIDE:
             raise InputError(f"--tissue: {label}={name}: the cells of a mesh are all tissue, name what they are")
     points = raw.points * frame.signs
-    notes = []
-    if len(numbers) == 1 and array is None:
+    notes = list(named.notes)
+    if len(numbers) == 1 and array is None and not named.names:
         notes.append("one tissue: if there are more, --array names the cell array of their labels")
     sets = {**first_sets(points, raw.tetrahedra), **raw.node_sets}
     vectors = {name: values * frame.signs for name, values in raw.element_vectors.items()}
     mesh = ordered(TetMesh(points, raw.tetrahedra, raw.tissue, sets, raw.element_sets, vectors))
-    tissues = {label: given.get(label, f"tissue {label}") for label in numbers}
-    _write(folder, mesh, tissues, file)
+    tissues = {label: called.get(label, f"tissue {label}") for label in numbers}
+    _write(folder, mesh, tissues, file, overwrite)
     return StartedCase(folder, mesh, tissues, measure(mesh), None, None, _cavity_volume(mesh), 0.0, tuple(notes))
 
 
@@ -227,15 +251,47 @@ def summary(case: StartedCase) -> list[str]:
     ]
 
 
-def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path) -> None:
+def _check_folder(folder: Path, overwrite: bool) -> None:
+    """`InputError` if a case cannot be begun there."""
+    if overwrite and (folder / CASE_FILE).is_file():
+        check_writable(folder / CASE_FILE)
+        return
+    try:
+        check_new_folder(folder)
+    except InputError as error:
+        if (folder / CASE_FILE).is_file():
+            raise InputError(f"{folder}: has a case already: choose another folder, or --overwrite it") from None
+        raise error
+
+
+def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path, overwrite: bool) -> None:
     if not mesh.node_sets["base"].any():
         raise BuildError(f"{source}: found no outer nodes that face down in the lower third: is its z axis up?")
     name = folder.resolve().name
+    text = case_text(name, source.name, tissues, "ventricle" in mesh.node_sets, RESECTION in mesh.element_sets)
+    if overwrite and (folder / CASE_FILE).is_file():
+        # what its user wrote into it, and recordings, are not ours to lose
+        (folder / CASE_FILE).replace(folder / f"{CASE_FILE}.old")
+        write_mesh(folder / "mesh.vtu", mesh, unit="mm")
+        with whole_file(folder / CASE_FILE) as scratch:
+            scratch.write_text(text, encoding="utf-8")
+        return
     with whole_folder(folder) as place:
         write_mesh(place / "mesh.vtu", mesh, unit="mm")
-        text = case_text(name, source.name, tissues, "ventricle" in mesh.node_sets, RESECTION in mesh.element_sets)
-        (place / "case.toml").write_text(text, encoding="utf-8")
+        (place / CASE_FILE).write_text(text, encoding="utf-8")
         (place / "recordings").mkdir()
+
+
+def _names_in(file: Path, names: Mapping[int, str], given: Mapping[int, str]) -> dict[int, str]:
+    """What the tissues of a mesh are called: as the user says, else as the file does."""
+    called = dict(given)
+    for label, name in names.items():
+        if label not in given:
+            try:
+                called[label] = usual_name(name)
+            except InputError as error:
+                raise InputError(f"{file}: {error}; --tissue {label}=NAME says what it is") from None
+    return called
 
 
 def _left_out(

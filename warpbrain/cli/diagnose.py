@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from warpbrain.cli import warp
+from warpbrain.cli import output, warp
 from warpbrain.terminal.progress import Progress
+
+if TYPE_CHECKING:
+    from warpbrain.terminal.record import Record
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -41,8 +44,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     add("--homogeneous", action="store_true", help="of a specimen: take its state for homogeneous whatever its grips")
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
     warp.add_arguments(parser)
-    add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-diagnose-CASE)")
-    add("--quiet", action="store_true", help="print nothing but errors")
+    output.add_arguments(parser, "warpbrain-diagnose-CASE")
     parser.set_defaults(call=_run)
 
 
@@ -59,15 +61,17 @@ def _run(options: argparse.Namespace) -> None:
         without_nuisances=options.ablation == "no-nuisances",
         ends=not options.homogeneous,
     )
-    say: Callable[..., None] = _silent if options.quiet else print
+    record: Record = options.record
+    say = record.say
 
-    from warpbrain.atomic import output_folder, safe_name
+    from warpbrain.atomic import safe_name
     from warpbrain.cases.shipped import find_case
     from warpbrain.report.diagnosis.files import write_explained
     from warpbrain.report.diagnosis.html import write_page
     from warpbrain.report.files import write_summary
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.quiet import start_warp_quietly
+    from warpbrain.terminal.result_folder import choose_folder, results_in
 
     start_warp_quietly()
     device = find_device(options.device).alias
@@ -81,9 +85,9 @@ def _run(options: argparse.Namespace) -> None:
         progress.clear()
         say(f"  {text}")
 
-    # nothing is written of a case of which nothing can be concluded
     diagnosing = way.diagnosing(case, asked, device, Listener(on_stage, progress.show))
-    out = output_folder(options.out or Path(f"warpbrain-diagnose-{safe_name(case.name)}"))
+    out = choose_folder(options.out, f"warpbrain-diagnose-{safe_name(case.name)}", options.overwrite)
+    output.note_case(record, case, device)
     say(case.title)
     try:
         found = diagnosing.run()
@@ -91,18 +95,19 @@ def _run(options: argparse.Namespace) -> None:
         progress.clear()
     said = way.describe(found, asked, device)
     say("", *way.lines(found, said), sep="\n")
-    for name, write in way.tables.items():
-        write(out / name, found)
-    written = [*way.tables]
-    if found.explained is not None:
-        write_explained(out / "explained", found.explained)
-        written.append("explained")
-    # after all that it speaks of: whoever finds it finds the others
-    write_summary(out / "diagnosis.json", said)
-    write_page(out)
-    if images is not None:
-        written += warp.warp(out / "state.vtu", out, images, say, options.quiet)
-    say("", f"written to {out}: report.html, diagnosis.json, {', '.join(written)}", sep="\n")
+    with results_in(out, record, options.overwrite):
+        for name, write in way.tables.items():
+            write(out / name, found)
+        record.files += ["report.html", "diagnosis.json", *way.tables]
+        if found.explained is not None:
+            write_explained(out / "explained", found.explained)
+            record.files.append("explained")
+        # after all that it speaks of: whoever finds it finds the others
+        write_summary(out / "diagnosis.json", said)
+        write_page(out)
+        if images is not None:
+            record.files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
+        say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
 
 
 class _Way(NamedTuple):
@@ -142,7 +147,3 @@ def _of_a_specimen() -> _Way:
         lambda found, _said: specimen_diagnosis_lines(found),
         {"curves.csv": write_curves},
     )
-
-
-def _silent(*_values: object, **_options: object) -> None:
-    """Stands for `print` where nothing is to be said."""

@@ -10,16 +10,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from warpbrain.cli import output
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
     from warpbrain.ensemble.job import Job
+    from warpbrain.ensemble.results import EnsembleResult
     from warpbrain.ensemble.sample import Sample
     from warpbrain.ensemble.store import Store
     from warpbrain.ensemble.workers import Workers
     from warpbrain.simulation.model import Model
+    from warpbrain.terminal.record import Record
 
 #: Samples where the arguments do not say how many: as many as the paper's sweep has.
 _SAMPLES = 289
@@ -82,24 +85,25 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "machine",
     )
     add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-ensemble-CASE-TISSUE)")
+    add("--overwrite", action="store_true", help="compute all anew, whatever is in that folder")
     add("--quiet", action="store_true", help="print nothing but errors")
     parser.set_defaults(call=_ensemble)
 
 
 def _ensemble(options: argparse.Namespace) -> None:
     _check(options)
-    say: Callable[..., None] = (lambda *_values, **_options: None) if options.quiet else print
+    record: Record = options.record
+    say = record.say
 
     from warpbrain.atomic import safe_name
     from warpbrain.ensemble.results import results_of
-    from warpbrain.ensemble.store import Store
+    from warpbrain.ensemble.store import Store, discard
     from warpbrain.report import summary as tables
-    from warpbrain.report.ensemble_files import table_of, write_fields, write_table
-    from warpbrain.report.ensemble_picture import write_spread_picture
     from warpbrain.report.ensemble_text import describe_ensemble, ensemble_lines
-    from warpbrain.report.files import write_summary
+    from warpbrain.report.fingerprints import fingerprints
     from warpbrain.simulation.of_case import model_of
     from warpbrain.terminal.quiet import start_warp_quietly
+    from warpbrain.terminal.result_folder import choose_folder, results_in
 
     start_warp_quietly()
     case = _case(options)
@@ -116,9 +120,15 @@ def _ensemble(options: argparse.Namespace) -> None:
 
     if options.steps is None:
         _warn(model, samples, options, say)
+    # the same command goes on with what is there, so its folder is that of before
     out = options.out or Path(f"warpbrain-ensemble-{safe_name(case.name)}-{options.tissue}")
+    beside = ("ensemble.json", "summary.json") if (out / "ensemble.json").exists() else ()
+    choose_folder(out, "", options.overwrite, beside)
+    if options.overwrite:
+        discard(out)
     with _workers(options) as workers:
         about = {"case": case.name, "samples": len(samples), "chosen": chosen, "course": course}
+        output.note_case(record, case, workers.name)
         store = Store(out, job, workers.kind, about)
         seconds, computed = _compute(job, store, workers, say, Progress("samples", options.quiet))
 
@@ -129,29 +139,42 @@ def _ensemble(options: argparse.Namespace) -> None:
     progress.clear()
     said = describe_ensemble(result)
     say("", *ensemble_lines(said), sep="\n")
+    summary = {
+        "case": described,
+        "inputs_sha256": fingerprints(case),
+        "chosen": chosen,
+        "course": course,
+        "precision": options.precision,
+        "workers": workers.name,
+        "result": said,
+        "seconds": seconds,
+        "samples_computed_in_these_seconds": computed,
+        "versions": tables.machine(),
+    }
+    with results_in(out, record, options.overwrite):
+        record.files += _write(out, result, summary, f"{course}: {chosen}", case.title, len(samples))
+        say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
+    if result.fields is None:
+        raise SolveError(f"no sample of {len(samples)} has an answer; the reasons are in {out / 'samples.csv'}")
+
+
+def _write(
+    out: Path, result: EnsembleResult, summary: dict[str, Any], chosen: str, title: str, count: int
+) -> list[str]:
+    """Write what an ensemble gave; returns the names of the files."""
+    from warpbrain.report.ensemble_files import table_of, write_fields, write_table
+    from warpbrain.report.ensemble_picture import write_spread_picture
+    from warpbrain.report.files import write_summary
+
     files = [*write_table(out, table_of(result)), "summary.json"]
     if result.fields is not None:
         write_fields(out / "fields.vtu", result.fields)
-        count = f"{result.fields.count} of {len(samples)} samples, {course}"
-        write_spread_picture(out / "spread.png", result.fields, case.title, f"{count}: {chosen}")
+        write_spread_picture(
+            out / "spread.png", result.fields, title, f"{result.fields.count} of {count} samples, {chosen}"
+        )
         files += ["fields.vtu", "spread.png"]
-    write_summary(
-        out / "summary.json",
-        {
-            "case": described,
-            "chosen": chosen,
-            "course": course,
-            "precision": options.precision,
-            "workers": workers.name,
-            "result": said,
-            "seconds": seconds,
-            "samples_computed_in_these_seconds": computed,
-            "versions": tables.machine(),
-        },
-    )
-    say("", f"written to {out}: {', '.join(files)}", sep="\n")
-    if result.fields is None:
-        raise SolveError(f"no sample of {len(samples)} has an answer; the reasons are in {out / 'samples.csv'}")
+    write_summary(out / "summary.json", summary)
+    return files
 
 
 def _check(options: argparse.Namespace) -> None:

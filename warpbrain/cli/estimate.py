@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli import warp
+from warpbrain.cli import output, warp
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from warpbrain.estimation.posterior import Posterior
     from warpbrain.recordings.registration import Registration
     from warpbrain.report.warped import Asked
+    from warpbrain.terminal.record import Record
     from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
 #: Nodes up to which it is said unasked what else may act: its cost grows faster than that of an estimate.
@@ -77,22 +78,23 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     add("--seed", type=int, default=0, metavar="S", help="of these draws (default: 0)")
     add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
     warp.add_arguments(parser)
-    add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-estimate-CASE-TISSUE)")
-    add("--quiet", action="store_true", help="print nothing but errors")
+    output.add_arguments(parser, "warpbrain-estimate-CASE-TISSUE")
     parser.set_defaults(call=_run)
 
 
 def _run(options: argparse.Namespace) -> None:
-    asked, registration = _options(options), _registration(options)
-    say: Callable[..., None] = _silent if options.quiet else print
+    settings, registration = _options(options), _registration(options)
+    record: Record = options.record
+    say = record.say
 
-    from warpbrain.atomic import output_folder, safe_name
+    from warpbrain.atomic import safe_name
     from warpbrain.cases.shipped import find_case
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.quiet import start_warp_quietly
+    from warpbrain.terminal.result_folder import choose_folder
 
     start_warp_quietly()
-    find_device(options.device)
+    device = find_device(options.device).alias
     images = warp.asked_for(options)
     if images is not None and options.method == "grid":
         raise InputError("--method grid: has no state that --image, --labels and --points could be warped by")
@@ -104,14 +106,18 @@ def _run(options: argparse.Namespace) -> None:
         case = case.with_law(options.model)
     if registration is not None:
         case = replace(case, registration=registration)
-    out = output_folder(options.out or Path(f"warpbrain-estimate-{safe_name(case.name)}-{options.tissue}"))
+    usual = f"warpbrain-estimate-{safe_name(case.name)}-{options.tissue}"
+    # a sweep goes on where it was left, and draws the estimate that lies beside it
+    allowed = ("estimate.json", "sweep.csv") if options.method == "grid" else ("sweep.csv",)
+    out = choose_folder(options.out, usual, options.overwrite, allowed)
+    output.note_case(record, case, device)
     say(case.title)
     if case.origin == "stand-in":
         say("  a stand-in, not a patient: what is estimated is the tissue of a model")
     if options.method == "grid":
-        _sweep(options, case, out, say)
+        _sweep(options, case, out)
     else:
-        _estimate(options, asked, case, images, out, say)
+        _estimate(options, settings, case, images, out)
 
 
 def _registration(options: argparse.Namespace) -> Registration | None:
@@ -145,11 +151,10 @@ def _options(options: argparse.Namespace) -> EstimationOptions:
 
 def _estimate(
     options: argparse.Namespace,
-    asked: EstimationOptions,
+    settings: EstimationOptions,
     case: Case,
     images: Asked | None,
     out: Path,
-    say: Callable[..., None],
 ) -> None:
     from warpbrain.estimation.estimate import Estimation, Listener
     from warpbrain.estimation.modes import GaussNewtonStep
@@ -161,7 +166,10 @@ def _estimate(
     from warpbrain.report.files import write_summary
     from warpbrain.report.state_files import write_estimated_state
     from warpbrain.simulation.system import find_device
+    from warpbrain.terminal.result_folder import results_in
 
+    record: Record = options.record
+    say = record.say
     progress = Progress("equilibria", options.quiet)
 
     def on_stage(text: str) -> None:
@@ -177,7 +185,7 @@ def _estimate(
     model = find_model(options.gp or "hierarchical")
     listener = Listener(on_stage, on_step, progress.show)
     try:
-        posterior = Estimation(case, model, asked, options.device, listener).run()
+        posterior = Estimation(case, model, settings, options.device, listener).run()
     finally:
         progress.clear()
     averaged = None
@@ -186,18 +194,20 @@ def _estimate(
     elif options.causes is None:
         say("", f"what else may act is left out on more than {_LARGEST} nodes; --causes computes it", sep="\n")
     say("", *estimate_lines(posterior, averaged), sep="\n")
-    write_predictions(out / "predictions.csv", posterior)
-    write_estimated_state(out / "state.vtu", posterior)
-    estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)
-    estimate_picture.write_observed_against_predicted(out / "predicted.png", posterior)
-    estimate_picture.write_residuals(out / "residuals.png", posterior)
     described = describe_estimate(posterior, find_device(options.device).alias, averaged)
-    write_summary(out / "estimate.json", described)
-    files = ["estimate.json", "predictions.csv", "state.vtu", "posterior.png", "predicted.png", "residuals.png"]
-    files += _illustrate(out, posterior, described, say)
-    if images is not None:
-        files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
-    say("", f"written to {out}: {', '.join(files)}", sep="\n")
+    with results_in(out, record, options.overwrite):
+        write_predictions(out / "predictions.csv", posterior)
+        write_estimated_state(out / "state.vtu", posterior)
+        estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)
+        estimate_picture.write_observed_against_predicted(out / "predicted.png", posterior)
+        estimate_picture.write_residuals(out / "residuals.png", posterior)
+        write_summary(out / "estimate.json", described)
+        record.files += ["estimate.json", "predictions.csv", "state.vtu"]
+        record.files += ["posterior.png", "predicted.png", "residuals.png"]
+        record.files += _illustrate(out, posterior, described, say)
+        if images is not None:
+            record.files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
+        say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
 
 
 def _illustrate(out: Path, posterior: Posterior, said: dict[str, Any], say: Callable[..., None]) -> list[str]:
@@ -234,40 +244,47 @@ def _averaged(posterior: Posterior, device: str | None, on_stage: Callable[[str]
         return None
 
 
-def _sweep(options: argparse.Namespace, case: Case, out: Path, say: Callable[..., None]) -> None:
+def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
+    from warpbrain.atomic import output_folder
     from warpbrain.estimation.parameters import Parameters
     from warpbrain.estimation.sweep import VALUES, SweepPoint, sweep
     from warpbrain.gp.trained import find_model
     from warpbrain.report.fingerprints import fingerprint_of
     from warpbrain.report.sweep import TABLE, columns, read_sweep, sweep_lines, write_sweep
     from warpbrain.report.sweep_picture import write_sweep_picture
+    from warpbrain.terminal.result_folder import results_in
+
+    record: Record = options.record
+    say = record.say
 
     # the paper's process on the paper's data
     model = find_model(options.gp or "coregionalised", "corrected" if options.gp else "as_published")
     parameters = Parameters.of(case)
     header = columns(parameters, fingerprint_of(case, model.name, model.variant))
     path = out / TABLE
+    if options.overwrite:
+        path.unlink(missing_ok=True)
     known = read_sweep(path, header, len(parameters.tissues))
     total = len(VALUES) ** len(parameters.tissues)
     say(f"sweep of {total} equilibria" + (f", {len(known)} of which are there already" if known else ""))
     progress = Progress("sweep", options.quiet)
-    found = dict(known)
+    points = dict(known)
 
     def on_point(point: SweepPoint) -> None:
-        found[point.k] = point
-        write_sweep(path, header, found.values())
-        progress.show(len(found) / total, ", ".join(f"k = {k:+.2f}" for k in point.k))
+        points[point.k] = point
+        output_folder(out)
+        write_sweep(path, header, points.values())
+        progress.show(len(points) / total, ", ".join(f"k = {k:+.2f}" for k in point.k))
 
     try:
         finished = sweep(case, model, VALUES, known, options.device, on_point)
     finally:
         progress.clear()
     say(*sweep_lines(finished), sep="\n")
-    beside = out / "estimate.json"
-    estimate = json.loads(beside.read_text(encoding="utf-8")) if beside.exists() else None
-    write_sweep_picture(out / "sweep.png", finished, case.title, estimate)
-    say("", f"written to {out}: {TABLE}, sweep.png", sep="\n")
-
-
-def _silent(*_values: object, **_options: object) -> None:
-    """Stands for `print` where nothing is to be said."""
+    estimate_file = out / "estimate.json"
+    estimate = json.loads(estimate_file.read_text(encoding="utf-8")) if estimate_file.exists() else None
+    # beside an estimate, and of points that were there before
+    with results_in(out, record, replace=False):
+        write_sweep_picture(out / "sweep.png", finished, case.title, estimate)
+        record.files += [TABLE, "sweep.png"]
+        say("", f"written to {out}: {TABLE}, sweep.png", sep="\n")

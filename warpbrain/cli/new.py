@@ -15,7 +15,9 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
         description="Makes a case folder with a conforming mesh, node sets and a commented case.toml that can be run "
         "at once. See docs/your-data.md.",
     )
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder to make; must not be there, or be empty")
+    parser.add_argument(
+        "folder", type=Path, metavar="FOLDER", help="folder to make; one that is there and not empty needs --overwrite"
+    )
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument("--labels", type=Path, metavar="FILE", help="label volume: .nii, .nii.gz, .mgz or .nrrd")
     source.add_argument("--mesh", type=Path, metavar="FILE", help="tetrahedral mesh: .vtu, .msh, .inp, ...")
@@ -38,7 +40,13 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
     mesh = parser.add_argument_group("with --mesh")
     mesh.add_argument("--units", choices=("mm", "m"), help="unit of the mesh (default: mm)")
     mesh.add_argument("--axes", choices=("RAS", "LPS"), help="axes of the mesh (default: RAS)")
-    mesh.add_argument("--array", metavar="NAME", help="cell array of the tissue labels (default: tissue)")
+    mesh.add_argument("--array", metavar="NAME", help="cell array of the tissues, where several could be it")
+    parser.add_argument(
+        "--overwrite",
+        action="store_true",
+        help="make mesh.vtu and case.toml anew in a case folder that is there; its case.toml is kept as case.toml.old, "
+        "and all else stays",
+    )
     parser.set_defaults(call=_new)
 
 
@@ -60,8 +68,11 @@ def _new(options: argparse.Namespace) -> None:
             options.size,
             progress=print,
             program=options.preset,
+            overwrite=options.overwrite,
         )
     else:
         frame = Frame(options.units or "mm", options.axes or "RAS")
-        case = start_from_mesh(options.folder, options.mesh, frame, options.tissue, options.array)
+        case = start_from_mesh(
+            options.folder, options.mesh, frame, options.tissue, options.array, overwrite=options.overwrite
+        )
     print("\n".join(summary(case)))

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli import run_slowly, warp
+from warpbrain.cli import output, run_slowly, warp
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from warpbrain.simulation.observation import Observed
     from warpbrain.simulation.result import Result
     from warpbrain.simulation.system import System
+    from warpbrain.terminal.record import Record
 
 
 #: Newton iterations that are printed one by one.
@@ -111,42 +112,45 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     )
     add("--allow-unstable", action="store_true", help="accept a law that breaks the paper's stability conditions")
     warp.add_arguments(parser)
-    add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-CASE-TISSUE)")
-    add("--quiet", action="store_true", help="print nothing but errors")
+    output.add_arguments(parser, "warpbrain-CASE-TISSUE")
     parser.set_defaults(call=_run)
 
 
 def _run(options: argparse.Namespace) -> None:
     start = time.perf_counter()
     _check(options)
-    say: Callable[..., None] = _silent if options.quiet else print
+    record: Record = options.record
+    say = record.say
 
-    from warpbrain.atomic import output_folder, safe_name
+    from warpbrain.atomic import safe_name
     from warpbrain.report import summary as tables
     from warpbrain.report.comparison import comparison_lines, describe_comparisons, write_comparisons
     from warpbrain.report.files import write_result, write_summary
+    from warpbrain.report.fingerprints import fingerprints
     from warpbrain.report.mesh_error import mesh_error_lines
     from warpbrain.report.prior_text import describe_prior, prior_lines
     from warpbrain.simulation.of_case import model_of
     from warpbrain.simulation.system import System, find_device
     from warpbrain.terminal.quiet import start_warp_quietly
+    from warpbrain.terminal.result_folder import choose_folder, results_in
 
     start_warp_quietly()
     find_device(options.device)
     asked = warp.asked_for(options)
     case, found = _case(options)
     warp.check_place(asked, case)
+    out = choose_folder(options.out, f"warpbrain-{safe_name(case.name)}-{options.tissue}", options.overwrite)
     prior = None if found is None else describe_prior(found)
     if case.specimen is not None:
         from warpbrain.cli import run_specimen
 
-        run_specimen.run(options, case, say, prior)
+        run_specimen.run(options, case, out, prior)
         return
     model, chosen = _with_elements(options, model_of(case)[0])
     described = tables.describe_case(case, model, chosen)
     say(*tables.case_lines(described), *prior_lines(prior), sep="\n")
     system = System(model, options.device, options.precision)
-    out = output_folder(options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}"))
+    output.note_case(record, case, f"{system.device.name} ({system.device.alias}), {options.precision} precision")
     say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
 
     loading = Progress("kernels", options.quiet)
@@ -172,9 +176,9 @@ def _run(options: argparse.Namespace) -> None:
         say("", *mesh_error_lines(doubt), sep="\n")
     say("", *tables.timing_lines(seconds, counts), sep="\n")
 
-    write_result(out / "result.vtu", result, None if estimated is None else estimated.u)
     summary = {
         "case": described,
+        "inputs_sha256": fingerprints(case),
         **({} if prior is None else {"prior": prior}),
         "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
         "solution": outcome,
@@ -186,14 +190,17 @@ def _run(options: argparse.Namespace) -> None:
         "seconds_to_first_step": first_step,
         "versions": tables.machine(),
     }
-    write_summary(out / "summary.json", summary)
-    files = ["result.vtu", "summary.json", *_illustrate(out, case, result, observed, summary, say)]
-    if observed.comparisons:
-        write_comparisons(out / "comparison.csv", case, observed)
-        files.append("comparison.csv")
-    if asked is not None:
-        files += warp.warp(out / "result.vtu", out, asked, say, options.quiet)
-    say("", f"written to {out}: {', '.join(files)}", sep="\n")
+    with results_in(out, record, options.overwrite):
+        write_result(out / "result.vtu", result, None if estimated is None else estimated.u)
+        record.files += ["result.vtu", "summary.json", *_illustrate(out, case, result, observed, summary, say)]
+        if observed.comparisons:
+            write_comparisons(out / "comparison.csv", case, observed)
+            record.files.append("comparison.csv")
+        # after all that it speaks of: whoever finds it finds the others
+        write_summary(out / "summary.json", summary)
+        if asked is not None:
+            record.files += warp.warp(out / "result.vtu", out, asked, say, options.quiet)
+        say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
 
 
 def _with_elements(options: argparse.Namespace, model: Model) -> tuple[Model, str | None]:
@@ -206,10 +213,6 @@ def _with_elements(options: argparse.Namespace, model: Model) -> tuple[Model, st
         return model, "--mesh-error elements is about them"
     choice = choose_elements(model, ("--mesh-error",) if options.mesh_error is not None else ())
     return replace(model, elements=choice.elements), choice.reason
-
-
-def _silent(*_values: object, **_options: object) -> None:
-    """Stands for `print` where nothing is to be said."""
 
 
 def _check(options: argparse.Namespace) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from warpbrain.cli import output
 from warpbrain.errors import InputError
 from warpbrain.terminal.progress import Progress
 
@@ -15,9 +15,10 @@ if TYPE_CHECKING:
     from warpbrain.recordings.recording import TestRecording
     from warpbrain.report.specimen_text import Tested
     from warpbrain.simulation.specimen import Rig
+    from warpbrain.terminal.record import Record
 
 
-def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior: dict[str, Any] | None = None) -> None:
+def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any] | None = None) -> None:
     """Simulate every test of a case.
 
     Parameters
@@ -26,8 +27,8 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior
         Of `warpbrain run`, checked.
     case : Case
         With a specimen, as the options change it.
-    say : callable
-        `print`, or what stands for it.
+    out : Path
+        Folder for the results.
     prior : dict, optional
         What is to be said of laws that the generative model gave.
 
@@ -40,10 +41,10 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior
     """
     tests = _tests(options, case)
 
-    from warpbrain.atomic import output_folder, safe_name
     from warpbrain.report import specimen_text as text
     from warpbrain.report.comparison import describe_comparisons
     from warpbrain.report.files import write_summary
+    from warpbrain.report.fingerprints import fingerprints
     from warpbrain.report.prior_text import prior_lines
     from warpbrain.report.specimen_page import write_specimen_page
     from warpbrain.report.specimen_picture import write_tests_picture
@@ -51,7 +52,10 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior
     from warpbrain.simulation.equilibrium import EquilibriumOptions
     from warpbrain.simulation.observation import Observed
     from warpbrain.simulation.specimen import Rig
+    from warpbrain.terminal.result_folder import results_in
 
+    record: Record = options.record
+    say = record.say
     solving = EquilibriumOptions(tolerance=options.tolerance)
     rig = Rig(case, options.device, options.precision, solving, options.elements)
     for recording in tests:
@@ -60,7 +64,7 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior
     in_time = any(rig.follows_time(recording) for recording in tests)
     described = text.describe_specimen(case, rig.specimen, system.model, in_time, rig.chosen)
     say(*text.specimen_lines(described), *prior_lines(prior), sep="\n")
-    out = output_folder(options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}"))
+    output.note_case(record, case, f"{system.device.name} ({system.device.alias}), {options.precision} precision")
     say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
 
     seconds = {"pre-processing": system.seconds, "loading kernels": system.load_kernels()}
@@ -75,10 +79,9 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior
         f"{rig.specimen.grips} ends, {material.law.name}, mu = {material.law.shear_modulus:g} Pa, "
         f"nu = {material.poisson:g}; {acting}"
     )
-    write_tests_picture(out / "tests.png", done, case.title, subtitle)
-    text.write_tests(out / "comparison.csv", done)
     summary = {
         "case": described,
+        "inputs_sha256": fingerprints(case),
         **({} if prior is None else {"prior": prior}),
         "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
         "solution": {"kind": "tests", "tolerance": rig.solver.tolerance, "tests": text.describe_tests(done)},
@@ -87,9 +90,13 @@ def run(options: argparse.Namespace, case: Case, say: Callable[..., None], prior
         "calls_by_phase": rig.solver.clock.counts,
         "versions": machine(),
     }
-    write_summary(out / "summary.json", summary)
-    write_specimen_page(out / "report.html", summary, done)
-    say("", f"written to {out}: summary.json, comparison.csv, tests.png, report.html", sep="\n")
+    with results_in(out, record, options.overwrite):
+        write_tests_picture(out / "tests.png", done, case.title, subtitle)
+        text.write_tests(out / "comparison.csv", done)
+        write_summary(out / "summary.json", summary)
+        write_specimen_page(out / "report.html", summary, done)
+        record.files += ["summary.json", "comparison.csv", "tests.png", "report.html"]
+        say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
 
 
 def _tests(options: argparse.Namespace, case: Case) -> list[TestRecording]:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from warpbrain.cases.case import Case
     from warpbrain.report.state_files import SavedState
     from warpbrain.report.warped import Asked
+    from warpbrain.terminal.record import Record
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -32,6 +33,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     )
     add_arguments(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the files (default: that of the result)")
+    parser.add_argument("--overwrite", action="store_true", help="replace what was warped by this result before")
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
     parser.set_defaults(call=_run)
 
@@ -84,9 +86,8 @@ def _write(state: SavedState, out: Path, asked: Asked, say: Callable[..., None],
     from warpbrain.terminal.progress import Progress
 
     progress = Progress("warping", quiet)
-    stages = iter((0.0, 0.3, 0.8))
     try:
-        lines, files = write_warped(out, state, asked, lambda text: progress.show(next(stages), text))
+        lines, files = write_warped(out, state, asked, progress.show)
     finally:
         progress.clear()
     say("", *lines, sep="\n")
@@ -94,21 +95,24 @@ def _write(state: SavedState, out: Path, asked: Asked, say: Callable[..., None],
 
 
 def _run(options: argparse.Namespace) -> None:
-    from warpbrain.atomic import output_folder
+    from warpbrain.atomic import check_output_folder
     from warpbrain.report import warped
     from warpbrain.report.state_files import read_state
+    from warpbrain.terminal.result_folder import results_in
 
     asked = asked_for(options)
     if asked is None:
         raise InputError("expected --image, --labels or --points: what is to be warped")
-    say: Callable[..., None] = _silent if options.quiet else print
+    record: Record = options.record
     out = options.out or (options.result if options.result.is_dir() else options.result.parent)
     # no folder is made for a result that is none, or an image of another body
     state = read_state(options.result)
     warped.check_place(asked, state.mesh, state.path)
-    files = _write(state, output_folder(out), asked, say, options.quiet)
-    say("", f"written to {out}: {', '.join(files)}", sep="\n")
-
-
-def _silent(*_values: object, **_options: object) -> None:
-    """Stands for `print` where nothing is to be said."""
+    if not options.overwrite and (there := warped.in_the_way(out, asked)):
+        raise InputError(f"{out}: has {', '.join(there)} already: --overwrite replaces them, --out writes elsewhere")
+    check_output_folder(out)
+    record.note(result=str(state.path))
+    # beside the result and what else was made of it
+    with results_in(out, record, replace=False):
+        record.files += _write(state, out, asked, record.say, options.quiet)
+        record.say("", f"written to {out}: {', '.join(record.files)}", sep="\n")

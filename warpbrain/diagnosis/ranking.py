@@ -64,6 +64,8 @@ class Ranking:
             with_it, without = (self._confirming.predict(candidate, held_out) for candidate in (alone, nothing))
             change = held_out.error(with_it) - held_out.error(without)
         why = "" if weighted_set.refit is not None else "less probable than what was fitted"
+        if weighted_set.failure:
+            why = f"as large as it is seen it could not be simulated: {weighted_set.failure}"
         return Ranked(
             cause.name,
             True,

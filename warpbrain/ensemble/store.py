@@ -6,6 +6,7 @@ The folder holds `ensemble.json`, which says whose outcomes these are, and `samp
 from __future__ import annotations
 
 import json
+import shutil
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -18,6 +19,16 @@ from warpbrain.atomic import output_folder, whole_file
 from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.sample import Outcome
 from warpbrain.errors import InputError
+
+#: Names in the folder.
+MANIFEST, PARTS = "ensemble.json", "samples"
+
+
+def discard(folder: Path) -> None:
+    """Take away the outcomes of an ensemble, if the folder holds some, so that all are computed anew."""
+    if (folder / MANIFEST).is_file():
+        shutil.rmtree(folder / PARTS, ignore_errors=True)
+        (folder / MANIFEST).unlink()
 
 
 class Store:
@@ -45,8 +56,8 @@ class Store:
         # reactions are kept at nodes with constrained components only
         self._held = np.any(job.model.constrained, axis=1)
         fingerprint = job.fingerprint(kind)
-        manifest = output_folder(folder) / "ensemble.json"
-        self._parts = folder / "samples"
+        manifest = output_folder(folder) / MANIFEST
+        self._parts = folder / PARTS
         if manifest.exists():
             _require_same(manifest, fingerprint)
         else:
@@ -122,4 +133,6 @@ def _require_same(manifest: Path, fingerprint: str) -> None:
     if known != fingerprint:
         about = ", ".join(f"{key}: {value}" for key, value in found.items() if isinstance(value, str | int))
         about = about.removeprefix(f"fingerprint: {known}, ")
-        raise InputError(f"{manifest.parent}: holds another ensemble ({about}): choose another folder")
+        raise InputError(
+            f"{manifest.parent}: holds another ensemble ({about}): choose another folder, or --overwrite it"
+        )

@@ -64,22 +64,22 @@ class Rows:
     def of(cls, observations: Observations, parts: tuple[Residuals, ...]) -> Rows:
         """Those of residuals at a state: surfaces are looked at along their normals there."""
         positions, sigma, points, first = [], [], [], 0
-        for one in observations.recordings:
-            count = len(one.rows)
-            where = one.positions if len(one.positions) else np.full((count, 3), np.nan)
-            positions.append(np.repeat(where, one.size, axis=0))
-            own = 1.0 / np.sqrt(one.weights) if one.sigma is None else one.sigma
-            sigma.append(np.repeat(own, one.size))
-            numbers = first + np.arange(count * one.size).reshape(count, one.size)
-            points += list(numbers) if one.unit == "m" else []
-            first += count * one.size
+        for recording in observations.recordings:
+            count = len(recording.rows)
+            where = recording.positions if len(recording.positions) else np.full((count, 3), np.nan)
+            positions.append(np.repeat(where, recording.size, axis=0))
+            deviation = 1.0 / np.sqrt(recording.weights) if recording.sigma is None else recording.sigma
+            sigma.append(np.repeat(deviation, recording.size))
+            numbers = first + np.arange(count * recording.size).reshape(count, recording.size)
+            points += list(numbers) if recording.unit == "m" else []
+            first += count * recording.size
         sizes = [part.values.size for part in parts]
         return cls(
             np.concatenate(positions),
             np.concatenate([part.directions.reshape(-1, 3) for part in parts]),
             np.concatenate(sigma),
             np.repeat(np.arange(len(parts)), sizes),
-            np.array([one.sigma is not None for one in observations.recordings]),
+            np.array([recording.sigma is not None for recording in observations.recordings]),
             tuple(points),
         )
 
@@ -100,8 +100,10 @@ class IndependentNoise:
         """As large as the residuals (n,) of each recording are, but no less than declared."""
         sigma = rows.sigma.copy()
         for number, declared in enumerate(rows.declared.tolist()):
-            own = rows.recordings == number
-            sigma[own] *= max(root_mean_square(residual[own] / sigma[own]), 1.0 if declared else LEAST_SIGMA)
+            members = rows.recordings == number
+            sigma[members] *= max(
+                root_mean_square(residual[members] / sigma[members]), 1.0 if declared else LEAST_SIGMA
+            )
         return cls(sigma)
 
     def negative_log(self, residual: Floats) -> float:
@@ -146,8 +148,8 @@ class Noise:
         """Lower triangular factor (n, n) of the covariance at a scale of 1, gross errors in it."""
         covariance = self.rows.covariance(self.sigma)
         for number in np.flatnonzero(self.gross).tolist():
-            own = self.rows.points[number]
-            covariance[np.ix_(own, own)] *= self.inflation[number] ** 2
+            numbers = self.rows.points[number]
+            covariance[np.ix_(numbers, numbers)] *= self.inflation[number] ** 2
         # metres beside newtons: one size for all
         return np.asarray(
             self.sigma[:, None] * np.linalg.cholesky(covariance / np.outer(self.sigma, self.sigma)), dtype=np.float64
@@ -156,11 +158,11 @@ class Noise:
     @cached_property
     def log_prior(self) -> float:
         """Of its scale and of its gross errors."""
-        found = float(log_scale_density(np.array(self.scale)))
+        log_density = float(log_scale_density(np.array(self.scale)))
         if self.outliers is not None:
             kinds = np.searchsorted(self.outliers.inflations, self.inflation)
-            found += float(self.outliers.log_probabilities[kinds].sum())
-        return found
+            log_density += float(self.outliers.log_probabilities[kinds].sum())
+        return log_density
 
     def negative_log(self, residual: Floats) -> float:
         """`-ln p` of residuals (n,), with that of the noise itself."""
@@ -186,11 +188,11 @@ class Noise:
         gross : (n,) bool array
             Rows that are gross errors.
         """
-        own = self.rows.recordings == number
-        gross = [wrong for rows, wrong in zip(self.rows.points, self.gross.tolist(), strict=True) if own[rows[0]]]
+        members = self.rows.recordings == number
+        gross = [wrong for rows, wrong in zip(self.rows.points, self.gross.tolist(), strict=True) if members[rows[0]]]
         return (
-            self.scale * self.sigma[own].reshape(shape)[:, 0],
-            self._deviation[own].reshape(shape),
+            self.scale * self.sigma[members].reshape(shape)[:, 0],
+            self._deviation[members].reshape(shape),
             np.array(gross or np.zeros(shape[0]), dtype=bool),
         )
 
@@ -233,14 +235,14 @@ class Likelihood:
         sound = np.ones(len(rows.points))
         sigma = rows.sigma.copy()
         for number in np.flatnonzero(~rows.declared).tolist():
-            own = rows.recordings == number
+            members = rows.recordings == number
             # few of them are gross errors
-            sigma[own] *= max(1.4826 * float(np.median(np.abs(left[own] / sigma[own]))), LEAST_SIGMA)
-        found = [
+            sigma[members] *= max(1.4826 * float(np.median(np.abs(left[members] / sigma[members]))), LEAST_SIGMA)
+        candidates = [
             self._settled(Noise(rows, sigma, scale, sound, self.outliers), expected, columns)
             for scale in self._starts(rows, sigma, expected, columns)
         ]
-        return max(found, key=lambda noise: _log_evidence(noise, expected, columns))
+        return max(candidates, key=lambda noise: _log_evidence(noise, expected, columns))
 
     def _starts(self, rows: Rows, sigma: Floats, expected: Floats, columns: Floats) -> tuple[float, ...]:
         """Scales to begin with: gross errors first, and all points sound first."""
@@ -256,8 +258,8 @@ class Likelihood:
             if self.outliers is not None and len(noise.rows.points):
                 sound = replace(noise, inflation=np.ones_like(noise.inflation))
                 model = GaussianModel(sound.factor, columns, noise.scale)
-                found = with_gross_errors(model, expected, noise.rows.points, self.outliers)
-                noise = replace(noise, inflation=found.inflation)
+                with_errors = with_gross_errors(model, expected, noise.rows.points, self.outliers)
+                noise = replace(noise, inflation=with_errors.inflation)
             for number in np.flatnonzero(~noise.rows.declared).tolist():
                 noise = _with_likely_sigma(noise, number, expected, columns)
             if noise.rows.declared.any():
@@ -285,15 +287,15 @@ def _likely_scale(noise: Noise, expected: Floats, columns: Floats) -> float:
 
 def _with_likely_sigma(noise: Noise, number: int, expected: Floats, columns: Floats) -> Noise:
     """The noise with another size of that of a recording which declares none: the likeliest of its own rows."""
-    own = noise.rows.recordings == number
-    model = GaussianModel(noise.factor, columns).rows(own)
+    members = noise.rows.recordings == number
+    model = GaussianModel(noise.factor, columns).rows(members)
 
     def negative(log_size: float) -> float:
-        return -float(model.with_scale(math.exp(log_size)).log_density(expected[own]))
+        return -float(model.with_scale(math.exp(log_size)).log_density(expected[members]))
 
     size = math.exp(_least(negative, -2.0, 2.0)) / noise.scale
     sigma = noise.sigma.copy()
-    sigma[own] = np.maximum(size * sigma[own], LEAST_SIGMA)
+    sigma[members] = np.maximum(size * sigma[members], LEAST_SIGMA)
     return replace(noise, sigma=sigma)
 
 

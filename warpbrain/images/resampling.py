@@ -32,7 +32,8 @@ def resampled(
     Returns
     -------
     array of the shape of the field's grid
-        Of the type that came in; linear interpolation of whole numbers is rounded. Zero where there was no image.
+        Of the type that came in; linear interpolation of whole numbers is rounded. Zero where there was no image. Not
+        a number where most of what is interpolated was none: it does not spread.
     """
     from scipy.ndimage import map_coordinates
 
@@ -41,6 +42,10 @@ def resampled(
     # single precision only where it holds every value
     single = np.result_type(values.dtype, np.float32) == np.float32
     source = values if nearest else values.astype(np.float32 if single else np.float64)
+    known: NDArray[np.float32] | None = None
+    if not nearest and values.dtype.kind == "f" and not np.isfinite(source).all():
+        known = np.isfinite(source).astype(np.float32)
+        source = np.where(known > 0, source, 0)
     last = np.array(grid.shape) - 1
     for first in range(0, after.shape[0], _SLICES):
         part = slice(first, min(first + _SLICES, after.shape[0]))
@@ -55,6 +60,9 @@ def resampled(
             sampled = source[tuple(np.minimum(index, last).T)]
         else:
             sampled = map_coordinates(source, at.T, order=1, mode="nearest")
+            if known is not None:
+                share = map_coordinates(known, at.T, order=1, mode="nearest")
+                sampled = np.where(share >= 0.5, sampled / np.maximum(share, 0.5), np.nan)
             if np.issubdtype(values.dtype, np.integer):
                 sampled = np.rint(sampled)
         shape = (part.stop - part.start, *after.shape[1:])

@@ -14,6 +14,7 @@ Conventions of the files
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from warpbrain.atomic import whole_file
 from warpbrain.frame import METRES
+from warpbrain.mesh.abaqus import read_abaqus
 from warpbrain.mesh.patience import patience
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 from warpbrain.mesh.vtu import read_vtu, write_vtu
@@ -31,8 +33,10 @@ from warpbrain.mesh.vtu import read_vtu, write_vtu
 ELEMENT_SET_PREFIX = "set_"
 #: A larger file [bytes] is refused, not read: the largest meshes that are worth a simulation are a tenth of it.
 LARGEST_FILE = 512 << 20
+#: A file with the numbers of an XDMF file.
+_COMPANION = re.compile(rb"<DataItem\b[^>]*\bFormat\s*=\s*[\"'](?:HDF|Binary)[\"'][^>]*>([^<]*)", re.IGNORECASE)
 # cells of lower dimension are other people's boundary markers: they take nothing away from the volume
-_TETRAHEDRA = ("tetra", "tetra10")
+TETRAHEDRA = ("tetra", "tetra10")
 _IGNORED = ("vertex", "line", "line3", "triangle", "triangle6", "quad", "quad8", "quad9", "polygon", "polyline")
 
 
@@ -81,38 +85,79 @@ def read_mesh(path: str | os.PathLike[str], unit: str = "m", tissue: str | None 
 
 def read_mesh_file(path: str | os.PathLike[str], unit: str = "m", tissue: str | None = None) -> MeshInFile:
     """As `read_mesh`, with the numbers that the nodes have in the file."""
+    return _in_file(Path(path), read_raw(Path(path)), unit, tissue)
+
+
+def read_raw(path: Path) -> Any:
+    """What meshio reads of a file: a `meshio.Mesh` with cells of any kind.
+
+    Raises
+    ------
+    MeshError
+        Naming the file, what was found and what was expected.
+    """
     import meshio
 
-    source = Path(path)
-    scale = _scale(unit)
-    if not source.is_file():
-        raise MeshError(f"{source}: no such file")
-    if (size := source.stat().st_size) == 0:
-        raise MeshError(f"{source}: not a mesh that meshio can read (the file is empty)")
+    if not path.is_file():
+        raise MeshError(f"{path}: no such file")
+    if (size := path.stat().st_size) == 0:
+        raise MeshError(f"{path}: not a mesh that meshio can read (the file is empty)")
     if size > LARGEST_FILE:
-        raise MeshError(f"{source}: found {size / 1e6:.0f} MB, expected a mesh of at most {LARGEST_FILE / 1e6:.0f} MB")
+        raise MeshError(f"{path}: found {size / 1e6:.0f} MB, expected a mesh of at most {LARGEST_FILE / 1e6:.0f} MB")
+    _check_companions(path)
     try:
-        with patience(source):
-            raw = read_vtu(source) if source.suffix.lower() == ".vtu" else meshio.read(source)
+        with patience(path):
+            reader = {".vtu": read_vtu, ".inp": read_abaqus}.get(path.suffix.lower(), meshio.read)
+            return reader(path)
+    except MeshError as error:
+        raise error.within(str(path)) from error
     except SystemExit as error:  # meshio leaves the program on some unreadable files
-        raise MeshError(f"{source}: not a mesh that meshio can read") from error
+        raise MeshError(f"{path}: not a mesh that meshio can read") from error
     except Exception as error:  # its readers raise whatever their parsers do
         detail = " ".join(str(error).split())[:200] or type(error).__name__
-        raise MeshError(f"{source}: not a mesh that meshio can read ({detail})") from error
+        raise MeshError(f"{path}: not a mesh that meshio can read ({detail})") from error
+
+
+def _check_companions(path: Path) -> None:
+    """`MeshError` if an XDMF file names data in another folder than its own."""
+    if path.suffix.lower() not in (".xdmf", ".xmf"):
+        return
+    for item in _COMPANION.finditer(path.read_bytes()):
+        name = item.group(1).decode("utf-8", "replace").strip().partition(":")[0]
+        if not (path.parent / name).resolve().is_relative_to(path.parent.resolve()):
+            raise MeshError(f"{path}: names '{name[:200]}', which leaves its folder")
+
+
+def ends_inside_a_number(path: Path) -> bool:
+    """Whether a text ends in a digit and not in a line break: cut off there, its last number is another one."""
+    with path.open("rb") as file:
+        file.seek(0, os.SEEK_END)
+        file.seek(max(0, file.tell() - 256))
+        end = file.read()
+    # of a binary file the last byte may be that of a digit by chance
+    return end[-1:].isdigit() and end.isascii() and b"\0" not in end
+
+
+def mesh_of(path: Path, raw: Any, unit: str) -> TetMesh:
+    """The mesh of what `read_raw` gave, with the conventions of this module; errors name `path`."""
+    return _in_file(path, raw, unit, None).mesh
+
+
+def _in_file(path: Path, raw: Any, unit: str, tissue: str | None) -> MeshInFile:
     try:
-        return _from_meshio(raw, scale, tissue)
+        return _from_meshio(raw, _scale(unit), tissue)
     except MeshError as error:
-        raise error.within(str(source)) from error
+        raise error.within(str(path)) from error
     except (ValueError, IndexError, TypeError) as error:  # arrays that do not fit together
-        raise MeshError(f"{source}: arrays that do not fit together ({' '.join(str(error).split())})") from error
+        raise MeshError(f"{path}: arrays that do not fit together ({' '.join(str(error).split())})") from error
 
 
 def _from_meshio(raw: Any, scale: float, tissue: str | None) -> MeshInFile:
     kinds = [block.type for block in raw.cells]
-    foreign = sorted({kind for kind in kinds if kind not in _TETRAHEDRA and kind not in _IGNORED})
+    foreign = sorted({kind for kind in kinds if kind not in TETRAHEDRA and kind not in _IGNORED})
     if foreign:
         raise MeshError(f"found volume cells of type {', '.join(foreign)}; expected tetrahedra only")
-    blocks = [number for number, kind in enumerate(kinds) if kind in _TETRAHEDRA]
+    blocks = [number for number, kind in enumerate(kinds) if kind in TETRAHEDRA]
     if not blocks:
         raise MeshError(f"found no tetrahedra (cells: {', '.join(sorted(set(kinds))) or 'none'})")
     cells = {name: np.concatenate([data[b] for b in blocks]) for name, data in raw.cell_data.items()}

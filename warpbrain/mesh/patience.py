@@ -1,7 +1,9 @@
-"""A limit on how long a file may take to read: some readers wait for ever for the end of a file that is cut off."""
+"""Limits on what the reading of a file may take: some readers wait for ever for the end of one that is cut off, or ask
+for all the memory that a counter in it speaks of."""
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from collections.abc import Iterator
@@ -9,28 +11,69 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-#: Seconds for any file, and for each million bytes of it: a hundred times what a slow disk and a slow format take.
-PATIENCE, PATIENCE_PER_MEGABYTE = 20.0, 5.0
+#: Seconds of computing for any file, and for each million bytes of it: a hundred times what a slow format takes.
+SECONDS, SECONDS_PER_MEGABYTE = 8.0, 5.0
+#: Bytes of memory for any file, and for each byte of it: a digit and a blank are a number of eight bytes, which
+#: readers copy several times.
+MEMORY, MEMORY_PER_BYTE = 1 << 30, 40
 
 
 @contextmanager
 def patience(path: Path) -> Iterator[None]:
-    """Raise `TimeoutError` in the block if it takes longer than reading a file of that size can.
+    """Raise `TimeoutError` or `MemoryError` in the block if it takes more than reading a file of that size can.
 
-    Works in the main thread on systems with timers, which is where commands read; elsewhere it sets no limit.
+    Time is what this process computes, so that a busy machine makes no file wrong; it works in the main thread on
+    systems with timers, which is where commands read. Memory is bounded where there are limits of the address space.
+    Elsewhere there is no limit.
     """
+    size = path.stat().st_size
+    with _time(SECONDS + SECONDS_PER_MEGABYTE * size / 1e6), _memory(MEMORY + MEMORY_PER_BYTE * size):
+        yield
+
+
+@contextmanager
+def _time(seconds: float) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
         yield
         return
-    seconds = PATIENCE + PATIENCE_PER_MEGABYTE * path.stat().st_size / 1e6
 
     def give_up(_number: int, _frame: FrameType | None) -> None:
         raise TimeoutError(f"no end after {seconds:.0f} s: is the file cut off?")
 
-    before = signal.signal(signal.SIGALRM, give_up)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before = signal.signal(signal.SIGPROF, give_up)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+@contextmanager
+def _memory(limit: int) -> Iterator[None]:
+    taken = _address_space()
+    if taken is None:
+        yield
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    wanted = taken + limit
+    if soft != resource.RLIM_INFINITY:
+        wanted = min(wanted, soft)
+    resource.setrlimit(resource.RLIMIT_AS, (wanted, hard))
+    try:
+        yield
+    except MemoryError:
+        raise MemoryError(f"needs more than {limit / 1e9:.1f} GB of memory: is a counter in it wrong?") from None
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def _address_space() -> int | None:
+    """Bytes of address space that this process has; None where it does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    except (OSError, ValueError, IndexError):
+        return None
+    return pages * os.sysconf("SC_PAGE_SIZE")

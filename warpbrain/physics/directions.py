@@ -14,7 +14,8 @@ Floats = NDArray[np.float64]
 def unit_vector(key: str, direction: ArrayLike) -> Floats:
     """A direction (3,) at length one; `ParameterError` of the key if it has none."""
     vector = np.asarray(direction, dtype=float)
-    length = float(np.linalg.norm(vector)) if vector.shape == (3,) else 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        length = float(np.linalg.norm(vector)) if vector.shape == (3,) else 0.0
     if not (np.isfinite(length) and length > 0.0):
         raise ParameterError(key, f"found {np.ravel(vector).tolist()}, expected 3 numbers that are not all zero")
     return np.asarray(vector / length)
@@ -47,7 +48,8 @@ def element_directions(
         known = ", ".join(sorted(mesh.element_vectors)) or "none"
         raise ParameterError("field", f"the mesh has no array of directions '{field}' (it has {known})")
     vectors = mesh.element_vectors[field][elements]
-    lengths = np.linalg.norm(vectors, axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        lengths = np.linalg.norm(vectors, axis=1)
     bad = np.flatnonzero(~(np.isfinite(lengths) & (lengths > 0.0)))
     if len(bad):
         raise ParameterError(

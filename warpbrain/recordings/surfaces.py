@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.frame import AXES
+from warpbrain.mesh.files import LARGEST_FILE, ends_inside_a_number
 from warpbrain.mesh.patience import patience
 from warpbrain.mesh.vtu import axes_of_vtu, read_vtu
 from warpbrain.problems import Problems
@@ -31,6 +32,9 @@ _SPACE = re.compile(rb"SPACE=(RAS|LPS)")
 # what there must be of a header: without it meshio's readers go round for ever at the end of the file
 _WHOLE_HEADER = {".ply": re.compile(rb"^end_header\s*$", re.MULTILINE), ".off": re.compile(rb"\n[ \t]*[^#\s]")}
 
+# bytes before the triangles of a binary STL, the last four of them their number, and bytes of each
+_STL_HEADER, _STL_TRIANGLE = 84, 50
+
 
 @dataclass(frozen=True, eq=False)
 class SurfaceMesh:
@@ -49,6 +53,10 @@ def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh | None:
     """
     if not is_readable(path, problems):
         return None
+    if (size := path.stat().st_size) > LARGEST_FILE:
+        found = f"found {size / 1e6:.0f} MB, expected a surface of at most {LARGEST_FILE / 1e6:.0f} MB"
+        problems.add(path, "", found)
+        return None
     before = len(problems.found)
     try:
         raw = _from_vtp(path) if path.suffix.lower() == ".vtp" else _from_meshio(path, problems)
@@ -59,13 +67,16 @@ def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh | None:
         return None
     if raw is None or len(problems.found) > before:
         return None
+    if ends_inside_a_number(path):
+        problems.remark(path, "the last line ends in a number without a line break: is the file cut off?")
     return _checked(raw, path, problems)
 
 
 def _from_vtp(path: Path) -> SurfaceMesh:
     from warpbrain.recordings.vtp import read_vtp
 
-    points, faces, axes = read_vtp(path)
+    with patience(path):
+        points, faces, axes = read_vtp(path)
     return SurfaceMesh(points, faces if len(faces) else None, axes)
 
 
@@ -80,6 +91,8 @@ def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh | None:
     whole = _WHOLE_HEADER.get(path.suffix.lower())
     if whole is not None and not whole.search(head):
         raise ValueError("its header is cut off")
+    if path.suffix.lower() == ".stl":
+        _check_stl(path, head)
     said = io.StringIO()
     try:
         # it prints what it says, and leaves the program where it cannot read
@@ -105,6 +118,16 @@ def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh | None:
     if axes is None and (mark := _SPACE.search(head[:2048])):
         axes = mark.group(1).decode()
     return SurfaceMesh(points, faces if len(faces) else None, axes)
+
+
+def _check_stl(path: Path, head: bytes) -> None:
+    """`ValueError` if the number of triangles in the header of a binary file is not that of its bytes."""
+    if head.lstrip().startswith(b"solid") or len(head) < _STL_HEADER:
+        return
+    count = int.from_bytes(head[_STL_HEADER - 4 : _STL_HEADER], "little")
+    there = (path.stat().st_size - _STL_HEADER) / _STL_TRIANGLE
+    if there != count:
+        raise ValueError(f"its header says {count} triangles, its bytes are {there:.10g}")
 
 
 def _checked(raw: SurfaceMesh, path: Path, problems: Problems) -> SurfaceMesh | None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.problems import Problems
-from warpbrain.recordings.text import lines_of, read_text, shown, without_comment
+from warpbrain.recordings.text import lines_of, read_text, remark_open_end, shown, without_comment
 
 Floats = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ class Table:
         column = self.header.index(name)
         words = tuple(row[column] for row in self._cells)
         for index, word in enumerate(words):
-            if not word:
+            if not word and not self._problems.enough:
                 self.problem(index, name, "found nothing, expected a name")
         return words
 
@@ -85,6 +85,8 @@ class Table:
         column = self.header.index(name)
         values = np.full(len(self._cells), np.nan)
         for index, row in enumerate(self._cells):
+            if self._problems.enough:
+                break
             cell = row[column]
             value = _number(cell)
             if value is not None and abs(value) <= LARGEST:
@@ -109,6 +111,8 @@ class Table:
         values = self.numbers(name)
         wrong = values < lowest if itself else values <= lowest
         for index in np.flatnonzero(wrong):
+            if self._problems.enough:
+                break
             limit = f"{lowest:g} or more" if itself else f"more than {lowest:g}"
             self.problem(int(index), name, f"found {values[index]:g}, expected {limit}")
         return values
@@ -121,6 +125,8 @@ class Table:
         values = self.numbers("t")
         before: dict[str, int] = {}
         for index in np.flatnonzero(np.isfinite(values)).tolist():
+            if self._problems.enough:
+                break
             key = of[index] if of is not None else ""
             if key in before:
                 last = before[key]
@@ -152,14 +158,15 @@ def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table | 
     text = read_text(path, problems)
     if text is None:
         return None
-    if not text.endswith(("\n", "\r")):
-        problems.remark(path, "the last row does not end with a line break: is the file cut off?")
+    remark_open_end(path, text, problems)
     header: list[str] = []
     separator = ","
     cells: list[list[str]] = []
     rows: list[int] = []
     broken = 0
     for number, line in enumerate(lines_of(text), 1):
+        if problems.enough:
+            break
         content = without_comment(line)
         if not content.strip():
             continue

@@ -40,6 +40,8 @@ def read_tags(path: Path, problems: Problems) -> tuple[Floats, Floats, tuple[str
     numbers: list[list[float]] = []
     labels: list[str] = []
     for row, line in enumerate(lines[1:], 2):
+        if problems.enough:
+            break
         content = without_comment(line, "#%").strip()
         if state == "Volumes" and content:
             key, _, value = content.partition("=")

@@ -11,19 +11,21 @@ from warpbrain.problems import Problems
 
 #: Largest text file that is read [bytes].
 LIMIT = 64 * 2**20
-#: Problems of one file that are listed one by one.
-LISTED = 20
+#: Problems of one file that are listed one by one, and that are counted before its reading stops.
+LISTED, COUNTED = 20, 2000
 
 
 @contextmanager
 def collected(path: Path, problems: Problems) -> Iterator[Problems]:
     """Problems of one file: in the end the first `LISTED` and the number of the others go to `problems`."""
-    found = Problems()
+    found = Problems(COUNTED)
     yield found
     problems.found.extend(found.found[:LISTED])
     problems.remarks.extend(found.remarks)
     others = len(found.found) - LISTED
-    if others > 0:
+    if found.enough:
+        problems.add(path, "", f"and more than {others} more problems in this file, whose reading stopped there")
+    elif others > 0:
         problems.add(path, "", f"and {others} more problem{'s' if others > 1 else ''} in this file")
 
 
@@ -72,7 +74,8 @@ def read_text(path: Path, problems: Problems) -> str | None:
         problems.add(path, "", f"cannot be read: {error.strerror}")
         return None
     try:
-        text = data.decode("utf-8-sig")
+        # some programs put a byte order mark before the one that is there
+        text = data.decode("utf-8").lstrip("\ufeff")
     except UnicodeDecodeError as error:
         row = data.count(b"\n", 0, error.start) + 1
         found = f"found byte 0x{data[error.start]:02x} at position {error.start}, expected UTF-8 text"
@@ -82,6 +85,12 @@ def read_text(path: Path, problems: Problems) -> str | None:
         problems.add(path, "", "is empty: it holds white space only")
         return None
     return text
+
+
+def remark_open_end(path: Path, text: str, problems: Problems) -> None:
+    """Remark on a last row that could be a part of one."""
+    if not text.endswith(("\n", "\r")):
+        problems.remark(path, "the last row does not end with a line break: is the file cut off?")
 
 
 def lines_of(text: str) -> list[str]:

@@ -14,6 +14,8 @@ from xml.etree import ElementTree as XML
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.mesh.files import LARGEST_FILE
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
@@ -96,7 +98,9 @@ class _File:
         import zlib
 
         decompress = zlib.decompress if self._compressor == "vtkZLibDataCompressor" else lzma.decompress
-        count = int(np.frombuffer(_take(data, size, coded), self._header)[0])
+        count, whole = (int(n) for n in np.frombuffer(_take(data, 2 * size, coded), self._header))
+        if count * whole > LARGEST_FILE:
+            raise ValueError(f"an array of {count} blocks of {whole} bytes is larger than {LARGEST_FILE / 1e6:.0f} MB")
         head = size * (3 + count)
         lengths = np.frombuffer(_take(data, head, coded), self._header)[3:].astype(np.int64)
         # the header is coded by itself, padding and all

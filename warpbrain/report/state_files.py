@@ -15,6 +15,7 @@ from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.errors import InputError
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.patience import patience
 from warpbrain.mesh.vtu import read_vtu, write_vtu
 from warpbrain.report.files import MIDDLES, MILLIMETRES
 
@@ -74,7 +75,8 @@ def read_state(result: Path) -> SavedState:
     elif not result.is_file():
         raise InputError(f"{result}: no such file or folder")
     try:
-        file = read_vtu(path)
+        with patience(path):
+            file = read_vtu(path)
         cells = file.cells[0].data
         at = {name: np.asarray(values, dtype=np.float64) for name, values in file.point_data.items()}
         of_cells = {name: values[0] for name, values in file.cell_data.items()}

@@ -29,8 +29,12 @@ _SPACING, _MARGIN = 2.0, 40.0
 #: Of a voxel of the transforms [mm], at most: between the centres of larger ones the inverse is off by more than 0.05
 #: mm, and smaller ones cost memory and time.
 _EDGE = 1.0
+#: Voxels of the transforms, at most: these take about 4 GB. Of a larger box the voxels are larger.
+_MOST_VOXELS = 64_000_000
 #: Part of the body that may lie outside an image before the image is none of it.
 _INSIDE = 0.5
+#: Part of the body outside an image from which on it is said.
+_CUT_OFF = 0.001
 #: What the values of `trust.nii.gz` mean.
 TRUST = {
     SEEN: "recordings see a force, and nothing is left",
@@ -84,13 +88,18 @@ def read_asked(image: Path | None, labels: Path | None, points: Sequence[Path]) 
         )
     names = [_after(each.path) for each in (asked.image, asked.labels) if each is not None]
     names += [file.moved_name for file in asked.points]
-    for name in sorted({name for name in names if names.count(name) > 1}):
-        raise InputError(f"{name}: {names.count(name)} of the files given would be written as it: rename one")
+    # one file on systems that take letters for the same in either case
+    plain = [name.lower() for name in names]
+    for name in names:
+        if plain.count(name.lower()) > 1:
+            raise InputError(
+                f"{name}: {plain.count(name.lower())} of the files given would be written as it: rename one"
+            )
     return asked
 
 
 def write_warped(
-    folder: Path, state: SavedState, asked: Asked, progress: Callable[[str], None] = lambda line: None
+    folder: Path, state: SavedState, asked: Asked, progress: Callable[[float, str], None] = lambda share, stage: None
 ) -> tuple[list[str], list[str]]:
     """Write everything that a state and what is asked for give.
 
@@ -109,13 +118,13 @@ def write_warped(
     source = asked.grid_of
     check_place(asked, state.mesh, state.path)
     grid = Grid.around(state.mesh, _SPACING, _MARGIN) if source is None else source.grid
-    progress("displacement on the grid of the image")
-    fine = grid.with_edges(_EDGE)
+    progress(0.0, "displacement on the grid of the image")
+    fine = _for_transforms(grid)
     inside = voxels_inside(state.mesh, fine)
     field = displacement_field(inside, state.u, state.middles)
-    progress("its inverse")
+    progress(0.3, "its inverse")
     back = inverse(field, inside.mask)
-    progress("files")
+    progress(0.8, "files")
     write_displacement(folder / "displacement.nii.gz", field.on(grid))
     write_transform(folder / FORTH, back.field)
     write_transform(folder / BACK, field)
@@ -132,7 +141,16 @@ def write_warped(
         files += write_moved(folder, moved)
     image_after, labels_after = (None if each is None else _after(each.path) for each in (asked.image, asked.labels))
     files += write_slicer_scene(folder, state, asked.image, image_after, labels_after, files)
-    return [*_lines(asked, field, inside, back, moved), *_trust_lines(state)], files
+    said = [*_lines(asked, field, inside, back, moved), *_partly_outside(asked, state.mesh), *_trust_lines(state)]
+    return said, files
+
+
+def in_the_way(folder: Path, asked: Asked) -> list[str]:
+    """Names of files in a folder that what is asked for would be written over."""
+    names = ["displacement.nii.gz", FORTH, BACK]
+    names += [_after(image.path) for image in (asked.image, asked.labels) if image is not None]
+    names += [file.moved_name for file in asked.points]
+    return [name for name in names if (folder / name).exists()]
 
 
 def _after(path: Path) -> str:
@@ -144,20 +162,48 @@ def _after(path: Path) -> str:
 
 
 def check_place(asked: Asked, mesh: TetMesh, path: Path) -> None:
-    """`InputError` if most of a body is outside of the image: in another place, unit or orientation."""
-    image = asked.grid_of
-    if image is None:
-        return
+    """`InputError` if most of a body is outside of an image: in another place, unit or orientation."""
     points = MILLIMETRES * mesh.points
-    share = float(np.mean(image.grid.contains(points)))
-    if share < _INSIDE:
-        # all eight: of an oblique image two opposite ones span less than the image
-        corners = image.grid.positions(np.indices((2, 2, 2)).reshape(3, -1).T * (np.array(image.grid.shape) - 1))
-        raise InputError(
-            f"{image.path}: affine: {100 * share:.0f} % of the body of {path} are in it: it spans "
-            f"{_span(corners)}, the body {_span(points)} "
-            "mm RAS: is it the image that the mesh was made from?"
-        )
+    for image in (asked.image, asked.labels):
+        if image is None:
+            continue
+        share = float(np.mean(image.grid.contains(points)))
+        if share < _INSIDE:
+            raise InputError(
+                f"{image.path}: affine: {100 * share:.0f} % of the body of {path} are in it: it spans "
+                f"{_span(_corners(image.grid))}, the body {_span(points)} "
+                "mm RAS: is it the image that the mesh was made from?"
+            )
+    if asked.labels is not None:
+        there = asked.labels.values != 0
+        labelled = [np.flatnonzero(there.any(axis=across)) for across in ((1, 2), (0, 2), (0, 1))]
+        if not len(labelled[0]):
+            raise InputError(f"{asked.labels.path}: all its voxels are 0: there are no labels to warp")
+        ends = np.array([(index.min() - 0.5, index.max() + 0.5) for index in labelled])
+        low, high = asked.labels.grid.indices(points).min(axis=0), asked.labels.grid.indices(points).max(axis=0)
+        if (ends[:, 1] < low).any() or (ends[:, 0] > high).any():
+            box = asked.labels.grid.positions(np.array(np.meshgrid(*ends, indexing="ij")).reshape(3, -1).T)
+            raise InputError(
+                f"{asked.labels.path}: affine: its labels span {_span(box)}, the body of {path} {_span(points)} "
+                "mm RAS: no label is of it"
+            )
+
+
+def _corners(grid: Grid) -> Floats:
+    """All eight: of an oblique image two opposite ones span less than the image."""
+    return grid.positions(np.indices((2, 2, 2)).reshape(3, -1).T * (np.array(grid.shape) - 1))
+
+
+def _partly_outside(asked: Asked, mesh: TetMesh) -> list[str]:
+    """What to say of images that hold a part of the body only."""
+    points, weights = MILLIMETRES * mesh.points, mesh.node_volumes
+    lines = []
+    for image in (asked.image, asked.labels):
+        if image is not None:
+            share = float(weights[~image.grid.contains(points)].sum() / weights.sum())
+            if share > _CUT_OFF:
+                lines.append(f"note      {image.path.name}: {100 * share:.2g} % of the body are outside of it")
+    return lines
 
 
 def _span(points: Floats) -> str:
@@ -165,6 +211,14 @@ def _span(points: Floats) -> str:
     return " x ".join(
         f"{low:.0f} to {high:.0f}" for low, high in zip(points.min(axis=0), points.max(axis=0), strict=True)
     )
+
+
+def _for_transforms(grid: Grid) -> Grid:
+    """The box of an image in voxels that a transform needs, or the smallest that fit the memory."""
+    edge = _EDGE
+    while (fine := grid.with_edges(edge)).count > _MOST_VOXELS:
+        edge *= 1.25
+    return fine
 
 
 def _write_maps(folder: Path, state: SavedState, inside: VoxelsInside) -> list[str]:

@@ -6,11 +6,14 @@ import argparse
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Callable
 from typing import NoReturn
 
 from warpbrain.errors import InputError, SolveError
+from warpbrain.terminal.crash import SOFTWARE, where, write_report
 from warpbrain.terminal.interrupt import clear_up, stop_promptly
+from warpbrain.terminal.record import Record
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -20,17 +23,32 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
 
-def exit_status(program: str, call: Callable[[], None]) -> int:
+def exit_status(program: str, call: Callable[[], None], record: Record | None = None, debug: bool = False) -> int:
     """Run a command.
+
+    Parameters
+    ----------
+    program : str
+    call : callable
+    record : Record, optional
+        Of the command: what it was asked for and what it said last stand in the report of a defect.
+    debug : bool
+        Show the traceback of whatever went wrong.
 
     Returns
     -------
     int
-        0 done, 1 no answer found or no place to write it, 2 bad input, 130 interrupted, 141 nobody reads the output.
+        0 done, 1 no answer found or no place to write it, 2 bad input, 70 a defect, 130 interrupted, 141 nobody reads
+        the output.
     """
     try:
         with stop_promptly():
-            call()
+            try:
+                call()
+            except Exception:
+                if debug:
+                    traceback.print_exc()
+                raise
             sys.stdout.flush()
     except InputError as error:
         print(f"{program}: error: {error}", file=sys.stderr)
@@ -45,8 +63,23 @@ def exit_status(program: str, call: Callable[[], None]) -> int:
     except OSError as error:
         print(f"{program}: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
         return 1
+    except MemoryError as error:
+        detail = " ".join(str(error).split())
+        print(f"{program}: not enough memory{f': {detail}' if detail else ''}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         clear_up()
         print(f"\n{program}: interrupted; nothing half-written was left", file=sys.stderr)
         return 130
+    except Exception as error:
+        arguments, doing = ((), "") if record is None else (record.arguments, record.doing)
+        path = write_report(error, arguments, doing)
+        saved = "its report could not be saved" if path is None else f"please send {path} to its developers"
+        print(
+            f"{program}: a defect of {program}, not of your files: {type(error).__name__} in {where(error)}"
+            + (f", after '{doing}'" if doing else "")
+            + f": {saved}; --debug shows the traceback",
+            file=sys.stderr,
+        )
+        return SOFTWARE
     return 0

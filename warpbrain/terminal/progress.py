@@ -1,28 +1,38 @@
-"""A progress bar on standard error, on a terminal only; and plain lines on standard output."""
+"""How far long work has come, on standard error: a bar on a terminal, and now and then a line in a file or pipe."""
 
 from __future__ import annotations
 
 import sys
+import time
+
+#: Seconds between two lines where there is no terminal: what is done sooner is not worth one.
+EVERY = 30.0
 
 
 class Progress:
-    """Shows how far long work has come; silent where there is nobody to look at it."""
+    """Shows how far long work has come."""
 
     def __init__(self, label: str, quiet: bool = False) -> None:
         self._label = label
-        self._shown = not quiet and sys.stderr.isatty()
+        self._quiet = quiet
+        self._bar = not quiet and sys.stderr.isatty()
+        self._said = time.monotonic()
 
     def show(self, fraction: float, note: str = "") -> None:
         """Draw the bar at a fraction in [0, 1]."""
-        if not self._shown:
-            return
-        done = round(30 * min(max(fraction, 0.0), 1.0))
-        bar = "#" * done + "." * (30 - done)
-        sys.stderr.write(f"\r{self._label} [{bar}] {100 * fraction:3.0f} % {note:<40.40}")
-        sys.stderr.flush()
+        share = min(max(fraction, 0.0), 1.0)
+        if self._bar:
+            done = round(30 * share)
+            bar = "#" * done + "." * (30 - done)
+            sys.stderr.write(f"\r{self._label} [{bar}] {100 * fraction:3.0f} % {note:<40.40}")
+            sys.stderr.flush()
+        elif not self._quiet and time.monotonic() - self._said >= EVERY:
+            self._said = time.monotonic()
+            sys.stderr.write(f"{self._label.strip()} {100 * share:.0f} % {note}".rstrip() + "\n")
+            sys.stderr.flush()
 
     def clear(self) -> None:
         """Take the bar away."""
-        if self._shown:
+        if self._bar:
             sys.stderr.write("\r" + " " * (len(self._label) + 82) + "\r")
             sys.stderr.flush()

@@ -1,6 +1,7 @@
 """The page of a diagnosis: one file, complete for every verdict, and for what has no mesh."""
 
 import base64
+import csv
 import json
 import re
 import shutil
@@ -122,6 +123,20 @@ def test_a_diagnosis_of_a_specimen_has_what_its_page_asks_for(tmp_path):
     write_page(tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "asymmetry: a pattern that means nothing does as well with p = " in page
+
+
+def test_points_that_are_all_set_aside_have_no_figure(folder):
+    """Figures of nothing ended in an IndexError."""
+    assert "What is left at each of" in page_of(read_saved(folder))
+    with (folder / "points.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    with (folder / "points.csv").open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(row | {"set_aside": 1} for row in rows)
+    page = page_of(read_saved(folder))
+    assert "What is left at each of" not in page
+    assert "Before and after" in page
 
 
 def test_words_of_a_case_are_no_markup(folder):

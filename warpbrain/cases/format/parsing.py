@@ -24,7 +24,7 @@ def parse_toml(file: Path, problems: Problems) -> dict[str, Any] | None:
             problems.add(file, "", "the file is empty", "`warpbrain cases new` writes one to start from")
             return None
         # some editors begin UTF-8 text with a byte order mark
-        return tomllib.loads(content.decode("utf-8-sig"))
+        return tomllib.loads(content.decode("utf-8").lstrip("\ufeff"))
     except FileNotFoundError:
         problems.add(file, "", "no such file")
     except OSError as error:

@@ -14,6 +14,7 @@ from warpbrain.cases.parts.context import Context
 from warpbrain.cases.specimen import Specimen
 from warpbrain.frame import METRES
 from warpbrain.mesh import MeshError, MeshInFile, pinched_nodes, read_mesh_file
+from warpbrain.mesh.files import ends_inside_a_number
 from warpbrain.mesh.soundness import coincident_nodes
 from warpbrain.mesh.surface import boundary_faces
 
@@ -67,6 +68,8 @@ def _read_mesh(context: Context, path: Path, tissue: str | None) -> MeshInFile |
         for message in error.messages:
             context.problems.add(path, "", message.removeprefix(f"{path}: "))
         return None
+    if ends_inside_a_number(path):
+        context.problems.remark(path, "the last line ends in a number without a line break: is the file cut off?")
     mesh = found.mesh
     if not np.all(context.frame.signs > 0):
         # both axes conventions are right-handed: turning two axes keeps the orientation of the elements

@@ -48,18 +48,20 @@ def _from_table(path: Path, _mesh: TetMesh, problems: Problems) -> Floats | None
     return None if found else vectors
 
 
-def _from_array(path: Path, _mesh: TetMesh, problems: Problems) -> Floats | None:
+def _from_array(path: Path, mesh: TetMesh, problems: Problems) -> Floats | None:
     if not is_readable(path, problems):
         return None
     try:
-        array = np.load(path, allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
+        # mapped, so that a header with more numbers than the file has is known before any memory is taken
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except Exception as error:  # headers are Python text: random ones raise what its tokenizer does
         problems.add(path, "", f"not an array of NumPy ({' '.join(str(error).split())[:100]})")
         return None
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "iuf":
         problems.add(path, "", "expected one array of real numbers")
         return None
-    return array.astype(np.float64)
+    # checked before it is read
+    return array if array.shape != (len(mesh.tetrahedra), 3) else array.astype(np.float64)
 
 
 def _from_mesh(path: Path, mesh: TetMesh, problems: Problems) -> Floats | None:

@@ -12,7 +12,7 @@ from warpbrain.cases.format.table import Reading
 from warpbrain.cases.parts.context import Context
 from warpbrain.mesh import MeshInFile, TetMesh, wall_nodes
 from warpbrain.problems import Problems
-from warpbrain.recordings.text import collected, lines_of, read_text, shown, without_comment
+from warpbrain.recordings.text import collected, lines_of, read_text, remark_open_end, shown, without_comment
 
 Bools = NDArray[np.bool_]
 
@@ -83,10 +83,13 @@ def _read_numbers(path: Path, found: MeshInFile, problems: Problems) -> Bools | 
         return None
     where = np.full(found.file_nodes, -1, dtype=np.int64)
     where[found.node_numbers] = np.arange(len(found.node_numbers))
+    remark_open_end(path, text, problems)
     members = np.zeros(len(found.mesh.points), dtype=bool)
     with collected(path, problems) as wrong:
         first = True
         for number, line in enumerate(lines_of(text), 1):
+            if wrong.enough:
+                break
             word = without_comment(line).strip().rstrip(",;")
             if not word:
                 continue

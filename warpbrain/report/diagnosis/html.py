@@ -12,7 +12,7 @@ from warpbrain.report.diagnosis.figures.confusion import confusion_figure
 from warpbrain.report.diagnosis.figures.curves import curves_figure
 from warpbrain.report.diagnosis.figures.map import map_figure
 from warpbrain.report.diagnosis.figures.residuals import residuals_figure
-from warpbrain.report.diagnosis.saved import Saved, read_saved, unit_of
+from warpbrain.report.diagnosis.saved import Rows, Saved, read_saved, unit_of
 from warpbrain.report.diagnosis.scene import view_of
 from warpbrain.report.diagnosis.tables import (
     aside_table,
@@ -102,7 +102,7 @@ def _verdict(summary: dict[str, Any]) -> str:
 def _before_and_after(saved: Saved) -> Section:
     summary = saved.summary
     parts = []
-    if saved.anatomy is not None and saved.rows is not None and saved.rows.lengths.any():
+    if saved.anatomy is not None and saved.rows is not None and _has_points(saved.rows):
         parts.append(residuals_figure(summary, saved.anatomy, saved.rows))
     if saved.curves is not None:
         parts.append(curves_figure(saved.curves))
@@ -113,15 +113,20 @@ def _before_and_after(saved: Saved) -> Section:
     placebos += [(f"{text(one['mechanism'])}: a", one["placebo_p"]) for one in fit.get("confirmations", ())]
     known = [(whose, p) for whose, p in placebos if p is not None]
     parts += [f"<p>{whose} pattern that means nothing does as well with p = {p:.2g}.</p>" for whose, p in known]
-    if saved.rows is not None and saved.rows.lengths.any():
+    if saved.rows is not None and (saved.rows.lengths & ~(saved.rows["set_aside"] > 0.0)).any():
         parts.append(agreement_figure(summary, saved.rows))
     return section("Before and after", *parts)
+
+
+def _has_points(rows: Rows) -> bool:
+    """Whether there are points to draw: recorded ones that are not all set aside."""
+    return bool(rows.lengths.any()) and not rows.vectors.aside.all()
 
 
 def _view(saved: Saved) -> str:
     if saved.anatomy is None:
         return ""
-    rows = saved.rows if saved.rows is not None and saved.rows.lengths.any() else None
+    rows = saved.rows if saved.rows is not None and _has_points(saved.rows) else None
     note = "Arrows go from the computed to the observed place."
     return viewer(view_of(saved.summary, saved.anatomy, rows), "what is left", note)
 

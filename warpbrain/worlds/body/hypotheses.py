@@ -179,7 +179,7 @@ class HypothesisSearch:
         about = None if subset is None else subset.refit
         try:
             refit = self._fitter.fit(candidate.effects, candidate.columns, starts, candidate.marginal, nearby, about)
-        except (SolveError, InputError) as error:
+        except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError) as error:
             self._sets[names] = replace(candidate, failure=str(error))
             return
         gain = refit.log_evidence - candidate.marginal.log_evidence
@@ -213,7 +213,7 @@ class HypothesisSearch:
                 refit = self._fitter.fit(
                     reduced.effects, reduced.columns, [reduced.coordinates], reduced.marginal, subset=begun
                 )
-            except (SolveError, InputError):
+            except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError):
                 continue
             gain = refit.log_evidence - subset.refit.log_evidence
             if gain > 0.0:

@@ -71,23 +71,25 @@ class HomogeneousMaterial:
         """
         [(label, tissue)] = case.tissues.items()
         law, poisson, formulation = tissue.known_law, case.poisson, tissue.formulation
-        found = cls(law, poisson, formulation)
+        material = cls(law, poisson, formulation)
         for given in (*case.mechanisms, *mechanisms):
             mechanism = given if turn is None else given.turned(turn)
             if isinstance(mechanism, Substituting):
-                law, poisson, formulation = mechanism.substitute(label, found.law, found.poisson, found.formulation)
-                found = replace(found, law=law, poisson=poisson, formulation=formulation)
+                law, poisson, formulation = mechanism.substitute(
+                    label, material.law, material.poisson, material.formulation
+                )
+                material = replace(material, law=law, poisson=poisson, formulation=formulation)
             elif isinstance(mechanism, Relaxing):
                 moduli, times = mechanism.branches()
-                found = replace(found, moduli=(*found.moduli, *moduli), times=(*found.times, *times))
+                material = replace(material, moduli=(*material.moduli, *moduli), times=(*material.times, *times))
             elif isinstance(mechanism, Storing):
-                found = replace(found, storing=(*found.storing, mechanism))
+                material = replace(material, storing=(*material.storing, mechanism))
             else:
                 raise InputError(
                     f"{case.path}: [[mechanism]] kind = '{mechanism.kind}': a diagnosis of a specimen has no "
                     "homogeneous state with it"
                 )
-        return found
+        return material
 
     def energy(self, lx: Floats, ly: Floats, lz: Floats, g: Floats) -> Floats:
         """Strain energy [Pa] without memory."""
@@ -95,12 +97,12 @@ class HomogeneousMaterial:
         apart = np.sqrt(((lx - lz) ** 2 + g**2) * ((lx + lz) ** 2 + g**2))
         first = np.sqrt(0.5 * (lx**2 + lz**2 + g**2 + apart))
         stretches = np.stack([first, ly, lx * lz / first], axis=-1)
-        found = total_energy(self.law, stretches, self.poisson, self.formulation)
+        energy = total_energy(self.law, stretches, self.poisson, self.formulation)
         if self.storing:
             F = np.zeros((len(lx), 3, 3))
             F[:, 0, 0], F[:, 1, 1], F[:, 2, 2], F[:, 0, 2] = lx, ly, lz, g
-            found = found + sum(one.stored_energy(F) for one in self.storing)
-        return found
+            energy = energy + sum(mechanism.stored_energy(F) for mechanism in self.storing)
+        return energy
 
     def axial(self, stretch: Floats, time: Floats | None) -> Floats:
         """Nominal stress [Pa] along z of states with free lateral faces, one after the other.
@@ -127,20 +129,20 @@ class HomogeneousMaterial:
         if not np.isfinite(step).all() or np.abs(step).max() > 1e3 * _TOLERANCE:
             raise NoStateError("lateral faces find no equilibrium")
         lx, ly = lateral.T
-        found = _slope(lambda h: self.energy(lx, ly, stretch + h, g))
+        stress = _slope(lambda h: self.energy(lx, ly, stretch + h, g))
         if time is not None and self.times:
             _, _, Szz, _ = self._isochoric(lx, ly, stretch, g)
-            found = found + stretch * self._held(Szz, time)
-        return found
+            stress = stress + stretch * self._held(Szz, time)
+        return stress
 
     def shear(self, shear: Floats, time: Floats | None) -> Floats:
         """Nominal stress [Pa] along x of states in simple shear."""
-        one = np.ones_like(shear)
-        found = _slope(lambda h: self.energy(one, one, one, shear + h))
+        unit = np.ones_like(shear)
+        stress = _slope(lambda h: self.energy(unit, unit, unit, shear + h))
         if time is not None and self.times:
-            _, _, Szz, Sxz = self._isochoric(one, one, one, shear)
-            found = found + self._held(Sxz, time) + shear * self._held(Szz, time)
-        return found
+            _, _, Szz, Sxz = self._isochoric(unit, unit, unit, shear)
+            stress = stress + self._held(Sxz, time) + shear * self._held(Szz, time)
+        return stress
 
     def torsion(self, rim: Floats, time: Floats | None) -> Floats:
         """Torque over `int r dA` [Pa] of a cylinder that is twisted by a shear at its rim; radii stay what they are."""
@@ -151,11 +153,11 @@ class HomogeneousMaterial:
 
     def confined(self, stretch: Floats, time: Floats | None) -> Floats:
         """Nominal stress [Pa] along z of states that are as wide as at rest."""
-        one, g = np.ones_like(stretch), np.zeros_like(stretch)
-        found = _slope(lambda h: self.energy(one, one, stretch + h, g))
+        unit, g = np.ones_like(stretch), np.zeros_like(stretch)
+        stress = _slope(lambda h: self.energy(unit, unit, stretch + h, g))
         if time is not None and self.times:
-            found = found + stretch * self._held(self._isochoric(one, one, stretch, g)[2], time)
-        return found
+            stress = stress + stretch * self._held(self._isochoric(unit, unit, stretch, g)[2], time)
+        return stress
 
     def biaxial(self, stretch: Floats, time: Floats | None) -> Floats:
         """Nominal stress [Pa] along x of states that are stretched alike along x and y, with free faces along z.
@@ -181,10 +183,10 @@ class HomogeneousMaterial:
                     break
         if not np.isfinite(step).all() or np.abs(step).max() > 1e3 * _TOLERANCE:
             raise NoStateError("faces across a sheet find no equilibrium")
-        found = _slope(lambda h: self.energy(stretch + h, stretch, thickness, g))
+        stress = _slope(lambda h: self.energy(stretch + h, stretch, thickness, g))
         if time is not None and remembers:
-            found = found + stretch * self._held(self._isochoric(stretch, stretch, thickness, g)[0], time)
-        return found
+            stress = stress + stretch * self._held(self._isochoric(stretch, stretch, thickness, g)[0], time)
+        return stress
 
     def stress(self, mode: str, strain: Floats, time: Floats | None) -> Floats:
         """Nominal stress [Pa] of a chain of one mode."""
@@ -218,11 +220,11 @@ class HomogeneousMaterial:
         """Forces (n, k) on the lateral faces and about how they change with the stretches (n, k, k)."""
 
         def at(*moves: float) -> Floats:
-            own = lateral.copy()
+            stretches = lateral.copy()
             for move, group in zip(moves, groups, strict=True):
                 for axis in group:
-                    own[:, axis] += move
-            return self.energy(own[:, 0], own[:, 1], stretch, g)
+                    stretches[:, axis] += move
+            return self.energy(stretches[:, 0], stretches[:, 1], stretch, g)
 
         k, h = len(groups), _STEP
         middle = at(*([0.0] * k))

@@ -1,0 +1,238 @@
+"""What a mesh file says of its tissues and sets in the ways of other programs, without being asked for one of them.
+
+* Tissues: a whole-number array of the cells (VTK, XDMF, Medit), the physical groups of Gmsh, or sets of elements
+  (Abaqus' ``*ELSET``) each tetrahedron of which is in one of them and in no other.
+* Node sets: the nodes of groups of faces, edges and points (Gmsh, ``*ELSET`` of shells), ``*NSET``, and each value of a
+  whole-number array of the points.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, ends_inside_a_number, mesh_of, read_raw
+from warpbrain.mesh.tet_mesh import MeshError, TetMesh
+
+#: Array that is made of sets of elements, and what `--array` calls them.
+SETS = "sets"
+#: Values of an array that could be tissues, or markers of points; more are numbers of elements, materials points, ...
+MOST_VALUES = 256
+#: What Gmsh numbers besides physical groups, and what VTK counts: no tissues unless they are asked for.
+_BOOKKEEPING = re.compile(r"gmsh:geometrical|gmsh:dim_tags|vtk\w+|Global\w*Ids?|Ids?|rank|partition\w*", re.IGNORECASE)
+_PHYSICAL = "gmsh:physical"
+_DIMENSION = {"vertex": 0, "line": 1, "line3": 1}
+
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class MeshWithRegions:
+    """A mesh with what its file names.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+    names : dict of int to str
+        Names of tissues that the file has.
+    notes : tuple of str
+        Where tissues and sets are from.
+    """
+
+    mesh: TetMesh
+    names: dict[int, str]
+    notes: tuple[str, ...]
+
+
+def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithRegions:
+    """Read a mesh with its tissues and sets.
+
+    Parameters
+    ----------
+    path : Path
+    unit : {"m", "mm"}
+        Of its coordinates.
+    array : str, optional
+        Cell array of the tissues, or `SETS`; by default ``tissue`` if there is one, else the only one that can be it.
+
+    Raises
+    ------
+    MeshError
+        Naming the file, if it is no mesh, or several arrays could be the tissues; the message lists them.
+    """
+    raw = read_raw(path)
+    if not any(block.type in TETRAHEDRA for block in raw.cells):
+        return MeshWithRegions(mesh_of(path, raw, unit), {}, ())
+    notes: list[str] = []
+    if ends_inside_a_number(path):
+        notes.append(f"{path.name} ends in a number without a line break: is it cut off?")
+    physical = {(int(dim), int(tag)): name for name, (tag, dim) in _groups(raw).items()}
+    parts = _partition(raw)
+    if parts is not None:
+        numbers = dict(enumerate(parts, 1))
+        raw.cell_data[SETS] = _numbered(raw, list(parts))
+    chosen = _chosen(path, raw, array)
+    names: dict[int, str] = {}
+    if chosen == SETS and parts is not None:
+        names = numbers
+        notes.append(f"tissues are the sets of elements {', '.join(parts)}")
+    elif chosen is not None:
+        values = np.unique(_of_tetrahedra(raw, chosen))
+        names = {int(v): physical[3, int(v)] for v in values if chosen == _PHYSICAL and (3, int(v)) in physical}
+        if chosen != "tissue":
+            what = "physical groups of Gmsh" if chosen == _PHYSICAL else f"values of the cell array '{chosen}'"
+            notes.append(f"tissues are the {what}: {', '.join(names.get(int(v), str(int(v))) for v in values)}")
+    notes += _name_nodes(raw, chosen, physical)
+    for name in raw.cell_sets or {}:
+        if not (chosen == SETS and parts is not None and name in parts) and name not in _groups(raw):
+            members = _members(raw, name)
+            if any(members[b].any() for b in _blocks(raw)):
+                raw.cell_data[ELEMENT_SET_PREFIX + _plain(name)] = [each.astype(np.uint8) for each in members]
+    if chosen is not None and chosen != "tissue":
+        raw.cell_data["tissue"] = raw.cell_data[chosen]
+    raw.cell_data.pop(SETS, None)
+    return MeshWithRegions(mesh_of(path, raw, unit), names, tuple(notes))
+
+
+def _blocks(raw: Any) -> list[int]:
+    return [number for number, block in enumerate(raw.cells) if block.type in TETRAHEDRA]
+
+
+def _groups(raw: Any) -> Mapping[str, Any]:
+    """Physical groups by name: their tag and dimension."""
+    return {name: value for name, value in (raw.field_data or {}).items() if np.shape(value) == (2,)}
+
+
+def _of_tetrahedra(raw: Any, name: str) -> NDArray[Any]:
+    return np.concatenate([np.asarray(raw.cell_data[name][b]) for b in _blocks(raw)])
+
+
+def _whole(values: NDArray[Any]) -> NDArray[np.int64] | None:
+    """Values (n,) as whole numbers, None if they are not."""
+    if values.ndim == 2 and values.shape[1] == 1:
+        values = values[:, 0]
+    if values.ndim != 1 or values.dtype.kind not in "biuf":
+        return None
+    if values.dtype.kind == "f" and not (np.abs(values) < 2**31).all():
+        return None
+    whole = values.astype(np.int64)
+    return whole if (whole == values).all() else None
+
+
+def _chosen(path: Path, raw: Any, array: str | None) -> str | None:
+    """Name of the cell array of the tissues; None if there is none."""
+    if array is not None:
+        if array not in raw.cell_data:
+            found = ", ".join(sorted(raw.cell_data)) or "none"
+            raise MeshError(f"{path}: no cell array '{array}' for tissue labels; found {found}")
+        return array
+    if "tissue" in raw.cell_data:
+        return "tissue"
+    values: dict[str, int] = {}
+    for name in raw.cell_data:
+        whole = _whole(_of_tetrahedra(raw, name))
+        if name.startswith(ELEMENT_SET_PREFIX) or _BOOKKEEPING.fullmatch(name) or whole is None or not len(whole):
+            continue
+        distinct = np.unique(whole)
+        if distinct[0] >= 0 and len(distinct) <= min(MOST_VALUES, max(1, len(whole) // 2)):
+            values[name] = len(distinct)
+    # an array that says one thing of all tetrahedra is a choice only if none says more
+    several = [name for name in values if values[name] > 1] or list(values)
+    if len(several) > 1 and max(values.values()) > 1:
+        listed = ", ".join(f"{name} ({values[name]} values)" for name in sorted(several))
+        raise MeshError(
+            f"{path}: found {len(several)} cell arrays that could be the tissues: {listed}: --array says which"
+        )
+    return several[0] if len(several) == 1 else None
+
+
+def _partition(raw: Any) -> list[str] | None:
+    """Sets of elements of which every tetrahedron is in one, and in one only; None if there are none such."""
+    blocks = _blocks(raw)
+    members = {}
+    for name in raw.cell_sets or {}:
+        if name not in _groups(raw) and not name.startswith("gmsh:"):
+            each = _members(raw, name)
+            members[name] = np.concatenate([each[b] for b in blocks])
+    parts = {name: each for name, each in members.items() if each.any() and not each.all()}
+    if not parts:
+        # one set of all, if it is the only one
+        whole = [name for name, each in members.items() if each.all()]
+        return whole if len(whole) == 1 else None
+    memberships = np.sum([each.astype(int) for each in parts.values()], axis=0)
+    return list(parts) if (memberships == 1).all() else None
+
+
+def _members(raw: Any, name: str) -> list[Bools]:
+    """For each block which cells are in a set."""
+    found = []
+    for block, ids in zip(raw.cells, raw.cell_sets[name], strict=True):
+        members = np.zeros(len(block.data), dtype=bool)
+        if ids is not None and len(ids):
+            members[np.asarray(ids, dtype=np.int64)] = True
+        found.append(members)
+    return found
+
+
+def _numbered(raw: Any, names: list[str]) -> list[NDArray[np.int32]]:
+    values = [np.zeros(len(block.data), dtype=np.int32) for block in raw.cells]
+    for number, name in enumerate(names, 1):
+        for each, members in zip(values, _members(raw, name), strict=True):
+            each[members] = number
+    return values
+
+
+def _name_nodes(raw: Any, chosen: str | None, physical: Mapping[tuple[int, int], str]) -> list[str]:
+    """Add node sets of faces, edges and points, and of the values of point arrays; says which."""
+    added: dict[str, list[NDArray[np.int64]]] = {}
+    for number, block in enumerate(raw.cells):
+        if block.type in TETRAHEDRA:
+            continue
+        dimension = _DIMENSION.get(block.type, 2)
+        labels = _whole(np.asarray(raw.cell_data[chosen][number])) if chosen in raw.cell_data else None
+        values = [] if labels is None or chosen == SETS else [int(v) for v in np.unique(labels) if v != 0]
+        for value in values if len(values) <= MOST_VALUES else []:
+            name = physical.get((dimension, value), f"{str(chosen).removeprefix('gmsh:')}-{value}")
+            assert labels is not None  # values are of them
+            added.setdefault(name, []).append(np.unique(block.data[labels == value]))
+        for name in raw.cell_sets or {}:
+            if name not in _groups(raw) and not name.startswith("gmsh:"):
+                members = _members(raw, name)[number]
+                if members.any():
+                    added.setdefault(name, []).append(np.unique(block.data[members]))
+    notes = []
+    for name, values_at in list(raw.point_data.items()):
+        values_of_points = np.asarray(values_at)
+        whole = _whole(values_of_points)
+        if whole is None:
+            continue
+        marks = np.unique(whole[whole != 0])
+        if len(marks) > MOST_VALUES or _BOOKKEEPING.fullmatch(name):
+            notes.append(f"point array '{name}' has {len(marks)} values: no node sets are made of it")
+            raw.point_data.pop(name)
+        elif len(marks) > 1:
+            raw.point_data.pop(name)
+            for mark in marks:
+                added.setdefault(f"{name}-{mark}", []).append(np.flatnonzero(whole == mark))
+    named = {_plain(name): ids for name, ids in (raw.point_sets or {}).items()}
+    for name, pieces in added.items():
+        free = _plain(name)
+        while free in named or free in raw.point_data:
+            free += "-faces"
+        named[free] = np.unique(np.concatenate(pieces))
+    raw.point_sets = named
+    if added:
+        listed = ", ".join(_plain(name) for name in added)
+        notes.append(f"node sets from groups of faces or values of points: {listed}")
+    return notes
+
+
+def _plain(name: str) -> str:
+    """A name that case.toml and VTU files can hold."""
+    return re.sub(r"[^\w .+-]+", "-", name).strip() or "unnamed"

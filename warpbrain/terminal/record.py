@@ -1,0 +1,111 @@
+"""What a command says, on standard output and in a log file beside its results."""
+
+from __future__ import annotations
+
+import shlex
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from warpbrain.atomic import whole_file
+
+#: Name of the log in a folder of results.
+LOG = "warpbrain.log"
+
+
+class Record:
+    """Prints lines, and keeps them with what was asked for.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Of the command line, from the command on.
+    quiet : bool
+        Print nothing; the log has the lines all the same.
+    """
+
+    def __init__(self, arguments: Sequence[str] = (), quiet: bool = False) -> None:
+        self.arguments = tuple(arguments)
+        self._quiet = quiet
+        self._begun = datetime.now(UTC)
+        self._clock = time.perf_counter()
+        self._facts: dict[str, str] = {}
+        self._lines: list[str] = []
+        self._warnings: list[str] = []
+        #: Names of the files that were written.
+        self.files: list[str] = []
+
+    def say(self, *values: object, sep: str = " ", flush: bool = False) -> None:
+        """As `print`."""
+        self._lines.append(sep.join(map(str, values)))
+        if not self._quiet:
+            print(*values, sep=sep, flush=flush)
+
+    @property
+    def doing(self) -> str:
+        """The last line that was said."""
+        lines = [line.strip() for text in self._lines[-3:] for line in text.splitlines() if line.strip()]
+        return lines[-1][:80] if lines else ""
+
+    def note(self, **facts: str) -> None:
+        """What the log should say and nobody needs to read: device, versions, files."""
+        self._facts |= facts
+
+    @contextmanager
+    def warnings_kept(self) -> Iterator[None]:
+        """Python's warnings in the block stand in the log, too, and are shown as ever."""
+        with warnings.catch_warnings():
+            shown = warnings.showwarning
+
+            def keep(
+                message: Warning | str, category: type[Warning], filename: str, lineno: int, *rest: Any, **named: Any
+            ) -> None:
+                self._warnings.append(f"{category.__name__}: {' '.join(str(message).split())}")
+                shown(message, category, filename, lineno, *rest, **named)
+
+            warnings.showwarning = keep
+            yield
+
+    def write(self, folder: Path, ending: str, replace: bool = True) -> None:
+        """Write the log, whole.
+
+        Parameters
+        ----------
+        folder : Path
+        ending : str
+            "done", or why the command ended before it was.
+        replace : bool
+            Whether it takes the place of the log that is there, or is written after it.
+        """
+        head = {
+            "command": shlex.join(["warpbrain", *self.arguments]),
+            "in": str(Path.cwd()),
+            "begun": self._begun.isoformat(timespec="seconds"),
+            **self._facts,
+            "took": f"{time.perf_counter() - self._clock:.1f} s",
+            "ended": " ".join(ending.split()),
+        }
+        lines = [f"{name:<10}{text}" for name, text in head.items()]
+        lines += [f"{'file':<10}{name}" for name in self.files]
+        lines += [f"{'warning':<10}{text}" for text in dict.fromkeys(self._warnings)]
+        # what was printed is indented: no title of a case is taken for a line of the head
+        printed = [f"    {line}".rstrip() for text in self._lines for line in text.splitlines()]
+        before = "" if replace else _text_of(folder)
+        with whole_file(folder / LOG) as scratch:
+            scratch.write_text(before + "\n".join([*lines, "", *printed]) + "\n\n", encoding="utf-8")
+
+
+def files_of(folder: Path) -> list[str]:
+    """Names of the files that the log of a folder says were written; none without a log."""
+    return [line[10:] for line in _text_of(folder).splitlines() if line[:10].rstrip() == "file"]
+
+
+def _text_of(folder: Path) -> str:
+    try:
+        return (folder / LOG).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return ""
