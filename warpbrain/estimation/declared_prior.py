@@ -12,6 +12,7 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.estimation.parameters import Parameters
+from warpbrain.gp.coordinates import coordinates
 from warpbrain.gp.literature.study import Study
 from warpbrain.gp.prior import Prior
 from warpbrain.inference.beliefs import belief
@@ -29,9 +30,16 @@ def declared(case: Case, parameters: Parameters) -> Floats:
     return parameters.theta_of([case.tissues[labels[0]].known_law for labels in parameters.labels])
 
 
-def declared_deviations(parameters: Parameters) -> Floats:
+def declared_deviations(case: Case, parameters: Parameters) -> Floats:
     """Standard deviation (p,) of each parameter about what a case declares."""
-    return np.array([belief(_DEVIATIONS[parameter.coordinate.name]) for parameter in parameters])
+    found = []
+    for labels, law in zip(parameters.labels, parameters.laws_of, strict=True):
+        accuracy = case.tissues[labels[0]].accuracy
+        for coordinate in coordinates(law):
+            believed = belief(_DEVIATIONS[coordinate.name])
+            # of a relative error that is small the logarithm's
+            found.append(accuracy if accuracy is not None and coordinate.name == "ln(mu0 / Pa)" else believed)
+    return np.array(found)
 
 
 @dataclass(frozen=True)
@@ -67,7 +75,8 @@ def declared_prior(case: Case, count: int, seed: int) -> Prior:
         If the case leaves a law to the prior.
     """
     parameters = Parameters.of(case)
-    rng, mean, deviations = np.random.default_rng([seed, 2]), declared(case, parameters), declared_deviations(parameters)
+    rng, mean = np.random.default_rng([seed, 2]), declared(case, parameters)
+    deviations = declared_deviations(case, parameters)
     found: list[Floats] = []
     attempts = 0
     while len(found) < count:
@@ -77,6 +86,4 @@ def declared_prior(case: Case, count: int, seed: int) -> Prior:
             found.append(theta)
     bounds = np.zeros(len(parameters.tissues))
     laws, poisson, formulations = parameters.laws_of, parameters.poisson, parameters.formulations
-    return Prior(
-        _NoStudies(), parameters.tissues, laws, poisson, formulations, seed, np.array(found), attempts, bounds
-    )
+    return Prior(_NoStudies(), parameters.tissues, laws, poisson, formulations, seed, np.array(found), attempts, bounds)

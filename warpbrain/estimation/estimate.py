@@ -129,9 +129,7 @@ class Estimation:
             self.prior = prior if isinstance(prior, Prior) else prior_of(case, prior, seed=self.options.seed)
             self.prior_modes = prior_modes(self.prior, self.parameters)
         with self.seconds.of("pre-processing"):
-            self.forward = Forward(
-                case, self.prior_modes[0].gaussian.mean, device, elements_of_fits(case.poisson)
-            )
+            self.forward = Forward(case, self.prior_modes[0].gaussian.mean, device, elements_of_fits(case.poisson))
 
     def run(self) -> Posterior:
         """All stages."""

@@ -229,7 +229,9 @@ class Linearisation:
         most of them are zero.
         """
         if isinstance(element_forces, np.ndarray):
-            element_forces = _gathered(self.system.tetrahedra, element_forces, np.arange(len(element_forces)), self.system)
+            element_forces = _gathered(
+                self.system.tetrahedra, element_forces, np.arange(len(element_forces)), self.system
+            )
         return -self._answers(element_forces @ weights)
 
     @cached_property

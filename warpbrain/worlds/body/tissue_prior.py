@@ -24,7 +24,7 @@ def tissue_prior(case: Case, parameters: Parameters) -> Gaussian:
     except (InputError, SolveError):
         modes = ()
     if not modes:
-        return Gaussian(declared(case, parameters), np.diag(declared_deviations(parameters) ** 2))
+        return Gaussian(declared(case, parameters), np.diag(declared_deviations(case, parameters) ** 2))
     try:
         theta = declared(case, parameters)
     except InputError:
