@@ -17,7 +17,7 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.real.beam_motion import CLAMP, GRAVITY, SIZE, TIP, Release, read_release
+from bench.real.beam_motion import GRAVITY, SIZE, TIP, Release, read_release
 from warpbrain.mesh import TetMesh, write_mesh
 
 Floats = NDArray[np.float64]
@@ -27,8 +27,8 @@ DATA = Path(__file__).resolve().parents[2] / "warpbrain" / "cases" / "data" / "b
 CELLS = (20, 6, 6)
 #: Shear modulus [Pa]: `warpbrain estimate --case beam-gravity`, the weight of the beam alone.
 MU = 82100.0
-#: Standard deviation of a component [mm] of the tip, which was held by hand: two releases 0.4 mm apart across and 0.1 mm
-#: down, and how much lower than undeformed is known to 0.3 mm. With a weight in the hand the tip was held 1.8 mm to the
+#: Standard deviation of a component [mm] of the tip, which was held by hand: two releases 0.4 mm apart across and
+#: 0.1 mm down, and how much lower than undeformed is known to 0.3 mm. With a weight in the hand the tip was held 1.8 mm to the
 #: side of that and turned by 4 degrees. Then of the clamp.
 HELD, HELD_WITH_WEIGHT, CLAMPED = 0.35, 0.6, 0.1
 GRAVITY_FILES = ("beam_gravity_V2_a.c3d", "beam_gravity_V2_b.c3d")
@@ -107,7 +107,7 @@ def beam_mesh(surface: Path) -> TetMesh:
 
 
 def _box() -> tuple[Floats, NDArray[np.int64]]:
-    """Points and tetrahedra of a box: a cell is cut along a diagonal that its neighbours mirror, so no side is weaker."""
+    """Points and tetrahedra of a box: cells are cut along diagonals that neighbours mirror, so no side is weaker."""
     axes = [np.linspace(0.0, length, n + 1) for n, length in zip(CELLS, SIZE, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     cells = np.stack(np.meshgrid(*[np.arange(n) for n in CELLS], indexing="ij"), axis=-1).reshape(-1, 3)

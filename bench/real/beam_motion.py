@@ -89,7 +89,7 @@ class Release:
 
     @property
     def feet(self) -> Floats:
-        """Points (6, 3) of the beam [m] nearest to the markers as they were held; of the clamp's, of the clamped face."""
+        """Points (6, 3) of the beam [m] nearest to the markers as held; for those of the clamp, of the clamped face."""
         feet = np.clip(self.held, 0.0, SIZE)
         feet[CLAMP, 0] = 0.0
         return feet

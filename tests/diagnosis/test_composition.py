@@ -9,6 +9,7 @@ from verification_rows import Row
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
+from warpbrain.estimation.declared_prior import declared
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.cavity import Cavity
 from warpbrain.physics.mechanisms.drainage import Drainage
@@ -21,7 +22,6 @@ from warpbrain.worlds.body.dictionary import dictionary_of
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.states import Hypothesis, States
-from warpbrain.worlds.body.tissue_prior import declared
 
 #: What the tissue is made of beside its law.
 MADE_OF = (

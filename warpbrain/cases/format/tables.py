@@ -94,7 +94,7 @@ TISSUE = Table(
         Key(
             "accuracy",
             ("number",),
-            "Relative standard deviation of its modulus, where that was measured; 0.5 if absent, of tissue without prior.",
+            "Relative standard deviation of its modulus, where that was measured; without a prior 0.5 if absent.",
             above=0.0,
             below=3.0,
         ),

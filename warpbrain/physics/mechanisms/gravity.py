@@ -13,7 +13,7 @@ the head was turned since imaging: `direction` is where 'down' is in the pose of
 difference of two densities, so it takes `tissue_density`, that of brain. The `density` of the case may be the paper's
 1211.5 kg/m3, which is right for comparing inertia with it and would make the difference six times too large.
 
-A body that hangs in air, and was free of gravity when its shape was taken, has its full weight, by the case's `density`.
+A body that hangs in air, and was free of gravity when its shape was taken, has its full weight, of the case's density.
 """
 
 from __future__ import annotations

@@ -53,8 +53,9 @@ def next_to_fit(
 def bend_of(base: Base) -> float:
     """Part of log evidence that the linear model may be wrong by: how far recorded points went, squared.
 
-    Relative to the body's size. What is linear in loads misses turns of the body to second order: a cantilever that sags
-    by half its length is drawn out by as much, and no linear column is of it. In a brain this is less than a hundredth.
+    Relative to the body's size. What is linear in loads misses turns of the body to second order: a cantilever that
+    sags by half its length is drawn out by as much, and no linear column is of it. In a brain this is less than a
+    hundredth.
     """
     sensors, size = base.declared.sensors, base.at.system.model.mesh.volume ** (1.0 / 3.0)
     recorded = (sensors.residual + sensors.computed)[sensors.is_displacement & ~sensors.of_surfaces]

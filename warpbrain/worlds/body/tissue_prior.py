@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.declared_prior import declared, declared_deviations
