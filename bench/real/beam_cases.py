@@ -28,8 +28,8 @@ CELLS = (20, 6, 6)
 #: Shear modulus [Pa]: `warpbrain estimate --case beam-gravity`, the weight of the beam alone.
 MU = 82100.0
 #: Standard deviation of a component [mm] of the tip, which was held by hand: two releases 0.4 mm apart across and
-#: 0.1 mm down, and how much lower than undeformed is known to 0.3 mm. With a weight in the hand the tip was held 1.8 mm to the
-#: side of that and turned by 4 degrees. Then of the clamp.
+#: 0.1 mm down, and how much lower than undeformed is known to 0.3 mm. With a weight in the hand it was held 1.8 mm to
+#: the side of that and turned by 4 degrees. Then of the clamp.
 HELD, HELD_WITH_WEIGHT, CLAMPED = 0.35, 0.6, 0.1
 GRAVITY_FILES = ("beam_gravity_V2_a.c3d", "beam_gravity_V2_b.c3d")
 #: Its standard deviation there, relative: of a beam with a weight it is known. The weight of the beam is what tells it.
