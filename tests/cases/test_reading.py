@@ -10,7 +10,7 @@ from wrong_cases import FORCE, GRAVITY, SECOND_LAW, WRONG
 
 from warpbrain.cases.boundary import Fixed, Forced
 from warpbrain.cases.reading import read_case
-from warpbrain.cases.shipped import RESECT, SHIPPED, STAND_INS, find_case
+from warpbrain.cases.shipped import BEAM, RESECT, SHIPPED, STAND_INS, find_case
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh, write_mesh
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
@@ -292,8 +292,8 @@ def test_a_file_that_is_no_mesh(tmp_path, capfd, name, content):
 @pytest.mark.parametrize("tissue", ["single", "multi"])
 def test_shipped_cases(name, tissue):
     case = find_case(name, tissue)
-    assert sorted(case.tissues) == ([1] if tissue == "single" else [1, 2])
-    assert case.origin == ("stand-in" if name in STAND_INS else "measured" if name in RESECT else "synthetic")
+    assert sorted(case.tissues) == ([1] if tissue == "single" or name in BEAM else [1, 2])
+    assert case.origin == ("stand-in" if name in STAND_INS else "measured" if name in (*RESECT, *BEAM) else "synthetic")
     assert (case.resection is not None) == (name in STAND_INS)
 
 

@@ -9,6 +9,7 @@ from verification_rows import Row
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
+from warpbrain.estimation.declared_prior import declared
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.cavity import Cavity
 from warpbrain.physics.mechanisms.drainage import Drainage
@@ -21,7 +22,6 @@ from warpbrain.worlds.body.dictionary import dictionary_of
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.states import Hypothesis, States
-from warpbrain.worlds.body.tissue_prior import declared
 
 #: What the tissue is made of beside its law.
 MADE_OF = (
@@ -68,8 +68,7 @@ def test_to_first_order_it_is_the_difference_of_states(make, block: Case, verify
 def test_forces_that_go_with_moduli_are_all_but_a_tension(block: Case) -> None:
     """In the course of stress that relaxes too, with what it remembers."""
     _, at = solved(States(replace(block, mechanisms=(MADE_OF[0], CAUSES["viscoelasticity"])), "cpu"))
-    total = np.zeros_like(at.u)
-    np.add.at(total, at.system.tetrahedra, at.element_forces)
+    total = at.element_forces.sum(axis=1).reshape(at.u.shape)
     expected = at.internal_forces()
     assert np.abs(total - expected).max() < 1e-12 * np.abs(expected).max()
     assert all(term.forces.numpy().any() for term in at.system.terms)

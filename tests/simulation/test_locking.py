@@ -8,7 +8,13 @@ from shapes import cube
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
-from warpbrain.simulation.locking import MEASURED, choose_elements, locking_sentences, on_linear_elements
+from warpbrain.simulation.locking import (
+    MEASURED,
+    choose_elements,
+    elements_of_fits,
+    locking_sentences,
+    on_linear_elements,
+)
 from warpbrain.simulation.model import ELEMENTS, Material, Model
 
 
@@ -46,4 +52,7 @@ def test_who_is_3_percent_too_stiff_says_so(elements: str, poisson: float) -> No
 def test_what_has_linear_tetrahedra_only_says_what_that_does() -> None:
     assert on_linear_elements(0.49, "an estimate") == []
     [said] = on_linear_elements(0.499, "an estimate")
-    assert "66 % less" in said and said.endswith("moduli that it names are too low by as much")
+    assert "8 % less" in said and said.endswith(
+        "an estimate has no other elements, and allows for what smaller ones show"
+    )
+    assert [elements_of_fits(poisson) for poisson in (0.45, 0.49, 0.499)] == ["tet4", "tet4", "tet4-averaged"]

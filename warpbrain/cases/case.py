@@ -36,6 +36,8 @@ class Tissue:
         Group of the generative model; may be empty.
     model : str
         Name of the law, which is known even where its parameters are not.
+    accuracy : float or None
+        Relative standard deviation of its modulus, where that was measured; None: as is believed of what is declared.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Tissue:
     formulation: str = "coupled"
     prior: str = ""
     model: str = "neo-hookean"
+    accuracy: float | None = None
 
     @property
     def known_law(self) -> Law:

@@ -15,6 +15,8 @@ _DATA = Path(__file__).parent / "data"
 STAND_INS = ("0529", "0614", "0660", "0685", "0535", "0555", "0603", "0684")
 #: Measured landmarks of patients of the RESECT database, in the template brain: the phantom's mesh.
 RESECT = tuple(f"resect-{number:02d}" for number in range(1, 16))
+#: Recordings of a silicone beam: under its own weight, and with 52 g at its tip. It has one tissue.
+BEAM = ("beam-gravity", "beam-52g")
 
 #: Files of each shipped case by tissue mode, relative to the data folder.
 SHIPPED = {
@@ -22,6 +24,7 @@ SHIPPED = {
     "phantom-fine": {"multi": "phantom/case-fine.toml", "single": "phantom/case-single-fine.toml"},
     "phantom-loaded": {"multi": "phantom/case-loaded.toml", "single": "phantom/case-single-loaded.toml"},
     **{name: {"multi": f"phantom/{name}.toml", "single": f"phantom/{name}-single.toml"} for name in RESECT},
+    **{name: {"multi": f"beam/{name}.toml", "single": f"beam/{name}.toml"} for name in BEAM},
 }
 
 
@@ -39,7 +42,7 @@ def files_of(name: str) -> list[Path]:
     """
     name = ALIASES.get(name, name)
     if name in SHIPPED:
-        return [_DATA / file for file in SHIPPED[name].values()]
+        return [_DATA / file for file in dict.fromkeys(SHIPPED[name].values())]
     path = _existing(name)
     if not path.is_dir():
         return [path]

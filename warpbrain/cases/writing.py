@@ -108,7 +108,8 @@ def _tissue(tissue: Tissue) -> dict[str, Any]:
     if tissue.law is not None:
         law = {key: _plain(getattr(tissue.law, key)) for key in tissue.law.keys}
     prior = {"prior": tissue.prior} if tissue.prior else {}
-    return {"name": tissue.name, "model": tissue.model, "formulation": tissue.formulation, **law, **prior}
+    known = {} if tissue.accuracy is None else {"accuracy": tissue.accuracy}
+    return {"name": tissue.name, "model": tissue.model, "formulation": tissue.formulation, **law, **prior, **known}
 
 
 def _boundary(folder: Path, boundary: Boundary, frame: Frame) -> dict[str, Any]:

@@ -62,7 +62,8 @@ def _list(options: argparse.Namespace) -> None:
     print(
         "\nA stand-in is the MNI anatomy, deformed and scaled to a patient's published figures: not the "
         "patient's images.\nOf resect-01 to resect-15 the landmarks are patients', measured; the mesh is the template, "
-        "not these patients' anatomy.\nYour own: `warpbrain cases new FOLDER --labels seg.nii.gz`; a folder's path "
+        "not these patients' anatomy.\nThe beam is of silicone, recorded at ETH Zurich.\n"
+        "Your own: `warpbrain cases new FOLDER --labels seg.nii.gz`; a folder's path "
         "works wherever a name does."
     )
 

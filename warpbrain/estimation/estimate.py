@@ -30,7 +30,7 @@ from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.seconds import Seconds
-from warpbrain.simulation.locking import on_linear_elements
+from warpbrain.simulation.locking import elements_of_fits, on_linear_elements
 
 #: The error of the mesh is computed again until the estimate moves by no more than this, in standard deviations.
 _SETTLED = 0.2
@@ -129,7 +129,7 @@ class Estimation:
             self.prior = prior if isinstance(prior, Prior) else prior_of(case, prior, seed=self.options.seed)
             self.prior_modes = prior_modes(self.prior, self.parameters)
         with self.seconds.of("pre-processing"):
-            self.forward = Forward(case, self.prior_modes[0].gaussian.mean, device)
+            self.forward = Forward(case, self.prior_modes[0].gaussian.mean, device, elements_of_fits(case.poisson))
 
     def run(self) -> Posterior:
         """All stages."""

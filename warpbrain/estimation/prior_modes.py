@@ -15,6 +15,7 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups
 from warpbrain.errors import InputError
+from warpbrain.estimation.declared_prior import declared_prior
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.gp.prior import Prior
@@ -48,7 +49,7 @@ class PriorMode:
 
 
 def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed: int = 0) -> Prior:
-    """What the generative model says of a case's tissues.
+    """What the generative model says of a case's tissues; about what the case declares where none is of a group of it.
 
     Parameters
     ----------
@@ -65,10 +66,12 @@ def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed:
     SolveError
         If no stable law is found.
     """
+    parameters = Parameters.of(case)
+    if not any(parameters.groups) and all(case.tissues[labels[0]].law is not None for labels in parameters.labels):
+        return declared_prior(case, count, seed)
     from warpbrain.gp.trained import trained
 
     asked = trained() if model is None else model
-    parameters = Parameters.of(case)
     require_groups(case, [label for labels in parameters.labels for label in labels], asked)
     return Prior.of(
         asked, parameters.groups, parameters.laws_of, parameters.poisson, parameters.formulations, count, seed

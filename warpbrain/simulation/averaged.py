@@ -110,6 +110,11 @@ class AveragedTerm(Term):
         self._volumes = (1.0 - PART) * self._sum(weight)
         self._volume.assign(self._volumes)
 
+    def shares(self, weight: Floats) -> tuple[Ints, Ints, Floats]:
+        """Elements, the patch of each, and its share of that by volumes times weights (m,); an element has several."""
+        parts, sums = self._shares * weight[self._members], self._sum(weight)
+        return self._members, self._owner, parts / sums[self._owner]
+
     def stress(self, u: wp.array) -> tuple[Ints, Ints, Floats]:
         """Elements, the patch of each, and the first Piola-Kirchhoff stress of each patch [Pa], (k, 3, 3)."""
         self._stress(u)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from slow_block import CAUSES, write_slow
 
+from warpbrain.estimation.declared_prior import declared
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
 from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.nuisances import other_volume
 from warpbrain.worlds.body.states import Hypothesis, States
-from warpbrain.worlds.body.tissue_prior import declared
 
 
 @pytest.mark.parametrize("launched", ["alike", "in another way"])

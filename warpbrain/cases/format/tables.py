@@ -91,6 +91,13 @@ TISSUE = Table(
         Key("name", ("text",), "For people."),
         Key("formulation", ("text",), "How the law treats changes of volume; coupled if absent.", choices=FORMULATIONS),
         Key("prior", ("text",), "Group of the generative model.", choices=PRIOR_GROUPS),
+        Key(
+            "accuracy",
+            ("number",),
+            "Relative standard deviation of its modulus, where that was measured; without a prior 0.5 if absent.",
+            above=0.0,
+            below=3.0,
+        ),
     ),
     by=Key("model", ("text",), "Law; neo-hookean if absent.", choices=tuple(LAWS)),
     default="neo-hookean",

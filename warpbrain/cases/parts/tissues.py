@@ -56,6 +56,9 @@ def _read_tissue(table: Reading, label: str) -> Tissue | None:
     if table.variant is None:
         return None
     law, good = _law(table)
+    if table.has("accuracy") and table.has("prior"):
+        table.problem("accuracy", "means nothing beside a prior, which says how well moduli are known", "leave one out")
+        return None
     if not good:
         return None
     return Tissue(
@@ -64,6 +67,7 @@ def _read_tissue(table: Reading, label: str) -> Tissue | None:
         formulation=table.get("formulation", "coupled"),
         prior=table.get("prior", ""),
         model=table.variant,
+        accuracy=float(table.get("accuracy")) if table.has("accuracy") else None,
     )
 
 

@@ -12,6 +12,8 @@ the head was turned since imaging: `direction` is where 'down' is in the pose of
 `imaged_direction` where it was while imaging, and either is the case's `gravity_axis` if it is not said. It is a small
 difference of two densities, so it takes `tissue_density`, that of brain. The `density` of the case may be the paper's
 1211.5 kg/m3, which is right for comparing inertia with it and would make the difference six times too large.
+
+A body that hangs in air, and was free of gravity when its shape was taken, has its full weight, of the case's density.
 """
 
 from __future__ import annotations
@@ -67,6 +69,8 @@ class Gravity(BodyForce, Mechanism):
     csf_level : float or None
         Height of the fluid's surface [m] against `direction`, above `lowest`. None: there never was any fluid, and the
         reference is free of gravity, as a gel phantom on the bench: the full weight acts.
+    surroundings : {"fluid", "air"}
+        ``"air"`` if `csf_level` is None.
     lowest : float or None
         Height [m] of the point that levels are counted from, ``-x . direction``; None: the lowest node of the mesh.
     imaged_direction : tuple of three floats or None
@@ -95,12 +99,18 @@ class Gravity(BodyForce, Mechanism):
     csf_level: float | None = parameter(
         "Height of the fluid's surface against gravity, above the lowest point of the anatomy.",
         default=None,
-        needed=True,
+        absent="needed in fluid, and nothing in air",
         unit="mm",
         si=1e-3,
         expectation=Uniform(0.0, 160.0),
         typical="the brain sinks by 5.7 mm in the mean, by 15 mm at most at the end of surgery",
         source="Miga et al. 1999; Davson and Segal 1996 (density of the fluid)",
+    )
+    surroundings: str = parameter(
+        "What is around the body: cerebrospinal fluid that drains to a level, or air, where all of it has its weight.",
+        kind="text",
+        default="fluid",
+        choices=("fluid", "air"),
     )
     lowest: float | None = None
     kind: ClassVar[str] = "gravity"
@@ -121,12 +131,18 @@ class Gravity(BodyForce, Mechanism):
             unit_vector("imaged_direction", self.imaged_direction)
         if self.csf_level is not None and not np.isfinite(self.csf_level):
             raise InputError(f"gravity: csf_level = {self.csf_level}: expected a finite height")
+        if self.csf_level is None:
+            object.__setattr__(self, "surroundings", "air")
+        elif self.surroundings == "air":
+            raise ParameterError("csf_level", "means nothing in air, where all has its weight")
 
     @classmethod
     def of_case(cls, values: Mapping[str, Any], facts: Facts) -> Gravity:
         axis = facts.gravity_axis or values.get("direction")
         if axis is None:
             raise ParameterError("gravity_axis", "missing, but [[mechanism]] gravity needs to know where 'down' is")
+        if "csf_level" not in values and values.get("surroundings") != "air":
+            raise ParameterError("csf_level", "missing: expected a finite number [mm], or surroundings = 'air'")
         known: dict[str, Any] = {"direction": axis, "imaged_direction": axis, **values}
         # counted from the whole anatomy: a resection must not move the datum
         lowest = float((-facts.mesh.points @ unit_vector("direction", known["direction"])).min())

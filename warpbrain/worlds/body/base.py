@@ -15,6 +15,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.declared_prior import declared
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.registration import registration_of
 from warpbrain.inference import GaussianModel
@@ -31,7 +32,7 @@ from warpbrain.worlds.body.sensing import noise_of
 from warpbrain.worlds.body.sensors import Sensors, rows_of_points, tracked_points
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
 from warpbrain.worlds.body.switching import SolvedSwitches
-from warpbrain.worlds.body.tissue_prior import declared, tissue_prior
+from warpbrain.worlds.body.tissue_prior import tissue_prior
 from warpbrain.worlds.body.unknown import body_forces, fields
 from warpbrain.worlds.listener import Listener
 

@@ -26,6 +26,7 @@ from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.mesh_share import MeshShare, mesh_share_of
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.refit import Refit
+from warpbrain.worlds.body.rigid_motion import RigidMotion
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
 
 _ITERATIONS, _HALVINGS = 20, 6
@@ -73,9 +74,11 @@ class FitSearch:
         nuisances = base.nuisances
         self._U = columns[:, : columns.shape[1] - width_of(effects)]
         self._layout = Layout.of(nuisances, self._U.shape[1], effects)
-        # recordings were realigned by a rigid motion already, which keeps its prior cost as coordinates
-        self._realigned = np.zeros(self._U.shape[1])
-        self._realigned[nuisances.part("registration")] = base.states.motion_coordinates
+        # recordings were realigned by a rigid motion already, which keeps its prior cost as coordinates; another one is
+        # no linear change of what moved far
+        self._rigid = RigidMotion(base.states, nuisances)
+        self._linear = self._layout.linear.copy()
+        self._linear[self._rigid.part] = False
         # nonlinear coordinates and displacements of states of this fit
         self._solved: list[tuple[Floats, Floats]] = []
         self._mesh_share: MeshShare | None = None
@@ -142,6 +145,7 @@ class FitSearch:
                 self._relinearise()
                 if by_differences:
                     self.columns = self._difference_columns()
+            self.columns = self._rigid.renewed(self.columns, self.state.sensors, self.z)
             step, current = self._gauss_newton_step(by_differences), np.array_equal(self._linearised_at, self.z)
             if not self._line_search(step):
                 if relinearise and not current and np.abs(step).max() >= 2.0 * _SHORT:
@@ -228,14 +232,25 @@ class FitSearch:
         return [] if self._mesh_share is None else [belief("mesh.share") * self._mesh_share.at(z)[:, None]]
 
     def _gauss_newton_step(self, field_stays: bool) -> Floats:
-        """The step; without the stiffness field, whose columns are rough where something relaxes, if that stays."""
-        free = np.ones(len(self.z), dtype=bool)
+        """The step; without the stiffness field, whose columns are rough where something relaxes, if that stays.
+
+        Coordinates at a limit that the step would leave stay there (projected Newton, Bertsekas 1982): clipped with the
+        others as they are, the step need not be downhill.
+        """
+        free, limited = np.ones(len(self.z), dtype=bool), np.zeros(len(self.z), dtype=bool)
         free[self._layout.field] = not field_stays
-        white = self._noise.whitened(np.column_stack([self.residual, self.columns[:, free]]))
-        W, step = white[:, 1:], np.zeros(len(self.z))
-        gradient = W.T @ white[:, 0] - self.z[free]
-        step[free] = np.linalg.solve(np.eye(W.shape[1]) + W.T @ W, gradient)
-        return step
+        limited[self._layout.tissue] = limited[self._layout.field] = True
+        limited &= np.abs(self.z) >= belief("tissue.farthest") * (1.0 - 1e-9)
+        white = self._noise.whitened(np.column_stack([self.residual, self.columns]))
+        W = white[:, 1:]
+        gradient = W.T @ white[:, 0] - self.z
+        while True:
+            kept, step = np.flatnonzero(free), np.zeros(len(self.z))
+            step[kept] = np.linalg.solve(np.eye(len(kept)) + W[:, kept].T @ W[:, kept], gradient[kept])
+            leaving = free & limited & (step * self.z > 0.0)
+            if not leaving.any():
+                return step
+            free &= ~leaving
 
     def _line_search(self, step: Floats) -> bool:
         """Go along a step, halved until it is downhill; whether any of it was."""
@@ -279,7 +294,8 @@ class FitSearch:
         state = self._solve(hypothesis, z[layout.nonlinear], nearby, error)
         self._course = state.course or self._course
         q = self._U.shape[1]
-        residual = state.sensors.residual - self._U[:, layout.linear] @ (z[:q] - self._realigned)[layout.linear]
+        residual = state.sensors.residual - self._U[:, self._linear] @ z[:q][self._linear]
+        residual = residual + self._rigid.change(state.sensors, z)
         if self._mesh_share is not None:
             residual = residual - self._mesh_share.at(z[q:])
         for effect, part in zip(self.effects, layout.effects, strict=True):

@@ -28,7 +28,7 @@ from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.fitting import Fitter
 from warpbrain.worlds.body.refit import Refit
-from warpbrain.worlds.body.stopping import next_to_fit
+from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
 from warpbrain.worlds.body.weighing import weigh, with_refined_places
 from warpbrain.worlds.body.weighted_set import WeightedSet
 from warpbrain.worlds.listener import Listener
@@ -61,6 +61,7 @@ class HypothesisSearch:
         self.base, self.candidates, self.spacing, self._listener = base, candidates, spacing, listener
         self.causes = causes_of(base, candidates)
         self._visible = visible(self.causes, base.model)
+        self._bend = bend_of(base)
         self._fitter = Fitter(base)
         self._sets: dict[frozenset[str], WeightedSet] = {}
         # of fitted sets whose supersets were weighed: what makes columns about the fit
@@ -136,6 +137,8 @@ class HypothesisSearch:
             Fit the set without any cause alone.
         """
         self._fit(frozenset())
+        while not alone and (single := far_from_linear(list(self._sets.values()), self._bend)) is not None:
+            self._fit(single.names)
         for _ in range(0 if alone else _MOST):
             chosen = next_to_fit(self.weighted_sets, self.probabilities, self._expanded)
             if chosen is None:

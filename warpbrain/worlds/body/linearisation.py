@@ -222,28 +222,26 @@ class Linearisation:
         solve = self.displacements
         return toward_equilibrium(system, external, start, lambda r: solve(r.reshape(-1, 1)).reshape(-1, 3), tolerance)
 
-    def answers_of_elements(self, element_forces: Floats, weights: Any) -> Floats:
-        """Response (n, k) to internal forces of elements (m, 4, 3) [N] times weights (m, k).
+    def answers_of_elements(self, element_forces: Any, weights: Any) -> Floats:
+        """Response (n, k) to internal forces of elements [N] times weights (m, k).
 
-        Weights are an array, or SciPy CSC where most of them are zero.
+        Forces are an array (m, 4, 3) on the corners, or SciPy sparse (3 N, m); weights an array, or SciPy CSC where
+        most of them are zero.
         """
-        from scipy.sparse import csr_matrix
-
-        nodes = self.system.tetrahedra
-        elements = len(nodes)
-        rows = (3 * nodes[:, :, None] + np.arange(3)).ravel()
-        columns = np.repeat(np.arange(elements), 12)
-        gather: Any = csr_matrix((element_forces.ravel(), (rows, columns)), (len(self._free), elements))
-        return -self._answers(gather @ weights)
+        if isinstance(element_forces, np.ndarray):
+            element_forces = _gathered(
+                self.system.tetrahedra, element_forces, np.arange(len(element_forces)), self.system
+            )
+        return -self._answers(element_forces @ weights)
 
     @cached_property
-    def element_forces(self) -> Floats:
-        """Internal forces (m, 4, 3) [N] of the elements in proportion to moduli: of laws, fibres and viscosity."""
-        return _element_forces(self.system, self.u, of_moduli=True)
+    def element_forces(self) -> Any:
+        """Internal forces [N], SciPy CSR (3 N, m), of elements in proportion to moduli: of laws, fibres, viscosity."""
+        return _element_forces(self.system, self.u, self.system.stiffness_factors, of_moduli=True)
 
     @cached_property
-    def growth_forces(self) -> Floats:
-        """Their derivative (m, 4, 3) [N] by a relative growth of volume of each element."""
+    def growth_forces(self) -> Any:
+        """Their derivative, SciPy CSR (3 N, m), by a relative growth of volume of each element."""
         from dataclasses import replace
 
         sides = []
@@ -252,7 +250,8 @@ class Linearisation:
             grown = replace(model, mechanisms=(*model.mechanisms, _Grown(relative=amount)))
             grown_system = System(grown, str(self.system.device), self.system.precision.name)
             grown_system.remember_as(self.system)
-            sides.append(_element_forces(grown_system, self.u))
+            # laws of averaged elements have the mean growth of these
+            sides.append(_element_forces(grown_system, self.u, np.ones(grown_system.elements)))
         return (sides[1] - sides[0]) / (2.0 * _GROWTH)
 
     def internal_forces(self, system: System | None = None) -> Floats:
@@ -264,12 +263,31 @@ class Linearisation:
         return np.asarray(other.internal.numpy().astype(np.float64))
 
 
-def _element_forces(system: System, u: Floats, of_moduli: bool = False) -> Floats:
-    """Internal forces (m, 4, 3) [N] of the tissue of a system; `of_moduli`: those in proportion to moduli alone."""
+def _element_forces(system: System, u: Floats, weights: Floats, of_moduli: bool = False) -> Any:
+    """Internal forces [N], SciPy CSR (3 N, m), of the tissue of a system; `of_moduli`: those in proportion to moduli.
+
+    Of averaged elements the forces of a patch are shared by its elements, by their volumes there times `weights` (m,).
+    """
     system.u.assign(u)
     system.evaluate_forces()
     forces = system.element_forces.numpy().astype(np.float64)
     for term in system.terms:
         if term.elements is not None and (term.of_moduli or not of_moduli):
             forces[term.elements] += term.forces.numpy()
-    return np.asarray(forces)
+    total = _gathered(system.tetrahedra, forces, np.arange(system.elements), system)
+    for averaged in (term for group in system.groups for term in group.averaged):
+        elements, patches, shares = averaged.shares(weights)
+        patch_forces = averaged.forces.numpy().astype(np.float64)
+        total = total + _gathered(
+            averaged.stencils[patches], shares[:, None, None] * patch_forces[patches], elements, system
+        )
+    return total.tocsr()
+
+
+def _gathered(nodes: NDArray[np.integer], forces: Floats, elements: NDArray[np.integer], system: System) -> Any:
+    """Forces (k, s, 3) on nodes (k, s) of elements (k,) as SciPy CSR (3 N, m)."""
+    from scipy.sparse import csr_matrix
+
+    rows = (3 * nodes[:, :, None] + np.arange(3)).ravel()
+    columns = np.repeat(elements, 3 * nodes.shape[1])
+    return csr_matrix((forces.ravel(), (rows, columns)), (3 * system.size, system.elements))

@@ -8,8 +8,8 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.estimation.observations import Observations
 
-#: Numbers below which nothing but registration and stiffness can be told.
-_FEWEST = 30
+#: Numbers below which nothing but registration and stiffness can be told: a dozen, and one point more.
+_FEWEST = 15
 
 
 def require_observable(case: Case) -> None:

@@ -25,6 +25,7 @@ from warpbrain.simulation.assumed import all_substituted
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.keeping import kept_for
 from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.locking import elements_of_fits
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
@@ -266,6 +267,7 @@ class States:
         except CompositionError as error:
             # treated like loads without an equilibrium
             raise SolveError(str(error)) from None
+        model = replace(model, elements=elements_of_fits(self.case.poisson))
         if hypothesis.field.any():
             field = StiffnessField(log_factor=self.modes @ hypothesis.field)
             model = replace(model, mechanisms=(*model.mechanisms, field))

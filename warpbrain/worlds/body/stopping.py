@@ -2,7 +2,7 @@
 
 A fit costs many equilibria, and tells by how much the evidence of a set differs from that in the linear model. It is
 worth that where the verdict of least expected loss could be regretted once this is known. Of the set that the verdict
-names a fit is always made.
+names a fit is always made. Where a body moves far the linear model says little of any cause: `bend_of`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import Decision, decide
 from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
 #: Probability below which a set is not fitted.
@@ -47,6 +48,37 @@ def next_to_fit(
             return None
         chosen = first
     return _subset_first(chosen, sets, expanded)
+
+
+def bend_of(base: Base) -> float:
+    """Part of log evidence that the linear model may be wrong by: how far recorded points went, squared.
+
+    Relative to the body's size. What is linear in loads misses turns of the body to second order: a cantilever that
+    sags by half its length is drawn out by as much, and no linear column is of it. In a brain this is less than a
+    hundredth.
+    """
+    sensors, size = base.declared.sensors, base.at.system.model.mesh.volume ** (1.0 / 3.0)
+    recorded = (sensors.residual + sensors.computed)[sensors.is_displacement & ~sensors.of_surfaces]
+    return float(np.abs(recorded).max(initial=0.0) / size) ** 2
+
+
+def far_from_linear(sets: Sequence[WeightedSet], bend: float) -> WeightedSet | None:
+    """A mechanism that was not fitted and may be the best for all that the linear model knows; None if there is none.
+
+    Parameters
+    ----------
+    sets : sequence of WeightedSet
+        With that of no cause.
+    bend : float
+        See `bend_of`: of what is at stake, the evidence of the best set over that of nothing.
+    """
+    nothing = next(candidate.hypothesis.log_evidence for candidate in sets if not candidate.names)
+    best = max(candidate.hypothesis.log_evidence for candidate in sets)
+    single = [s for s in sets if len(s.names) == 1 and s.mechanisms and s.refit is None and not s.failure]
+    likely = max(single, key=lambda candidate: candidate.hypothesis.log_evidence, default=None)
+    if likely is None or likely.hypothesis.log_evidence + bend * (best - nothing) < best:
+        return None
+    return likely
 
 
 def _decide(

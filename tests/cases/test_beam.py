@@ -1,0 +1,40 @@
+"""A recorded silicone beam: its cases, and the figures that its recordings must give."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpbrain.cases.shipped import BEAM, find_case
+from warpbrain.simulation.equilibrium import EquilibriumSolver
+from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.system import System
+
+#: How far the tip is from where it was recorded in mm, vertically: markers are known to 0.35 and to 0.6.
+TOLERANCE = dict(zip(BEAM, (0.35, 0.6), strict=True))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BEAM)
+def test_it_bends_as_was_recorded_with_a_modulus_of_its_weight_alone(name, verify):
+    case = find_case(name)
+    model = replace(model_of(case)[0], elements="tet10-mixed")
+    u = EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u[: len(case.mesh.points)]
+    recording = case.recordings[0]
+    nearest = np.argmin(np.linalg.norm(case.mesh.points - recording.points[:3, None], axis=2), axis=1)
+    error = 1e3 * np.sqrt(np.mean((u[nearest, 2] - recording.displacement[:3, 2]) ** 2))
+    verify(
+        f"{name}: fall of the tip, root mean square", "motion capture, Dubied et al. 2022", error, TOLERANCE[name], "mm"
+    )
+
+
+@pytest.mark.parametrize("name", BEAM)
+def test_what_is_declared(name):
+    case = find_case(name)
+    assert case.mesh.volume == pytest.approx(9e-5, rel=1e-6)
+    [gravity] = case.mechanisms
+    assert gravity.csf_level is None and gravity.surroundings == "air"
+    weight = -gravity.density * 9.81 * case.mesh.volume
+    assert gravity.nodal_forces(case.mesh).sum(axis=0)[2] == pytest.approx(weight, rel=1e-9)
+    assert {boundary.kind for boundary in case.boundaries} == ({"fixed"} if name == BEAM[0] else {"fixed", "force"})
+    assert case.tissues[1].accuracy == (None if name == BEAM[0] else 0.043)
