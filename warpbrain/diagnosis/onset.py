@@ -19,7 +19,7 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.inference.blocks import Blocks
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import unknown_cause
-from warpbrain.worlds.body.time_courses import TimeCourse, time_courses
+from warpbrain.worlds.body.time_courses import TimeCourse, factor_of_rows, finite_times, time_courses
 
 #: Course of a mechanism that changes in time by itself.
 OF_ITS_OWN = "as its own law says, since the load came"
@@ -72,11 +72,11 @@ def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianMode
     per_interval = np.bincount([course.interval for course in courses])
     cause = cause or unknown_cause(base, [np.ones(len(residual))])
     evidence = [
-        _log_evidence(cause, course.factor(base.at.sensors.times), model, residual)
+        _log_evidence(cause, factor_of_rows(course, base.at.sensors), model, residual)
         - float(np.log(per_interval[course.interval]))
         for course in courses
     ]
-    return _summary([0.0, *times.tolist()], courses, np.array(evidence))
+    return _summary([0.0, *finite_times(times).tolist()], courses, np.array(evidence))
 
 
 def _log_evidence(cause: Cause, factor: Floats, model: GaussianModel, residual: Floats) -> float:

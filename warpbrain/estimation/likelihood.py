@@ -63,13 +63,14 @@ class Rows:
     @classmethod
     def of(cls, observations: Observations, parts: tuple[Residuals, ...]) -> Rows:
         """Those of residuals at a state: surfaces are looked at along their normals there."""
-        positions, sigma, points, first = [], [], [], 0
+        positions, sigma, points, times, first = [], [], [], [], 0
         for one in observations.recordings:
             count = len(one.rows)
             where = one.positions if len(one.positions) else np.full((count, 3), np.nan)
             positions.append(np.repeat(where, one.size, axis=0))
             own = 1.0 / np.sqrt(one.weights) if one.sigma is None else one.sigma
             sigma.append(np.repeat(own, one.size))
+            times.append(np.repeat(one.times, one.size))
             numbers = first + np.arange(count * one.size).reshape(count, one.size)
             points += list(numbers) if one.unit == "m" else []
             first += count * one.size
@@ -81,6 +82,7 @@ class Rows:
             np.repeat(np.arange(len(parts)), sizes),
             np.array([one.sigma is not None for one in observations.recordings]),
             tuple(points),
+            np.concatenate(times),
         )
 
     def covariance(self, sigma: Floats) -> Floats:

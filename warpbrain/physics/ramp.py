@@ -11,6 +11,9 @@ import numpy as np
 
 from warpbrain.errors import InputError
 
+#: Rounding of factors that users write.
+_ROUNDING = 1e-6
+
 
 @dataclass(frozen=True, kw_only=True)
 class Ramped:
@@ -37,3 +40,10 @@ class Ramped:
             return 1.0
         times, factors = zip(*self.ramp, strict=True)
         return float(np.interp(time, times, factors))
+
+
+def take_turns(ramped: Sequence[Ramped]) -> bool:
+    """Whether no more than one of them acts in full at any time: sizes of their factors add up to 1 at most."""
+    # a sum of absolute values of linear functions is largest at an end of a piece
+    times = sorted({time for one in ramped for time, _ in one.ramp})
+    return all(sum(abs(one.factor(time)) for one in ramped) <= 1.0 + _ROUNDING for time in (*times, math.inf))

@@ -112,6 +112,7 @@ class Traction(Load, Mechanism):
             on_surface=True,
             centre=site,
             radius=radius,
+            varying=(0, 1, 2),
         )
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:

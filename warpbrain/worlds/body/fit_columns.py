@@ -11,7 +11,7 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
 from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.effects import Effect, Effects, column_slices, parts_of, width_of
+from warpbrain.worlds.body.effects import Effect, Effects, column_slices, columns_over_time, parts_of, width_of
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.mesh_share import MeshShare
@@ -90,7 +90,7 @@ def columns_about(
     # a state that was followed over time has no one tangent
     if all(effect.columns_at is None for effect in effects):
         try:
-            at = Linearisation(state.system, state.u, state.reactions, state.sensors)
+            at = state.linearised()
         except SolveError:
             return columns, None
         relaxed = _relaxation_factor(effects, [z[part] for part in layout.effects], state.sensors)
@@ -103,8 +103,11 @@ def columns_about(
         if effect.columns_at is not None:
             columns[:, part] = effect.columns_at(c)
         elif at is not None and not effect.proposed.is_there_or_not:
-            made = Effects(at, mesh_errors=mesh_errors)
-            columns[:, part] = made.of([_proposal_about(effect.proposed, c)], effect.proposed.make(c))[0].columns
+            if effect.proposed.over_time is not None:
+                columns[:, part] = columns_over_time(at, effect.proposed, c, mesh_errors)
+            else:
+                made = Effects(at, mesh_errors=mesh_errors)
+                columns[:, part] = made.of([_proposal_about(effect.proposed, c)], effect.proposed.make(c))[0].columns
         else:
             continue
         if mesh_share is not None:

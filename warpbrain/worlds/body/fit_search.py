@@ -270,7 +270,7 @@ class FitSearch:
         base, layout, mesh = self._base, self._layout, self.mesh_errors
         mechanisms, patches = [], []
         for effect, part in zip(self.effects, layout.effects, strict=True):
-            mechanisms.append(effect.proposed.make(effect.coefficients(z[part])))
+            mechanisms += effect.proposed.acting(effect.coefficients(z[part]))
             if effect.proposed.patch is not None:
                 patches.append(effect.proposed.patch)
         theta = base.prior.mean + base.prior.factor @ z[layout.tissue]
