@@ -102,6 +102,7 @@ def _when(onset: Onset | None) -> dict[str, Any] | None:
         "probability": onset.probability,
         "course": onset.course,
         "intervals": [{"seconds": [a, b], "probability": p} for a, b, p in onset.intervals],
+        "sizes": None if onset.sizes is None else asdict(onset.sizes),
     }
 
 

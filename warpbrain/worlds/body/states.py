@@ -363,14 +363,15 @@ def _released(case: Case, patches: tuple[Patch, ...]) -> tuple[TetMesh, tuple[Bo
 def times_of_states(case: Case, role: str = "fit") -> tuple[float, ...]:
     """Times [s] of the states that recordings of a role are compared with.
 
-    Infinity alone, for the end, where there is one state: at one time, under loads that do not change after it. Where
+    Infinity alone, for the end, where what is fitted has one state: of one time, with loads that stay after it. Where
     stress relaxes or fluid flows as the case says, there is nothing but the end either if loads change, or something
     was recorded at the end and at no time.
     """
     times = recorded_times(case, (role,))
     moments = Moments.of(case, (*times, np.inf))
     constant = len(moments.cases) == 1
-    if constant and len(times) < 2:
+    # a cause that is found may change where nothing does that is declared: what is checked keeps its time
+    if not times or (constant and len(times) < 2 and role == "fit"):
         return (np.inf,)
     if goes_on(case) and not (constant and np.isfinite(times).all()):
         return (np.inf,)
