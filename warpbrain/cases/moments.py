@@ -31,9 +31,8 @@ def _boundary_at(boundary: Boundary, time: float) -> Boundary:
     if isinstance(boundary, Displaced):
         if not boundary.has_history:
             return boundary
-        values = np.array(boundary.values)
-        now = tuple(float(np.interp(time, boundary.times, component)) for component in values.T)
-        return replace(boundary, times=(0.0,), values=(now,), file="")
+        x, y, z = (float(np.interp(time, boundary.times, component)) for component in np.array(boundary.values).T)
+        return replace(boundary, times=(0.0,), values=((x, y, z),), file="")
     ramp = getattr(boundary, "ramp", ())
     return replace(boundary, ramp=_held(ramp, time)) if ramp else boundary  # type: ignore[call-arg]
 

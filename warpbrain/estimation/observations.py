@@ -255,10 +255,12 @@ def _observation(case: Case, recording: Recording, moments: Moments) -> Observat
         blocks = []
         for number, part in zip(numbers, parts, strict=True):
             moved = fields[:, number] if start < 0 else fields[:, number] - fields[:, start]
-            blocks.append(part.at(*moved, centre, motion))
+            blocks.append(part.at(moved[0], moved[1], centre, motion))
         values, rigid, directions = (np.concatenate([block[k] for block in blocks]) for k in range(3))
-        matrices = (blocks[0][k] if len(blocks) == 1 else vstack([b[k] for b in blocks]).tocsr() for k in (3, 4))
-        return Residuals(values, rigid, directions, *matrices, after, before)
+        by_displacement, by_reactions = (
+            blocks[0][k] if len(blocks) == 1 else vstack([block[k] for block in blocks]).tocsr() for k in (3, 4)
+        )
+        return Residuals(values, rigid, directions, by_displacement, by_reactions, after, before)
 
     return Observation(
         recording.name,

@@ -17,6 +17,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.marginal import Marginal
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.extrapolated import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
@@ -268,7 +269,8 @@ class FitSearch:
     def _evaluate(self, z: Floats, nearby: SolvedState) -> tuple[SolvedState, Floats]:
         """State and residual at coordinates."""
         base, layout, mesh = self._base, self._layout, self.mesh_errors
-        mechanisms, patches = [], []
+        mechanisms: list[Mechanism] = []
+        patches = []
         for effect, part in zip(self.effects, layout.effects, strict=True):
             mechanisms += effect.proposed.acting(effect.coefficients(z[part]))
             if effect.proposed.patch is not None:

@@ -279,7 +279,7 @@ class States:
     def _instant(time: float, system: System, state: Equilibrium, external: Floats) -> Instant:
         return Instant(time, system, state.u, system.model.reactions(state.internal, external))
 
-    def corrected(self, state: SolvedState, expected: Difference) -> SolvedState:
+    def corrected(self, state: SolvedState, expected: Difference | None) -> SolvedState:
         """A state with sensors where it is without the error of the mesh."""
         return replace(state, sensors=self._sensors(state.instants, expected))
 
