@@ -168,6 +168,11 @@ def traits_in_words(unknown: Traits, extent: float) -> str:
     where = f"about {place(unknown.centre, extent)}"
     if unknown.outside:
         sentence = f"It is a force from outside, {where}, of {measured(size, sd, 'N')} in all"
+    elif unknown.hidden:
+        sentence = (
+            f"It is strongest {where}, so near to what is held that the reactions there may carry it: whether it has a "
+            "net force cannot be told"
+        )
     else:
         sentence = (
             f"It is strongest {where}, and no net force of it is seen ({measured(size, sd, 'N')}): it may act within"
