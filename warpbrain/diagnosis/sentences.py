@@ -137,7 +137,8 @@ def _where(ranked: Ranked) -> str:
         return f" Where: {ranked.region}." if ranked.region else ""
     # to whole millimetres where its size is not known
     radius = f", within {number(1e3 * ranked.radius, 1)} mm" if ranked.radius else ""
-    return f" It lies about {place(ranked.centre, 10.0 * (ranked.radius or 1.0))}{radius}."
+    surface = f", on the {ranked.region}" if ranked.region else ""
+    return f" It lies about {place(ranked.centre, 10.0 * (ranked.radius or 1.0))}{radius}{surface}."
 
 
 def _grounds(named: Sequence[Ranked], fit: Fit) -> str:

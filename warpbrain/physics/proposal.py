@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import TYPE_CHECKING, Literal
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,8 @@ class Situation:
         [m]
     axes : (str, str, str)
         How x, y and z run, for people.
+    named : tuple of (str, (k, 3) int array)
+        Every part of the surface that can move, with what people call it: what something acts on already, too.
     """
 
     mesh: TetMesh
@@ -100,6 +102,25 @@ class Situation:
     surface_sites: Floats
     spacing: float
     axes: tuple[str, str, str] = ("from left to right", "from posterior to anterior", "from inferior to superior")
+    named: tuple[tuple[str, NDArray[np.int32]], ...] = ()
+
+    @cached_property
+    def _names(self) -> tuple[Any, list[str]]:
+        """A tree of the middles of triangles, and the name of each: that of the smallest part that it belongs to."""
+        from scipy.spatial import cKDTree
+
+        names: dict[bytes, tuple[NDArray[np.int32], str]] = {}
+        for words, faces in sorted(self.named, key=lambda part: -len(part[1])):
+            names.update({row.tobytes(): (row, words) for row in np.sort(faces, axis=1)})
+        rows = np.array([row for row, _ in names.values()], dtype=np.int64).reshape(-1, 3)
+        return cKDTree(self.mesh.points[rows].mean(axis=1)), [words for _, words in names.values()]
+
+    def surface_at(self, point: Floats) -> str:
+        """What people call the surface that is nearest to a point (3,) [m]; empty if nothing can move."""
+        if not self.named:
+            return ""
+        tree, words = self._names
+        return words[int(tree.query(point)[1])]
 
     def require_new(self, kind: str) -> None:
         """Raise `NotTestableError` if the case assumes a mechanism already."""

@@ -20,7 +20,7 @@ from warpbrain.worlds.body.courses import over_time
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.states import SolvedState
-from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, with_free_surfaces
+from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, named_triangles, with_free_surfaces
 
 #: About how many sites a scan has in the tissue, and on its surface.
 _VOLUME_SITES, _SURFACE_SITES = 350, 480
@@ -75,6 +75,7 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
         mesh.centres[spread_points(mesh.centres, spacing)],
         np.concatenate(sites),
         spacing,
+        named=named_triangles(case, free),
     )
 
 
