@@ -21,7 +21,7 @@ def error_at(case, theta: np.ndarray) -> DiscretisationError:
     forward = Forward(case, theta, "cpu")
     state = forward.solve(theta)
     derivatives = forward.differentiate(state)
-    return discretisation_error(FinerMesh("cpu"), forward, state, (derivatives.u, derivatives.reactions))
+    return discretisation_error([FinerMesh("cpu")], forward, state, (derivatives.u, derivatives.reactions))
 
 
 @pytest.fixture(scope="module")

@@ -54,7 +54,7 @@ def error_of_mesh(case: Case) -> DiscretisationError:
     forward = Forward(case, THETA, "cpu")
     state = forward.solve(THETA)
     found = forward.differentiate(state)
-    return discretisation_error(FinerMesh("cpu"), forward, state, (found.u, found.reactions))
+    return discretisation_error([FinerMesh("cpu")], forward, state, (found.u, found.reactions))
 
 
 def test_every_mechanism_that_an_estimate_can_have_is_here() -> None:

@@ -37,7 +37,7 @@ def problem(request: pytest.FixtureRequest) -> Problem:
     forward = Forward(case, THETA, "cpu")
     state = forward.solve(THETA)
     derivatives = forward.differentiate(state)
-    error = discretisation_error(FinerMesh("cpu"), forward, state, (derivatives.u, derivatives.reactions))
+    error = discretisation_error([FinerMesh("cpu")], forward, state, (derivatives.u, derivatives.reactions))
     mode = PriorMode(
         1.0, Gaussian(np.log([1000.0, 900.0]), np.diag([0.5, 0.6])), np.full(2, -np.inf), np.full(2, np.inf)
     )

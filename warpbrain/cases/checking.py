@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.cases.case import Case
+from warpbrain.cases.enough import too_few_for_noise, too_few_to_diagnose
 from warpbrain.cases.reading import examine_case
 from warpbrain.mesh import Quality, measure
 from warpbrain.problems import Problem, Problems
@@ -127,6 +128,11 @@ def _nothing_there(case: Case) -> list[str]:
         found.append("no [[boundary]]: nothing holds the body, so it cannot be simulated")
     if case.nothing_acts and case.specimen is None:
         found.append(NOTHING_ACTS)
+    if case.recordings and case.specimen is None:
+        fitted = [recording for recording in case.recordings if recording.role == "fit"]
+        found += [why for recording in fitted if (why := too_few_for_noise(case, recording))]
+        if why := too_few_to_diagnose(case):
+            found.append(f"`diagnose` will refuse: {why}")
     if not case.recordings:
         found.append("no [[recording]]: there is nothing to compare a simulation with")
     return found

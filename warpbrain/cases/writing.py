@@ -182,6 +182,8 @@ def _recording(folder: Path, recording: Recording, frame: Frame) -> dict[str, An
         ForceRecording: lambda r: {"boundary": r.boundary},
         TestRecording: lambda r: _test(r, frame),
     }
+    if recording.reference is not None:
+        table["reference"] = recording.reference
     write_recording(folder / name, replace(recording, file=name), frame)
     return table | more[type(recording)](recording)
 

@@ -157,7 +157,8 @@ def _run(options: argparse.Namespace) -> None:
     loading.show(0.0, "the first run on a machine compiles them")
     loaded = system.load_kernels()
     loading.clear()
-    outcome, seconds, counts = _simulate(options, system, say)
+    outcome, seconds, counts = _simulate(options, case, system, say)
+    earlier = outcome.pop("states", None)
     first_step = outcome.pop("first_step") - start
     seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **seconds}
 
@@ -165,7 +166,12 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.simulation.result import nodal_state_of, result_of
 
     result = result_of(system, outcome.get("time_s", math.inf))
-    observed = observe(case, nodal_state_of(system, outcome.get("time_s", math.inf)), outcome.get("time_s"))
+    reached = nodal_state_of(system, outcome.get("time_s", math.inf))
+    if "time_s" not in outcome:
+        from warpbrain.simulation.at_rest import states_at_rest
+
+        earlier = states_at_rest(case, system, reached, options.tolerance)
+    observed = observe(case, reached, outcome.get("time_s"), earlier)
     said = tables.describe_result(result)
     compared = describe_comparisons(observed)
     say("", *tables.displacement_lines(said), sep="\n")
@@ -319,11 +325,11 @@ def parse_moduli(values: list[str]) -> tuple[float | None, dict[int, float]]:
 
 
 def _simulate(
-    options: argparse.Namespace, system: System, say: Any
+    options: argparse.Namespace, case: Case, system: System, say: Any
 ) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
     """Find the state that the arguments ask for; returns what to report of it, and times and counts by phase."""
     if options.until is not None:
-        return run_slowly.follow(options, system, say)
+        return run_slowly.follow(options, case, system, say)
     if options.steps is not None:
         return _follow(options, system, say, Progress("motion", options.quiet))
     if options.to_rest:

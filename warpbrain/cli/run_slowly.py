@@ -11,6 +11,7 @@ from warpbrain.errors import InputError
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
+    from warpbrain.cases.case import Case
     from warpbrain.simulation.system import System
 
 #: Steps of a run that names no number.
@@ -30,14 +31,18 @@ def check(options: argparse.Namespace) -> None:
 
 
 def follow(
-    options: argparse.Namespace, system: System, say: Any
+    options: argparse.Namespace, case: Case, system: System, say: Any
 ) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
-    """Follow it; returns what to report, and times and counts by phase."""
+    """Follow it; returns what to report, with the states at which something was recorded, and times and counts."""
+    from warpbrain.cases.moments import recorded_times
     from warpbrain.simulation.equilibrium import EquilibriumOptions, NewtonStep
     from warpbrain.simulation.phase_clock import PhaseClock
     from warpbrain.simulation.quasi_static import follow_slowly, growing_times
+    from warpbrain.simulation.result import NodalState, nodal_state_of
 
-    times = growing_times(options.until, options.steps or STEPS)
+    recorded = {time for time in recorded_times(case, ("fit", "check")) if time <= options.until}
+    times = sorted({*growing_times(options.until, options.steps or STEPS), *recorded})
+    states: dict[float, NodalState] = {}
     say("", "slow change     time [s]   Newton    CG   min J   largest [mm]", sep="\n")
     progress = Progress("slow change", options.quiet)
     clock = PhaseClock(system.device)
@@ -54,6 +59,8 @@ def follow(
     try:
         moments = follow_slowly(system, times, EquilibriumOptions(tolerance=options.tolerance), on_step, clock)
         for number, moment in enumerate(moments, 1):
+            if moment.time in recorded:
+                states[moment.time] = nodal_state_of(system, moment.time)
             largest, least = moment.largest, moment.min_J
             iterations = sum(step.cg_iterations for step in taken)
             history.append(
@@ -81,6 +88,7 @@ def follow(
         "kind": "slow change",
         "first_step": first[0] if first else time.perf_counter(),
         "time_s": options.until,
+        "states": states,
         "history": history,
     }
     return outcome, clock.seconds, clock.counts

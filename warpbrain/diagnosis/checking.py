@@ -1,52 +1,79 @@
-"""Errors at recordings with role `check`, to which nothing is fitted."""
+"""Errors at recordings with role `check`, to which nothing is fitted: each at its time."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
+import numpy as np
+
+from warpbrain.arrays import Floats, Ints
 from warpbrain.cases.case import Case
+from warpbrain.cases.moments import Moments
 from warpbrain.diagnosis.held_out import distance
 from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
-from warpbrain.estimation.observations import Observations
-from warpbrain.estimation.registration import realigned
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
 from warpbrain.worlds.body.refit import Refit
-from warpbrain.worlds.body.sensors import sensors_at
+from warpbrain.worlds.body.sensors import Sensors
+from warpbrain.worlds.body.states import SolvedState, States
+from warpbrain.worlds.body.time_courses import finite_times
 
 
 def check_errors(case: Case, base: Base, fits: Sequence[Refit]) -> tuple[float, ...] | None:
     """Root mean square distances [m]: of the case as declared, then of each fit; None if there is nothing to check.
 
-    A fit predicts them by its state, the expected error of the mesh, and its nuisances: an error of registration is the
-    same for recordings that are fitted and for others.
+    A fit predicts them by its state at their times, the expected error of the mesh, and its nuisances: an error of
+    registration is the same for recordings that are fitted and for others.
     """
-    checks = Observations.to_check(case)
-    if all(observation.kind == "force" for observation in checks.recordings):
+    if all(recording.kind == "force" for recording in case.recordings if recording.role == "check"):
         return None
-    centre, declared = base.states.centre, base.declared
-    sensors = sensors_at([(math.inf, checks, declared.u, declared.reactions)], centre)
+    checks = States(case, base.states.device, "check")
+    checks.centre = base.states.centre
+    declared = _sensors(checks, base.declared, None)
     # fits are to realigned recordings, see `realigned`
-    realigned_checks = Observations.to_check(realigned(case, base.states.motion, centre))
-    return distance(sensors, sensors.residual), *(_error(realigned_checks, base, fit) for fit in fits)
+    checks.realign(base.states.motion)
+    return distance(declared, declared.residual), *(_error(checks, base, fit) for fit in fits)
 
 
-def _error(checks: Observations, base: Base, fit: Refit) -> float:
+def _error(checks: States, base: Base, fit: Refit) -> float:
     """Root mean square distance [m] of a fit."""
-    u, reactions = fit.state.u, fit.state.reactions
-    if base.mesh_errors is not None:
-        error = _mesh_error(base, base.mesh_errors, fit)
-        u, reactions = u + error.u, reactions + error.reactions
-    sensors = sensors_at([(math.inf, checks, u, reactions)], base.states.centre)
-    nuisances, _ = base.for_sensors(sensors)
+    error = None if base.mesh_errors is None else _mesh_error(base, base.mesh_errors, fit)
+    sensors = _sensors(checks, fit.state, error)
+    nuisances, _ = base.for_sensors(_at_nearest_times(sensors, base.states.times))
     # less tissue and field, which the state has, and the motion by which recordings were realigned
     coordinates = nuisances.coordinates(base.prior, fit.state.hypothesis)
     coordinates[nuisances.part("registration")] = base.states.motion_coordinates
     linear = fit.nuisances[: len(coordinates)] - coordinates
     residual = sensors.residual - nuisances.columns @ linear
     return distance(sensors, residual)
+
+
+def _sensors(checks: States, state: SolvedState, error: Difference | None) -> Sensors:
+    """What is checked beside a state; at times at which something else acts, beside the states of these."""
+    case = checks.case_of(state.hypothesis)
+    moments = Moments.of(case, checks.times)
+    ended = moments.cases[0] is case and not state.course and len({id(i.system) for i in state.instants}) == 1
+    if ended or checks.times == (math.inf,):
+        instants = tuple(replace(state.instants[-1], time=time) for time in checks.times)
+        return checks.corrected(replace(state, instants=instants), error).sensors
+    return checks.solve(state.hypothesis, state.u, error).sensors
+
+
+def _at_nearest_times(sensors: Sensors, times: Sequence[float]) -> Sensors:
+    """The rows as if their states were those of the nearest of some times [s]: what is linear about these is alike."""
+
+    def nearest(wanted: Floats) -> Ints:
+        ranks = np.concatenate([np.array(times), wanted])
+        finite = finite_times(ranks)
+        return np.abs(finite[len(times) :, None] - finite[: len(times)]).argmin(axis=1)
+
+    if times == (math.inf,):
+        return replace(sensors, after=np.zeros_like(sensors.after), before=np.full_like(sensors.before, -1))
+    before = np.where(sensors.before < 0, -1, nearest(sensors.references))
+    return replace(sensors, after=nearest(sensors.times), before=before)
 
 
 def _mesh_error(base: Base, known: MeshErrors, fit: Refit) -> Difference:

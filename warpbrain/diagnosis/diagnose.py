@@ -9,10 +9,11 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.checking import check_errors
 from warpbrain.diagnosis.confirming import Confirming, HeldOutErrors
+from warpbrain.diagnosis.course import size_over_time
 from warpbrain.diagnosis.held_out import distance
 from warpbrain.diagnosis.locating import ScoreMap, score_map
 from warpbrain.diagnosis.measuring import next_measurements
-from warpbrain.diagnosis.onset import Onset, onset_of
+from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.ranking import Ranking, about_base
 from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Ranked
@@ -318,8 +319,11 @@ def _onset(search: HypothesisSearch, decision: Decision, best: WeightedSet) -> O
         return onset_of(search.base, None, False, best.marginal.model, best.residual)
     name = best.mechanisms[0]
     effect = best.effects[0]
+    if (sizes := size_over_time(effect, *best.coefficients[0])) is not None:
+        return Onset(0.0, sizes.seconds[-1], None, AS_IT_CHANGES, sizes=sizes)
     model, residual = about_base(search, best, name)
-    return onset_of(search.base, search.causes.named(name), effect.proposed.changes_in_time, model, residual)
+    cause = always_there(search.causes, name)
+    return onset_of(search.base, cause, effect.proposed.changes_in_time, model, residual)
 
 
 def _next(search: HypothesisSearch, ranked: tuple[Ranked, ...]) -> tuple[Measurement, ...]:

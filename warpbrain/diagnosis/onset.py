@@ -14,15 +14,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.diagnosis.course import SizeOverTime
 from warpbrain.inference import Cause, GaussianModel, Place
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.blocks import Blocks
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.causes import unknown_cause
-from warpbrain.worlds.body.time_courses import TimeCourse, time_courses
+from warpbrain.worlds.body.causes import BodyCauses, unknown_cause
+from warpbrain.worlds.body.time_courses import TimeCourse, factor_of_rows, finite_times, time_courses
 
 #: Course of a mechanism that changes in time by itself.
 OF_ITS_OWN = "as its own law says, since the load came"
+#: Course of one whose size was found as a function of time.
+AS_IT_CHANGES = "its size changes with time"
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,8 @@ class Onset:
         Its shape in time, in words; empty if these data do not tell.
     intervals : tuple of (first, last, probability)
         All intervals that were compared.
+    sizes : SizeOverTime or None
+        Of what was found with a size that is a function of time.
     """
 
     first: float
@@ -46,6 +51,7 @@ class Onset:
     probability: float | None
     course: str
     intervals: tuple[tuple[float, float, float], ...] = ()
+    sizes: SizeOverTime | None = None
 
 
 def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianModel, residual: Floats) -> Onset | None:
@@ -72,11 +78,18 @@ def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianMode
     per_interval = np.bincount([course.interval for course in courses])
     cause = cause or unknown_cause(base, [np.ones(len(residual))])
     evidence = [
-        _log_evidence(cause, course.factor(base.at.sensors.times), model, residual)
+        _log_evidence(cause, factor_of_rows(course, base.at.sensors), model, residual)
         - float(np.log(per_interval[course.interval]))
         for course in courses
     ]
-    return _summary([0.0, *times.tolist()], courses, np.array(evidence))
+    return _summary([0.0, *finite_times(times).tolist()], courses, np.array(evidence))
+
+
+def always_there(causes: BodyCauses, name: str) -> Cause:
+    """A mechanism without the places at which its size is a function of time."""
+    cause = causes.named(name)
+    pairs = zip(cause.places, causes.effects[name], strict=True)
+    return replace(cause, places=tuple(place for place, effect in pairs if effect.proposed.over_time is None))
 
 
 def _log_evidence(cause: Cause, factor: Floats, model: GaussianModel, residual: Floats) -> float:

@@ -137,7 +137,8 @@ def _where(ranked: Ranked) -> str:
         return f" Where: {ranked.region}." if ranked.region else ""
     # to whole millimetres where its size is not known
     radius = f", within {number(1e3 * ranked.radius, 1)} mm" if ranked.radius else ""
-    return f" It lies about {place(ranked.centre, 10.0 * (ranked.radius or 1.0))}{radius}."
+    surface = f", on the {ranked.region}" if ranked.region else ""
+    return f" It lies about {place(ranked.centre, 10.0 * (ranked.radius or 1.0))}{radius}{surface}."
 
 
 def _grounds(named: Sequence[Ranked], fit: Fit) -> str:
@@ -168,6 +169,11 @@ def traits_in_words(unknown: Traits, extent: float) -> str:
     where = f"about {place(unknown.centre, extent)}"
     if unknown.outside:
         sentence = f"It is a force from outside, {where}, of {measured(size, sd, 'N')} in all"
+    elif unknown.hidden:
+        sentence = (
+            f"It is strongest {where}, so near to what is held that the reactions there may carry it: whether it has a "
+            "net force cannot be told"
+        )
     else:
         sentence = (
             f"It is strongest {where}, and no net force of it is seen ({measured(size, sd, 'N')}): it may act within"

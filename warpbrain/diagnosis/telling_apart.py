@@ -28,7 +28,7 @@ def imitations(causes: BodyCauses, model: GaussianModel) -> Confusion:
     for cause in causes.causes:
         if cause.kind is not Kind.PHYSICS:
             continue
-        place, _ = _median_place(cause, model)
+        place, _ = _median_place(causes, cause, model)
         effect = model.standardised(_pattern(cause, place))
         whole = max(float(effect @ effect), 1e-300)
         rows[cause.name] = {
@@ -45,7 +45,7 @@ def smallest(causes: BodyCauses, model: GaussianModel, confusion: Confusion) -> 
     sizes = {}
     for name, others in confusion.rows.items():
         cause = causes.named(name)
-        place, length = _median_place(cause, model)
+        place, length = _median_place(causes, cause, model)
         imitated = max(
             (part for other, part in others.items() if causes.named(other).kind is Kind.PHYSICS), default=0.0
         )
@@ -65,12 +65,15 @@ def _pattern(cause: Cause, place: int) -> Floats:
     return chosen.columns[:, 0] if chosen.mean is None else chosen.mean
 
 
-def _median_place(cause: Cause, model: GaussianModel) -> tuple[int, float]:
-    """The place of median detectability, and its detectability."""
-    patterns = np.column_stack([_pattern(cause, place) for place in range(len(cause.places))])
+def _median_place(causes: BodyCauses, cause: Cause, model: GaussianModel) -> tuple[int, float]:
+    """The place of median detectability, and its detectability; of a size that does not change, if it has any."""
+    effects = causes.effects[cause.name]
+    always = [k for k, effect in enumerate(effects) if effect.proposed.over_time is None]
+    numbers = always or list(range(len(effects)))
+    patterns = np.column_stack([_pattern(cause, place) for place in numbers])
     lengths = np.linalg.norm(model.standardised(patterns), axis=0)
     middle = int(np.argsort(lengths)[len(lengths) // 2])
-    return middle, float(lengths[middle])
+    return numbers[middle], float(lengths[middle])
 
 
 def _orthonormal(model: GaussianModel, columns: Floats) -> Floats:

@@ -5,12 +5,17 @@ coefficients `c ~ N(0, s^2 I)`, `A` the response of the sensors to these and `S`
 
     mean = s^2 E A^T (S + s^2 A A^T)^-1 r,     covariance = s^2 E E^T - s^4 E A^T (S + s^2 A A^T)^-1 A E^T.
 
-A net force that is not zero is external: growth and stress within the body have none.
+A net force that is not zero is external: growth and stress within the body have none. But of a stress beside what is
+held a part acts on nodes that do not move, and the rest looks like a net force. So stress there is part of `S`, as
+large as is likely: a net force is told if such a stress does not explain it.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +24,7 @@ from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.mesh import nodes_of
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.unknown import force_patches
+from warpbrain.worlds.body.unknown import force_patches, stress_beside_held
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +41,8 @@ class Traits:
         Whether there is a net force: it is exerted from outside the body.
     turning : bool
         Whether there is a net moment.
+    hidden : bool
+        Whether there seems to be a net force, which what holds the body may carry: it cannot be told.
     surface_nats : float
         Log Bayes factor of a force on the surface alone over one within the body alone.
     centre : (3,) array
@@ -48,6 +55,7 @@ class Traits:
     moment_sd: Floats
     outside: bool
     turning: bool
+    hidden: bool
     surface_nats: float
     centre: Floats
 
@@ -77,39 +85,80 @@ def traits_of(
     centre : (3,) array
         About which moments are taken [m].
     """
-    from scipy.special import chdtri
-
     sites, answers = force_patches(at, length)
     # patches on held nodes have no effect
     moving = np.linalg.norm(answers, axis=(0, 2)) > 1e-3 * np.linalg.norm(answers, axis=(0, 2)).max()
     sites, answers = sites[moving], answers[:, moving]
     A = answers.reshape(len(answers), -1)
     rows = at.sensors.is_displacement
-    unit = 1.0 / np.sqrt(np.mean(np.sum(A[rows] ** 2, axis=1)))
-    scales = noise * unit * beliefs("unknown.sizes")
-    # the scale of the greatest likelihood
-    scale = float(scales[int(np.argmax([model.with_columns(s * A).log_density(residual) for s in scales.tolist()]))])
-    functionals = scale * np.concatenate([_summed(sites), _turned(sites - centre)])
-    coefficients, spread = model.with_columns(scale * A).coefficients(residual)
-    of_patches = slice(len(coefficients) - A.shape[1], None)
-    mean = functionals @ coefficients[of_patches]
-    covariance = functionals @ spread[of_patches, of_patches] @ functionals.T
-    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-
-    def significant(part: slice) -> bool:
-        square = float(mean[part] @ np.linalg.solve(covariance[part, part], mean[part]))
-        return square > float(chdtri(3, 1.0 - belief("checks.sure")))
-
+    unit = noise / np.sqrt(np.mean(np.sum(A[rows] ** 2, axis=1)))
+    functionals = unit * np.concatenate([_summed(sites), _turned(sites - centre)])
+    covariance = model.scale**2 * (model.noise_factor @ model.noise_factor.T) + model.columns @ model.columns.T
+    resultant = partial(_Resultant.of, unit * A, functionals, covariance, residual)
+    plain, beside = resultant(None), resultant(noise * stress_beside_held(at, length))
+    force, moment = slice(0, 3), slice(3, 6)
+    sd = np.sqrt(np.maximum(np.diag(beside.covariance), 0.0))
+    outside = beside.is_significant(force)
     return Traits(
-        mean[:3],
-        sd[:3],
-        mean[3:],
-        sd[3:],
-        significant(slice(0, 3)),
-        significant(slice(3, 6)),
-        _surface_nats(at, sites, answers, model, scale, residual, length),
+        beside.mean[force],
+        sd[force],
+        beside.mean[moment],
+        sd[moment],
+        outside,
+        beside.is_significant(moment),
+        plain.is_significant(force) and not outside,
+        _surface_nats(at, sites, answers, model, plain.size * unit, residual, length),
         centre,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Resultant:
+    """Posterior of net force and moment.
+
+    Attributes
+    ----------
+    mean, covariance : (6,) and (6, 6) array
+    size : float
+        Of the patches, relative to those that move as much as the noise: the likeliest.
+    """
+
+    mean: Floats
+    covariance: Floats
+    size: float
+
+    @classmethod
+    def of(
+        cls, patches: Floats, functionals: Floats, covariance: Floats, residual: Floats, hiding: Floats | None
+    ) -> _Resultant:
+        """Of patches (n, k) beside a covariance (n, n), and beside columns (n, m) that hide it, of any size."""
+        from scipy.linalg import cho_factor, cho_solve
+
+        sizes = beliefs("unknown.sizes").tolist()
+        own, of_hiding = patches @ patches.T, None if hiding is None else hiding @ hiding.T
+        best: tuple[float, float, Any] | None = None
+        # metres and newtons have one size
+        units = np.sqrt(np.diag(covariance))
+        for size, other in itertools.product(sizes, (0.0,) if of_hiding is None else sizes):
+            total = covariance + size**2 * own + (0.0 if of_hiding is None else other**2 * of_hiding)
+            factor = cho_factor(total / np.outer(units, units))
+            log_density = -0.5 * float(residual / units @ cho_solve(factor, residual / units))
+            log_density -= float(np.log(np.diag(factor[0])).sum())
+            if best is None or log_density > best[0]:
+                best = log_density, size, factor
+        assert best is not None
+        _, size, factor = best
+        F = size**2 * functionals @ patches.T / units
+        mean = F @ cho_solve(factor, residual / units)
+        spread = size**2 * functionals @ functionals.T - F @ cho_solve(factor, F.T)
+        return cls(mean, spread, size)
+
+    def is_significant(self, part: slice) -> bool:
+        """Whether three of the components are not zero."""
+        from scipy.special import chdtri
+
+        square = float(self.mean[part] @ np.linalg.solve(self.covariance[part, part], self.mean[part]))
+        return square > float(chdtri(3, 1.0 - belief("checks.sure")))
 
 
 def _summed(sites: Floats) -> Floats:

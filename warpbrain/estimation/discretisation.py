@@ -25,6 +25,7 @@ held fixed, it would make the displacement change too little with a modulus, by 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -111,8 +112,8 @@ class DiscretisationError:
     ----------
     change : Change
         `d`: what elements of half the size change.
-    positions : (n, 3) array
-        Of the nodes, from the mean of all in units of their root mean square radius.
+    positions : (s n, 3) array
+        Of the nodes in each of s states, from the mean of all in units of their root mean square radius.
     part : float
         `k`: the part of the displacement on elements of half the size that is `d`, its projection.
     """
@@ -169,36 +170,42 @@ class DiscretisationError:
 
 
 def discretisation_error(
-    finer: FinerMesh, forward: Forward, state: State, derivatives: tuple[Floats, Floats]
+    finer: Sequence[FinerMesh], forward: Forward, state: State, derivatives: tuple[Floats, Floats]
 ) -> DiscretisationError:
-    """The error of a state, to first order in the parameters.
+    """The error of states, to first order in the parameters.
 
     Parameters
     ----------
-    finer : FinerMesh
+    finer : sequence of FinerMesh
+        For each of the s states one.
     forward : Forward
     state : State
-    derivatives : pair of (p, n, 3) arrays
-        Of its displacement and its reactions by the parameters.
+    derivatives : pair of (p, s n, 3) arrays
+        Of displacement and reactions by the parameters.
 
     Raises
     ------
     SolveError
         If there is no stable equilibrium on the finer mesh.
     """
-    theta, parameters = state.theta, forward.parameters
-    case = parameters.applied(forward.case, theta)
+    theta, parameters, count = state.theta, forward.parameters, len(forward.states)
+    errors, by_theta = [], []
     try:
-        error = finer.difference(case, theta, forward.system, state.u, state.reactions)
-        du, dR = finer.derivatives(theta, parameters.materials)
+        for mesh, one, u, R in zip(
+            finer, forward.states, np.split(state.u, count), np.split(state.reactions, count), strict=True
+        ):
+            errors.append(mesh.difference(parameters.applied(one.case, theta), theta, one.system, u, R))
+            by_theta.append(mesh.derivatives(theta, parameters.materials))
     except SolveError as failure:
         raise SolveError(
             f"the error of the mesh is not known: on elements of half the size {failure}; it can be left out, and "
             "then the estimate holds for this mesh only"
         ) from None
-    change = Change(error.u, error.reactions, theta, du - derivatives[0], dR - derivatives[1])
+    u, reactions = (np.concatenate([getattr(one, name) for one in errors]) for name in ("u", "reactions"))
+    du, dR = (np.concatenate(parts, axis=1) for parts in zip(*by_theta, strict=True))
+    change = Change(u, reactions, theta, du - derivatives[0], dR - derivatives[1])
     there = state.u + change.u
     part = float(np.vdot(change.u, there)) / max(float(np.vdot(there, there)), 1e-300)
-    points = case.remaining[0].points
+    points = forward.case.remaining[0].points
     away = points - points.mean(axis=0)
-    return DiscretisationError(change, away / root_mean_square(away), part)
+    return DiscretisationError(change, np.tile(away / root_mean_square(away), (count, 1)), part)

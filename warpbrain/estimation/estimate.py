@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpbrain.cases.case import Case
+from warpbrain.cases.moments import Moments
 from warpbrain.errors import SolveError
 from warpbrain.estimation.chain import Chain, run_chain
 from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, discretisation_error
@@ -122,14 +123,16 @@ class Estimation:
         self._registration = registration_of(case) if self.options.registration else None
         self._remarks = on_linear_elements(case.poisson, "an estimate")
         # what is wrong with recordings is known before anything is computed
-        self.observations = Observations.to_fit(case)
+        self.moments = Moments.recorded(case)
+        self.observations = Observations.to_fit(case, self.moments)
         self._remarks += self.observations.remarks
         self.parameters = Parameters.of(case)
         with self.seconds.of("prior"):
             self.prior = prior if isinstance(prior, Prior) else prior_of(case, prior, seed=self.options.seed)
             self.prior_modes = prior_modes(self.prior, self.parameters)
         with self.seconds.of("pre-processing"):
-            self.forward = Forward(case, self.prior_modes[0].gaussian.mean, device, elements_of_fits(case.poisson))
+            elements = elements_of_fits(case.poisson)
+            self.forward = Forward(case, self.prior_modes[0].gaussian.mean, device, elements, self.moments)
 
     def run(self) -> Posterior:
         """All stages."""
@@ -224,7 +227,7 @@ class Estimation:
         solves: dict[str, int],
     ) -> tuple[Estimate, ...]:
         before = self.forward.solves
-        finer = FinerMesh(self._device)
+        finer = [FinerMesh(self._device) for _ in self.forward.states]
         for _ in range(_MOST_ERRORS):
             self.listener.stage("error of the mesh: one equilibrium on elements of half the size")
             best = modes[0]
@@ -242,7 +245,7 @@ class Estimation:
                 f"the mesh is coarse: on elements of half the size displacements change by {100.0 * part:.0f} %; what "
                 "is left of its error may be larger than the intervals"
             )
-        solves["on elements of half the size"] = finer.solves
+        solves["on elements of half the size"] = sum(mesh.solves for mesh in finer)
         solves["estimate with the error of the mesh"] = self.forward.solves - before
         return modes
 

@@ -1,12 +1,19 @@
-"""From parameters to a state, again and again: one system, solved from the state before, and its derivatives."""
+"""From parameters to states, again and again: a system for each, solved from the state before, and their derivatives.
+
+A case has one state, or one for each time at which something else acts (`warpbrain.cases.moments`). Fields of several
+states stand one after the other.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
+from warpbrain.cases.moments import Moments
 from warpbrain.errors import SolveError
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.simulation.assumed import with_mechanisms
@@ -25,13 +32,13 @@ _DERIVATIVES = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """An equilibrium of a case.
+    """Equilibria of a case.
 
     Attributes
     ----------
     theta : (p,) array
-    u, reactions : (n, 3) array
-        Displacement [m], and what holds the constrained components [N].
+    u, reactions : (s n, 3) array
+        Displacement [m], and what holds the constrained components [N], in s states.
     newton_iterations : int
         That it took.
     passed_unstable : bool
@@ -57,11 +64,14 @@ class Forward:
     device : str, optional
     elements : str
         See `Model`.
+    moments : Moments, optional
+        Its states; the end alone unless given.
 
     Attributes
     ----------
     solves : int
         Equilibria that were asked for.
+    moments : Moments
     """
 
     def __init__(
@@ -70,42 +80,48 @@ class Forward:
         theta: Floats,
         device: str | None = None,
         elements: str = "tet4",
+        moments: Moments | None = None,
     ) -> None:
         self.parameters = Parameters.of(case)
         self.case = case
-        plain, _ = plain_model_of(self.parameters.applied(case, theta))
-        self._plain = replace(plain, elements=elements)
-        self.system = System(self._model(theta), device)
-        self._last: State | None = None
+        self.moments = Moments.of(case, ()) if moments is None else moments
+        self.states = tuple(OneState(one, self.parameters, theta, device, elements) for one in self.moments.cases)
         self.solves = 0
-        self._external = self.system.model.external_forces()
-        self._solvers = {
-            tolerance: EquilibriumSolver(self.system, EquilibriumOptions(tolerance=tolerance))
-            for tolerance in (EXACT, ROUGH)
-        }
-        self._sensitivity = SensitivitySolver(self.system, _DERIVATIVES)
+
+    @property
+    def system(self) -> System:
+        """Of the last state."""
+        return self.states[-1].system
 
     def solve(self, theta: Floats, start: Floats | None = None, tolerance: float = EXACT) -> State:
-        """The equilibrium of parameters.
+        """The equilibria of parameters.
 
         Parameters
         ----------
         theta : (p,) array
-        start : (n, 3) array, optional
-            A displacement [m] that is near to it; rest by default.
+        start : (s n, 3) array, optional
+            Displacements [m] that are near to them; rest by default.
         tolerance : {EXACT, ROUGH}
 
         Raises
         ------
         SolveError
-            If none is found.
+            If one is not found.
         """
-        self.solves += 1
-        self.system.set_model(self._model(theta))
-        found = self._solvers[tolerance].solve(self._external, start)
-        reactions = self.system.model.reactions(found.internal, self._external)
-        self._last = State(theta.copy(), found.u, reactions, len(found.history), found.unstable_iterations > 0)
-        return self._last
+        starts = [None] * len(self.states) if start is None else np.split(start, len(self.states))
+        found: list[State] = []
+        for state, near in zip(self.states, starts, strict=True):
+            self.solves += 1
+            found.append(state.solve(theta, found[-1].u if near is None and found else near, tolerance))
+        if len(found) == 1:
+            return found[0]
+        return State(
+            theta.copy(),
+            np.concatenate([one.u for one in found]),
+            np.concatenate([one.reactions for one in found]),
+            sum(one.newton_iterations for one in found),
+            any(one.passed_unstable for one in found),
+        )
 
     def solve_from(self, theta: Floats, starts: Sequence[Floats | None], tolerance: float = EXACT) -> State:
         """The same from the first of some starts that leads to it; a bold one may turn elements inside out."""
@@ -117,12 +133,50 @@ class Forward:
         return self.solve(theta, starts[-1], tolerance)
 
     def differentiate(self, state: State) -> Sensitivities:
+        """Derivatives (p, s n, 3) of displacement and reactions by the parameters; `SolveError` if one is unstable."""
+        displacements = np.split(state.u, len(self.states))
+        found = [one.differentiate(state.theta, u) for one, u in zip(self.states, displacements, strict=True)]
+        if len(found) == 1:
+            return found[0]
+        return Sensitivities(
+            np.concatenate([one.u for one in found], axis=1),
+            np.concatenate([one.reactions for one in found], axis=1),
+            tuple(sum(counts) for counts in zip(*(one.cg_iterations for one in found), strict=True)),
+        )
+
+
+class OneState:
+    """One state of a case as a function of the parameters of its tissues; parameters as of `Forward`."""
+
+    def __init__(self, case: Case, parameters: Parameters, theta: Floats, device: str | None, elements: str) -> None:
+        self.case, self._parameters = case, parameters
+        plain, _ = plain_model_of(parameters.applied(case, theta))
+        self._plain = replace(plain, elements=elements)
+        self.system = System(self._model(theta), device)
+        self._last: Floats | None = None
+        self._external = self.system.model.external_forces()
+        self._solvers = {
+            tolerance: EquilibriumSolver(self.system, EquilibriumOptions(tolerance=tolerance))
+            for tolerance in (EXACT, ROUGH)
+        }
+        self._sensitivity = SensitivitySolver(self.system, _DERIVATIVES)
+
+    def solve(self, theta: Floats, start: Floats | None, tolerance: float = EXACT) -> State:
+        """The equilibrium; `SolveError` if none is found."""
+        self.system.set_model(self._model(theta))
+        found = self._solvers[tolerance].solve(self._external, start)
+        reactions = self.system.model.reactions(found.internal, self._external)
+        self._last = found.u
+        return State(theta.copy(), found.u, reactions, len(found.history), found.unstable_iterations > 0)
+
+    def differentiate(self, theta: Floats, u: Floats) -> Sensitivities:
         """Derivatives of a state by its parameters; `SolveError` if it is unstable."""
-        if state is not self._last and any(term.memory for term in self.system.terms):
+        remembers = any(term.memory for term in self.system.terms)
+        if remembers and (self._last is None or not np.array_equal(u, self._last)):
             # what contacts have found is that of the state that was solved for last
-            state = self.solve(state.theta, state.u)
-        return self._sensitivity.solve(state.u, self._model, state.theta)
+            u = self.solve(theta, u).u
+        return self._sensitivity.solve(u, self._model, theta)
 
     def _model(self, theta: Floats) -> Model:
-        plain = replace(self._plain, materials=self.parameters.materials(theta))
+        plain = replace(self._plain, materials=self._parameters.materials(theta))
         return with_mechanisms(plain, self.case.mechanisms)

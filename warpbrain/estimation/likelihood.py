@@ -63,13 +63,14 @@ class Rows:
     @classmethod
     def of(cls, observations: Observations, parts: tuple[Residuals, ...]) -> Rows:
         """Those of residuals at a state: surfaces are looked at along their normals there."""
-        positions, sigma, points, first = [], [], [], 0
+        positions, sigma, points, times, first = [], [], [], [], 0
         for recording in observations.recordings:
             count = len(recording.rows)
             where = recording.positions if len(recording.positions) else np.full((count, 3), np.nan)
             positions.append(np.repeat(where, recording.size, axis=0))
             deviation = 1.0 / np.sqrt(recording.weights) if recording.sigma is None else recording.sigma
             sigma.append(np.repeat(deviation, recording.size))
+            times.append(np.repeat(recording.times, recording.size))
             numbers = first + np.arange(count * recording.size).reshape(count, recording.size)
             points += list(numbers) if recording.unit == "m" else []
             first += count * recording.size
@@ -81,6 +82,7 @@ class Rows:
             np.repeat(np.arange(len(parts)), sizes),
             np.array([recording.sigma is not None for recording in observations.recordings]),
             tuple(points),
+            np.concatenate(times),
         )
 
     def covariance(self, sigma: Floats) -> Floats:

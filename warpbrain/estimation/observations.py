@@ -1,7 +1,8 @@
 """Recordings of a case beside a state: residuals, and how they change with it.
 
-A residual is what was recorded less what was computed, at the end of the recording. Recordings whose role is ``"fit"``
-are one thing, those to ``"check"`` with another: no function here looks at both.
+A residual is what was recorded less what was computed, each row at its time (`warpbrain.cases.moments`), less what was
+computed at the time from which it is counted. Recordings whose role is ``"fit"`` are one thing, those to ``"check"``
+with another: no function here looks at both.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ import numpy as np
 from warpbrain.arrays import Floats, Ints
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
+from warpbrain.cases.enough import too_few_for_noise
+from warpbrain.cases.moments import Moments
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
 from warpbrain.mesh import TetMesh
@@ -25,10 +28,8 @@ from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.comparison import faces_of_set
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
-from warpbrain.recordings.times import rows_at
+from warpbrain.recordings.times import compared_rows, rows_at, times_of
 
-#: Noise can be estimated from no fewer residuals than this.
-_FEWEST = 10
 #: Sets of points whose places in a mesh are kept, the latest ones.
 _KEPT = 16
 
@@ -46,7 +47,10 @@ class Residuals:
     directions : (n, d, 3) array
         Along which lengths are; zero of forces.
     by_displacement, by_reactions : (n d, 3 N) SciPy CSR
-        Derivatives of what was computed by displacement and reactions.
+        Derivatives of what was computed by displacement and reactions at its time; with another sign, by those at the
+        time of the reference.
+    after, before : (n,) int array
+        Numbers of the states (`Moments`) that each row is compared with, and counted from; -1: from rest.
     """
 
     values: Floats
@@ -54,12 +58,20 @@ class Residuals:
     directions: Floats
     by_displacement: Any
     by_reactions: Any
+    after: Ints
+    before: Ints
 
     def derivative(self, du: Floats, dR: Floats) -> Floats:
-        """From derivatives of displacement and reactions (p, N, 3) to those of the values (n, d, p)."""
-        count = len(du)
-        change = self.by_displacement @ du.reshape(count, -1).T + self.by_reactions @ dR.reshape(count, -1).T
-        return -np.asarray(change).reshape(*self.values.shape, count)
+        """From derivatives of displacement and reactions (p, s N, 3) in s states to those of the values (n, d, p)."""
+        count, size, components = len(du), self.by_displacement.shape[1], self.values.shape[1]
+        u, R = du.reshape(count, -1, size), dR.reshape(count, -1, size)
+        total = np.zeros((self.values.size, count))
+        for number in range(u.shape[1]):
+            share = (self.after == number) * 1.0 - (self.before == number)
+            if share.any():
+                change = np.asarray(self.by_displacement @ u[:, number].T + self.by_reactions @ R[:, number].T)
+                total -= np.repeat(share, components)[:, None] * change
+        return total.reshape(*self.values.shape, count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +91,11 @@ class Observation:
         Components of a row.
     positions : (k, 3) array
         What a wrong registration moves [m]; empty for forces.
+    times, references : (n,) array
+        When each row was recorded, and the time from which it is counted [s]: infinity is the end, 0 is rest.
     at : callable
-        From displacement and reactions (N, 3), the centre of a rigid motion (3,) and that motion (6,) to `Residuals`.
+        From displacement and reactions (s N, 3) in s states, one after the other, the centre of a rigid motion (3,) and
+        that motion (6,) to `Residuals`.
     """
 
     name: str
@@ -91,6 +106,8 @@ class Observation:
     weights: Floats
     size: int
     positions: Floats
+    times: Floats
+    references: Floats
     at: Callable[[Floats, Floats, Floats, Floats], Residuals]
 
 
@@ -109,14 +126,14 @@ class Observations:
     remarks: tuple[str, ...]
 
     @classmethod
-    def to_fit(cls, case: Case, time: float | None = None) -> Observations:
+    def to_fit(cls, case: Case, moments: Moments | None = None) -> Observations:
         """The recordings that a case is fitted to.
 
         Parameters
         ----------
         case : Case
-        time : float, optional
-            [s] The end of each recording if absent.
+        moments : Moments, optional
+            States that there are; those of all times at which something was recorded unless given.
 
         Raises
         ------
@@ -127,25 +144,22 @@ class Observations:
         if not any(recording.role == "fit" for recording in case.recordings):
             checks = f"; its {len(case.recordings)} have role = 'check'" if case.recordings else ""
             raise InputError(f"{case.path}: no [[recording]] to estimate from{checks}")
-        found = cls._of(case, "fit", time)
+        found = cls._of(case, "fit", moments)
         if not found.recordings:
             raise InputError(f"{case.path}: nothing to estimate from: {'; '.join(found.remarks)}")
-        for observation in found.recordings:
-            count = observation.size * len(observation.rows)
-            if observation.sigma is None and count < _FEWEST:
-                raise InputError(
-                    f"recording '{observation.name}' holds {count} numbers: too few to estimate their noise from, "
-                    f"which takes {_FEWEST}; give its sigma"
-                )
+        for recording in case.recordings:
+            if recording.role == "fit" and (why := too_few_for_noise(case, recording)):
+                raise InputError(why)
         return found
 
     @classmethod
-    def to_check(cls, case: Case) -> Observations:
+    def to_check(cls, case: Case, moments: Moments | None = None) -> Observations:
         """The recordings that only score what was estimated without them; as `to_fit`."""
-        return cls._of(case, "check", None)
+        return cls._of(case, "check", moments)
 
     @classmethod
-    def _of(cls, case: Case, role: str, time: float | None) -> Observations:
+    def _of(cls, case: Case, role: str, moments: Moments | None) -> Observations:
+        moments = Moments.recorded(case) if moments is None else moments
         each, remarks = [], []
         for recording in case.recordings:
             if recording.role != role:
@@ -155,7 +169,13 @@ class Observations:
                     f"recording '{recording.name}' says nothing of tissue: the force of '{recording.boundary}' is given"
                 )
                 continue
-            each.append(_observation(case, recording, time))
+            if recording.reference is not None and recording.reference not in moments.times:
+                remarks.append(
+                    f"recording '{recording.name}' is counted from {recording.reference:g} s, and tissue that goes on "
+                    "by itself is looked at in the end alone"
+                )
+                continue
+            each.append(_observation(case, recording, moments))
         return cls(tuple(each), tuple(remarks))
 
     @property
@@ -171,9 +191,9 @@ class Observations:
 
         Parameters
         ----------
-        u : (N, 3) array
-            Displacement [m].
-        reactions : (N, 3) array
+        u : (s N, 3) array
+            Displacement [m] in s states, one after the other.
+        reactions : (s N, 3) array
             Of the constrained components [N].
         centre : (3,) array, optional
             Of a rigid motion [m]; that of these recordings by default.
@@ -185,40 +205,98 @@ class Observations:
         return tuple(observation.at(u, reactions, about, by) for observation in self.recordings)
 
 
-def _observation(case: Case, recording: Recording, time: float | None) -> Observation:
-    if isinstance(recording, PointsRecording):
-        return _points(case, recording, time)
-    if isinstance(recording, SurfaceRecording):
-        return _surface(case, recording, time)
-    if isinstance(recording, ForceRecording):
-        return _force(case, recording, time)
-    raise InputError(f"recording '{recording.name}': a {recording.kind} is of a specimen, not of a deformed body")
+#: From a displacement and reactions (N, 3), a centre and a motion: what `Residuals` begins with, of some rows.
+_At = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats, Floats, Any, Any]]
 
 
-def _points(case: Case, recording: PointsRecording, time: float | None) -> Observation:
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Rows of a recording that are compared with one state."""
+
+    rows: Ints
+    weights: Floats
+    size: int
+    positions: Floats
+    at: _At
+
+
+def _observation(case: Case, recording: Recording, moments: Moments) -> Observation:
+    makers: dict[type[Recording], tuple[str, Callable[[Case, Any, Ints], _Part]]] = {
+        PointsRecording: ("m", _points),
+        SurfaceRecording: ("m", _surface),
+        ForceRecording: ("N", _force),
+    }
+    if type(recording) not in makers:
+        raise InputError(f"recording '{recording.name}': a {recording.kind} is of a specimen, not of a deformed body")
+    unit, make = makers[type(recording)]
+    rows, times = compared_rows(recording), times_of(recording)
+    if not set(times[rows].tolist()) <= set(moments.times):
+        # of a body that goes on by itself there is an end alone
+        rows = rows_at(recording)  # type: ignore[arg-type]
+        times = np.full(len(times), np.inf)
+    if len(rows) == 0:
+        zero = isinstance(recording, PointsRecording) and recording.weights is not None
+        reason = "the weight of every point is zero" if zero else "no row is of a time after 0 s"
+        raise InputError(f"recording '{recording.name}': {reason}")
+    states = np.array([moments.number(time) for time in times[rows].tolist()])
+    start = -1 if recording.reference is None else moments.number(recording.reference)
+    numbers = np.unique(states).tolist()
+    parts = [make(case, recording, rows[states == number]) for number in numbers]
+    rows = np.concatenate([part.rows for part in parts])
+    weights = np.concatenate([part.weights for part in parts])
+    after = np.repeat(numbers, [len(part.rows) for part in parts])
+    before = np.full(len(rows), start)
+
+    def at(u: Floats, reactions: Floats, centre: Floats, motion: Floats) -> Residuals:
+        from scipy.sparse import vstack
+
+        size = len(case.remaining[0].points)
+        fields = np.stack([u.reshape(-1, size, 3), reactions.reshape(-1, size, 3)])
+        blocks = []
+        for number, part in zip(numbers, parts, strict=True):
+            moved = fields[:, number] if start < 0 else fields[:, number] - fields[:, start]
+            blocks.append(part.at(moved[0], moved[1], centre, motion))
+        values, rigid, directions = (np.concatenate([block[k] for block in blocks]) for k in range(3))
+        by_displacement, by_reactions = (
+            blocks[0][k] if len(blocks) == 1 else vstack([block[k] for block in blocks]).tocsr() for k in (3, 4)
+        )
+        return Residuals(values, rigid, directions, by_displacement, by_reactions, after, before)
+
+    return Observation(
+        recording.name,
+        recording.kind,
+        unit,
+        rows,
+        _sigma(recording, rows, weights),
+        weights,
+        parts[0].size,
+        np.concatenate([part.positions for part in parts]),
+        times[rows],
+        np.full(len(rows), recording.reference or 0.0),
+        at,
+    )
+
+
+def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Part:
     from scipy.sparse import csr_matrix
 
     mesh = case.remaining[0]
-    rows = rows_at(recording, time)
     weights = np.ones(len(rows)) if recording.weights is None else recording.weights[rows]
     if not (np.isfinite(weights) & (weights >= 0.0)).all():
         raise InputError(f"recording '{recording.name}': a weight is negative or no number")
     rows, weights = rows[weights > 0.0], weights[weights > 0.0]
-    if len(rows) == 0:
-        raise InputError(f"recording '{recording.name}': the weight of every point is zero")
     matrix, by_displacement = _located(mesh, recording.points[rows].astype(np.float64).tobytes())
     nothing = csr_matrix(by_displacement.shape)
     positions = recording.points[rows] + recording.displacement[rows]
 
     directions = np.tile(np.eye(3), (len(rows), 1, 1))
 
-    def at(u: Floats, _reactions: Floats, centre: Floats, motion: Floats) -> Residuals:
+    def at(u: Floats, _reactions: Floats, centre: Floats, motion: Floats) -> tuple[Floats, Floats, Floats, Any, Any]:
         displacement = moved_back(positions, motion, centre) - recording.points[rows]
         rigid = -moved_back_columns(positions, motion, centre)
-        return Residuals(displacement - matrix @ u, rigid, directions, by_displacement, nothing)
+        return displacement - matrix @ u, rigid, directions, by_displacement, nothing
 
-    sigma = _sigma(recording, rows, weights)
-    return Observation(recording.name, recording.kind, "m", rows, sigma, weights, 3, positions, at)
+    return _Part(rows, weights, 3, positions, at)
 
 
 @lru_cache(maxsize=_KEPT)
@@ -233,17 +311,16 @@ def _located(mesh: TetMesh, points: bytes) -> tuple[Any, Any]:
     return matrix, kron(matrix, eye(3), format="csr")
 
 
-def _surface(case: Case, recording: SurfaceRecording, time: float | None) -> Observation:
+def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Part:
     from scipy.sparse import csr_matrix
 
     mesh = case.remaining[0]
-    rows = rows_at(recording, time)
     positions = recording.points[rows]
     faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
     size = float(np.ptp(mesh.points, axis=0).max())
     shape = (len(rows), 3 * len(mesh.points))
 
-    def at(u: Floats, _reactions: Floats, centre: Floats, motion: Floats) -> Residuals:
+    def at(u: Floats, _reactions: Floats, centre: Floats, motion: Floats) -> tuple[Floats, Floats, Floats, Any, Any]:
         moved, points = mesh.points + u, moved_back(positions, motion, centre)
         closest = closest_points(points, moved, faces)
         nodes, weights = faces[closest.face], closest.weights
@@ -263,18 +340,15 @@ def _surface(case: Case, recording: SurfaceRecording, time: float | None) -> Obs
         by_displacement = csr_matrix((shares.ravel(), (np.repeat(np.arange(len(rows)), 9), columns.ravel())), shape)
         rigid = -np.einsum("nj,njk->nk", directions, moved_back_columns(positions, motion, centre))[:, None, :]
         values = (side * closest.distance)[:, None]
-        return Residuals(values, rigid, directions[:, None, :], by_displacement, csr_matrix(shape))
+        return values, rigid, directions[:, None, :], by_displacement, csr_matrix(shape)
 
-    ones = np.ones(len(rows))
-    sigma = _sigma(recording, rows, ones)
-    return Observation(recording.name, recording.kind, "m", rows, sigma, ones, 1, positions, at)
+    return _Part(rows, np.ones(len(rows)), 1, positions, at)
 
 
-def _force(case: Case, recording: ForceRecording, time: float | None) -> Observation:
+def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Part:
     from scipy.sparse import csr_matrix
 
     nodes = case.remaining[0].node_sets[case.boundary(recording.boundary).nodes]
-    rows = rows_at(recording, time)
     recorded = np.isfinite(recording.force[rows]).all(axis=0)
     size = int(recorded.sum())
     if size == 0:
@@ -289,13 +363,11 @@ def _force(case: Case, recording: ForceRecording, time: float | None) -> Observa
     by_reactions = csr_matrix((np.ones(len(columns)), (which, columns)), (size * len(rows), 3 * len(nodes)))
     nothing = csr_matrix(by_reactions.shape)
 
-    def at(_u: Floats, reactions: Floats, _centre: Floats, _motion: Floats) -> Residuals:
+    def at(_u: Floats, reactions: Floats, _centre: Floats, _motion: Floats) -> tuple[Floats, Floats, Floats, Any, Any]:
         values = force - reactions[nodes].sum(axis=0)[recorded]
-        return Residuals(values, np.zeros((len(rows), size, 6)), np.zeros((len(rows), size, 3)), nothing, by_reactions)
+        return values, np.zeros((len(rows), size, 6)), np.zeros((len(rows), size, 3)), nothing, by_reactions
 
-    ones = np.ones(len(rows))
-    sigma = _sigma(recording, rows, ones)
-    return Observation(recording.name, recording.kind, "N", rows, sigma, ones, size, np.empty((0, 3)), at)
+    return _Part(rows, np.ones(len(rows)), size, np.empty((0, 3)), at)
 
 
 def _sigma(recording: Recording, rows: Ints, weights: Floats) -> Floats | None:

@@ -191,7 +191,7 @@ class Posterior:
     def predictions(self) -> tuple[Prediction, ...]:
         """Recordings that were fitted, then those that check; these are looked at here for the first time."""
         fitted = self.best.problem.observations
-        both = (("fit", fitted), ("check", Observations.to_check(self.case)))
+        both = (("fit", fitted), ("check", Observations.to_check(self.case, self.best.problem.forward.moments)))
         return tuple(
             one
             for role, observations in both

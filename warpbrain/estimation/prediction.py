@@ -9,6 +9,7 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.case import Case
+from warpbrain.cases.moments import Moments
 from warpbrain.estimation.likelihood import Noise, Rows
 from warpbrain.estimation.modes import Estimate
 from warpbrain.estimation.observations import Observation, Observations, Residuals
@@ -125,8 +126,9 @@ def predictions(
     rest = np.zeros_like(point.state.u)
     seen = problem.nuisances.observed(point.state, point.nuisances)
     before, parts = observations.at(rest, rest, centre), observations.at(*seen, centre, motion)
-    run = compared(case, point.state.u, point.state.reactions)
-    fitted = compared(realigned(case, motion, centre), *seen)
+    moments = problem.forward.moments
+    run = compared(case, point.state.u, point.state.reactions, moments)
+    fitted = compared(realigned(case, motion, centre), *seen, moments)
     found = []
     for number, (observation, first, part) in enumerate(zip(observations.recordings, before, parts, strict=True)):
         jacobian = problem.nuisances.jacobian(
@@ -170,9 +172,13 @@ def _unseen(observation: Observation, part: Residuals, jacobian: Floats, joint: 
     return replace(noise, inflation=found.inflation)
 
 
-def compared(case: Case, u: Floats, reactions: Floats) -> Mapping[str, Comparison]:
-    """Recordings by name beside displacement and reactions (N, 3), as `warpbrain run` compares them."""
-    return {one.name: one for one in observe(case, Found(case.remaining[0], u, reactions)).comparisons}
+def compared(case: Case, u: Floats, reactions: Floats, moments: Moments) -> Mapping[str, Comparison]:
+    """Recordings by name beside displacement and reactions (s N, 3) at moments, as `warpbrain run` compares them."""
+    count = len(moments.cases)
+    pairs = zip(np.split(u, count), np.split(reactions, count), strict=True)
+    found = [Found(case.remaining[0], *state) for state in pairs]
+    others = {time: found[number] for time, number in zip(moments.times, moments.numbers, strict=True)}
+    return {one.name: one for one in observe(case, found[-1], others=others).comparisons}
 
 
 def coverage(residuals: Floats, deviation: Floats, gross: Bools) -> tuple[float, ...] | None:

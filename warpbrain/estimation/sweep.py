@@ -14,6 +14,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups
+from warpbrain.cases.moments import Moments
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.observations import Observations
@@ -110,7 +111,8 @@ def sweep(
     InputError
         If there is nothing to compare with, or a tissue has no group, or one that the model has seen no study of.
     """
-    observations = Observations.to_fit(case)
+    moments = Moments.recorded(case)
+    observations = Observations.to_fit(case, moments)
     unit = "m" if any(observation.unit == "m" for observation in observations.recordings) else "N"
     parameters = Parameters.of(case)
     require_groups(case, [label for labels in parameters.labels for label in labels], model)
@@ -129,11 +131,11 @@ def sweep(
         error, reason = None, ""
         try:
             parameters.require_possible(theta)
-            forward = forward or Forward(case, theta, device)
+            forward = forward or Forward(case, theta, device, moments=moments)
             state = forward.solve_from(theta, (near, None))
             if not state.passed_unstable:
                 near = state.u
-            beside = compared(case, state.u, state.reactions)
+            beside = compared(case, state.u, state.reactions, moments)
             error = by_unit((one.unit, beside[one.name].residuals_after) for one in observations.recordings)[unit]
         except (InputError, SolveError) as failure:
             reason = str(failure)

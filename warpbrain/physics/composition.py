@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism, Removing
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.potential import potential
@@ -88,9 +89,10 @@ def pairs() -> list[Pair]:
 def _pair(one: type[Mechanism], other: type[Mechanism]) -> Pair:
     kinds = (one.kind, other.kind)
     if one is other and not one.several:
-        return Pair(
-            kinds, "", "", f"a case has one {one.kind}, a second one would act twice; that of `--with` takes its place"
-        )
+        at_a_time = " at a time" if issubclass(one, Load) else ""
+        turns = "; several take turns by their ramps" if at_a_time else ""
+        words = f"a case has one {one.kind}{at_a_time}, a second one would act twice{turns}"
+        return Pair(kinds, "", "", f"{words}; that of `--with` takes its place")
     remark = one.together.get(other.kind, "") or other.together.get(one.kind, "")
     refused = one.excluded(other) or other.excluded(one)
     return Pair(kinds, potential([one.enters, other.enters]), remark, refused)

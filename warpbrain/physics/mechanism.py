@@ -212,6 +212,8 @@ class Mechanism(Ramped, abc.ABC):
     quadratic: ClassVar[bool] = False
     #: Whether it is there or not, and nothing in between: its effect is a difference, not a derivative at nothing.
     switches: ClassVar[bool] = False
+    #: Whether what it does changes in time while loads do not.
+    changes_by_itself: ClassVar[bool] = False
     #: Whether a case can have several.
     several: ClassVar[bool] = False
     #: Whether it means something in a laboratory specimen between its grips.

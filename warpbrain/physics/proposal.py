@@ -7,9 +7,9 @@ proposals of a kind (places, levels, node sets), and averages over them: that is
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +94,8 @@ class Situation:
         [m]
     axes : (str, str, str)
         How x, y and z run, for people.
+    named : tuple of (str, (k, 3) int array)
+        Every part of the surface that can move, with what people call it: what something acts on already, too.
     """
 
     mesh: TetMesh
@@ -109,6 +111,25 @@ class Situation:
     surface_sites: Floats
     spacing: float
     axes: tuple[str, str, str] = ("from left to right", "from posterior to anterior", "from inferior to superior")
+    named: tuple[tuple[str, NDArray[np.int32]], ...] = ()
+
+    @cached_property
+    def _names(self) -> tuple[Any, list[str]]:
+        """A tree of the middles of triangles, and the name of each: that of the smallest part that it belongs to."""
+        from scipy.spatial import cKDTree
+
+        names: dict[bytes, tuple[NDArray[np.int32], str]] = {}
+        for words, faces in sorted(self.named, key=lambda part: -len(part[1])):
+            names.update({row.tobytes(): (row, words) for row in np.sort(faces, axis=1)})
+        rows = np.array([row for row, _ in names.values()], dtype=np.int64).reshape(-1, 3)
+        return cKDTree(self.mesh.points[rows].mean(axis=1)), [words for _, words in names.values()]
+
+    def surface_at(self, point: Floats) -> str:
+        """What people call the surface that is nearest to a point (3,) [m]; empty if nothing can move."""
+        if not self.named:
+            return ""
+        tree, words = self._names
+        return words[int(tree.query(point)[1])]
 
     def require_new(self, kind: str) -> None:
         """Raise `NotTestableError` if the case assumes a mechanism already."""
@@ -135,6 +156,87 @@ class Tests:
     loads: int
     tension: bool
     compression: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Varying:
+    """Coefficients of a proposal that are smooth functions of time.
+
+    A coefficient that varies is `mean + sum_j modes_j(t) c_j`, with modes of a Gaussian process.
+
+    Attributes
+    ----------
+    base : Proposal
+        What acts at one time.
+    times : (m,) array
+        [s], increasing: at which states are looked at; the last stands for the end.
+    modes : (m, r) array
+        At these times.
+    """
+
+    base: Proposal
+    times: Floats
+    modes: Floats
+
+    @property
+    def fixed(self) -> tuple[int, ...]:
+        """Numbers of the coefficients that do not vary; they come first."""
+        return tuple(k for k in range(len(self.base)) if k not in self.base.varying)
+
+    def modes_at(self, time: float | Floats) -> Floats:
+        """Modes at times (...) [s], linear between the known ones: (..., r)."""
+        return np.stack([np.interp(time, self.times, mode) for mode in self.modes.T], axis=-1)
+
+    def at(self, c: Floats, time: float) -> Floats:
+        """Coefficients (k,) of what acts at a time."""
+        found = self.base.mean.copy()
+        found[list(self.fixed)] = c[: len(self.fixed)]
+        courses = c[len(self.fixed) :].reshape(len(self.base.varying), -1)
+        found[list(self.base.varying)] += courses @ self.modes_at(time)
+        return found
+
+    def mechanisms(self, c: Floats) -> tuple[Mechanism, ...]:
+        """What acts over time, each with a ramp."""
+        by_time = np.array([self.at(c, time) for time in self.times.tolist()])
+        if self.base.in_turns:
+            acting = [self.base.make(coefficients) for coefficients in by_time]
+            # one after the other, each growing as the one before it goes
+            turns = zip(acting, np.eye(len(self.times)), strict=True)
+            return tuple(self._ramped(mechanism, hat * mechanism.factor()) for mechanism, hat in turns)
+        found = []
+        for number, sizes in enumerate(by_time.T):
+            largest = float(sizes[np.argmax(np.abs(sizes))])
+            if largest != 0.0 or number == 0:
+                alone = self.base.make(largest * np.eye(len(self.base))[number])
+                found.append(self._ramped(alone, sizes / largest if largest else np.zeros_like(sizes)))
+        return tuple(found)
+
+    def _ramped(self, mechanism: Mechanism, factors: Floats) -> Mechanism:
+        return replace(mechanism, ramp=tuple(zip(self.times.tolist(), factors.tolist(), strict=True)))
+
+    def proposal(self) -> Proposal:
+        """The base with coefficients for each mode in the place of one that varies."""
+        base, count = self.base, self.modes.shape[1]
+        fixed, varying = list(self.fixed), list(base.varying)
+
+        def wide(values: Floats, modes: Floats) -> Floats:
+            return np.concatenate([values[fixed], np.repeat(modes[varying], count)])
+
+        def elsewhere(centre: Floats, radius: float) -> Proposal:
+            assert base.elsewhere is not None
+            return replace(self, base=base.elsewhere(centre, radius)).proposal()
+
+        none = np.zeros(len(base))
+        return replace(
+            base,
+            make=lambda c: base.make(self.at(c, float(self.times[-1]))),
+            mean=wide(base.mean, none),
+            sd=wide(base.sd, base.sd),
+            start=wide(base.start, none) if len(base.start) else base.start,
+            nothing=wide(base.without, none),
+            elsewhere=None if base.elsewhere is None else elsewhere,
+            over_time=self,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +272,14 @@ class Proposal:
         Where it acts [m], if somewhere.
     region : str
         Where it acts in words.
+    varying : tuple of int
+        Numbers of the coefficients that may be functions of time: all of them where it is in proportion to them.
+    in_turns : bool
+        Whether what acts at one time gives way to what acts at the next; else each coefficient has a ramp.
+    only_over_time : bool
+        Whether it is looked for with a course alone.
+    over_time : Varying or None
+        What its coefficients mean, if some are functions of time: `make` is what acts in the end.
     """
 
     make: Callable[[Floats], Mechanism]
@@ -186,6 +296,14 @@ class Proposal:
     centre: Floats | None = None
     radius: float | None = None
     region: str = ""
+    varying: tuple[int, ...] = ()
+    in_turns: bool = False
+    only_over_time: bool = False
+    over_time: Varying | None = None
+
+    def acting(self, c: Floats) -> tuple[Mechanism, ...]:
+        """The mechanisms of coefficients (k,): one, or with ramps what acts over time."""
+        return (self.make(c),) if self.over_time is None else self.over_time.mechanisms(c)
 
     @classmethod
     def of_one(
@@ -213,7 +331,12 @@ class Proposal:
 
     @classmethod
     def in_balls(
-        cls, make: Callable[[float, Place, float], Mechanism], sd: float, radii: Sequence[float], situation: Situation
+        cls,
+        make: Callable[[float, Place, float], Mechanism],
+        sd: float,
+        radii: Sequence[float],
+        situation: Situation,
+        varying: tuple[int, ...] = (),
     ) -> list[Proposal]:
         """Smooth ones of one coefficient, nothing at zero, in balls of some radii [m] throughout the tissue.
 
@@ -224,12 +347,13 @@ class Proposal:
         sd : float
         radii : sequence of float
         situation : Situation
+        varying : tuple of int
         """
 
         def ball(centre: Floats, radius: float) -> Proposal:
             x, y, z = centre.tolist()
             one = partial(_placed, make, (x, y, z), radius)
-            return cls.of_one(one, 0.0, sd, "smooth", elsewhere=ball, centre=centre, radius=radius)
+            return cls.of_one(one, 0.0, sd, "smooth", elsewhere=ball, centre=centre, radius=radius, varying=varying)
 
         return [ball(site, radius) for site in situation.volume_sites for radius in radii]
 

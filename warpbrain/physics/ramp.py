@@ -11,6 +11,9 @@ import numpy as np
 
 from warpbrain.errors import InputError
 
+#: Rounding of factors that users write.
+_ROUNDING = 1e-6
+
 
 @dataclass(frozen=True, kw_only=True)
 class Ramped:
@@ -37,3 +40,11 @@ class Ramped:
             return 1.0
         times, factors = zip(*self.ramp, strict=True)
         return float(np.interp(time, times, factors))
+
+
+def take_turns(ramped: Sequence[Ramped]) -> bool:
+    """Whether they are together no more than one of them in full: their factors add up to 1, or the largest of all."""
+    # a sum of absolute values of linear functions is largest at an end of a piece
+    times = sorted({time for one in ramped for time, _ in one.ramp})
+    sizes = np.array([[abs(one.factor(time)) for one in ramped] for time in (*times, math.inf)])
+    return bool(sizes.sum(axis=1).max() <= max(1.0, float(sizes.max())) * (1.0 + _ROUNDING))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -116,6 +117,7 @@ def compare_points(
     u: ArrayLike,
     time: float | None = None,
     location: Location | None = None,
+    rows: NDArray[np.int64] | None = None,
 ) -> Comparison:
     """Compare displacements of tracked points.
 
@@ -130,13 +132,15 @@ def compare_points(
         Of the state [s]; the recording's end if left out, see `rows_at`.
     location : Location, optional
         Of all points of the recording in the mesh, if it is known already.
+    rows : (n,) int array, optional
+        Those that are compared, whatever the time.
 
     Raises
     ------
     InputError
         If nothing was recorded at that time.
     """
-    rows = rows_at(recording, time)
+    rows = rows_at(recording, time) if rows is None else rows
     place = locate(mesh.points, mesh.tetrahedra, recording.points[rows]) if location is None else location.at(rows)
     before = recording.displacement[rows]
     after = before - place.interpolate(u)
@@ -157,7 +161,13 @@ def compare_points(
     )
 
 
-def compare_surface(recording: SurfaceRecording, mesh: TetMesh, u: ArrayLike, time: float | None = None) -> Comparison:
+def compare_surface(
+    recording: SurfaceRecording,
+    mesh: TetMesh,
+    u: ArrayLike,
+    time: float | None = None,
+    rows: NDArray[np.int64] | None = None,
+) -> Comparison:
     """Compare a recorded surface with the moved faces of its node set, both ways.
 
     Parameters are those of `compare_points`. The way back goes from the nodes of these faces to the recorded triangles,
@@ -169,7 +179,7 @@ def compare_surface(recording: SurfaceRecording, mesh: TetMesh, u: ArrayLike, ti
         If the mesh has no such node set, no boundary triangle has all its nodes in it, or nothing was recorded at that
         time.
     """
-    rows = rows_at(recording, time)
+    rows = rows_at(recording, time) if rows is None else rows
     points = recording.points[rows]
     faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
     members = np.unique(faces)
@@ -194,7 +204,12 @@ def compare_surface(recording: SurfaceRecording, mesh: TetMesh, u: ArrayLike, ti
     )
 
 
-def compare_force(recording: ForceRecording, reaction: ArrayLike, time: float | None = None) -> Comparison:
+def compare_force(
+    recording: ForceRecording,
+    reaction: ArrayLike,
+    time: float | None = None,
+    rows: NDArray[np.int64] | None = None,
+) -> Comparison:
     """Compare the resultant of a boundary; components that were not recorded do not count.
 
     Parameters
@@ -202,7 +217,7 @@ def compare_force(recording: ForceRecording, reaction: ArrayLike, time: float | 
     recording : ForceRecording
     reaction : (3,) array
         Force of the boundary on the tissue [N].
-    time : float, optional
+    time, rows : optional
         As in `compare_points`.
 
     Raises
@@ -210,7 +225,7 @@ def compare_force(recording: ForceRecording, reaction: ArrayLike, time: float | 
     InputError
         If no component of the force was recorded, or nothing at that time.
     """
-    rows = rows_at(recording, time)
+    rows = rows_at(recording, time) if rows is None else rows
     before = recording.force[rows]
     recorded = np.isfinite(before).all(axis=0)
     if not recorded.any():
@@ -227,6 +242,29 @@ def compare_force(recording: ForceRecording, reaction: ArrayLike, time: float | 
         residuals_before=before,
         residuals_after=after,
         noise=None if recording.sigma is None else float(np.sqrt(recorded.sum())) * recording.sigma,
+    )
+
+
+def joined(parts: Sequence[Comparison]) -> Comparison:
+    """Comparisons of one recording with states of several times as one; of a surface the way back is of the last."""
+    if len(parts) == 1:
+        return parts[0]
+    before, after = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("residuals_before", "residuals_after")
+    )
+    recorded = np.isfinite(before).all(axis=0)
+    unit = parts[-1].unit
+    noises = [part.noise for part in parts]
+    squares = [part.count * noise**2 for part, noise in zip(parts, noises, strict=True) if noise is not None]
+    rows = np.concatenate([part.rows for part in parts])
+    return replace(
+        parts[-1],
+        rows=rows,
+        before=Error.of(before[:, recorded], unit),
+        after=Error.of(after[:, recorded], unit),
+        residuals_before=before,
+        residuals_after=after,
+        noise=float(np.sqrt(sum(squares) / len(rows))) if len(squares) == len(parts) else None,
     )
 
 

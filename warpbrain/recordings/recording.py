@@ -28,6 +28,8 @@ class Recording:
     sigma : float or None
         Noise of one component, one standard deviation, in the unit of what was recorded (m, N, Pa or N m); None: to be
         estimated.
+    reference: float or None
+        Time [s] of the loaded state from which displacements and forces are counted; None: rest.
     """
 
     kind: ClassVar[str]
@@ -35,6 +37,7 @@ class Recording:
     file: str
     role: str = "fit"
     sigma: float | None = None
+    reference: float | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -1,4 +1,4 @@
-"""Which rows of a recording a state is compared with."""
+"""Which rows of a recording a state is compared with, and how many numbers it holds."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from warpbrain.errors import InputError
 from warpbrain.recordings.recording import (
     ForceRecording,
     PointsRecording,
+    Recording,
     SurfaceRecording,
     TestRecording,
 )
@@ -17,6 +18,40 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 AnyRecording = PointsRecording | SurfaceRecording | ForceRecording | TestRecording
+
+
+def times_of(recording: Recording) -> Floats:
+    """Time (n,) [s] of each row; infinite of the end, where a recording has no times, or none after the loads came."""
+    times = getattr(recording, "time", None)
+    if times is None or not (times > 0.0).any():
+        return np.full(_count(recording), np.inf)
+    return np.asarray(times, dtype=np.float64)
+
+
+def compared_rows(recording: Recording) -> Rows:
+    """Numbers (k,) of the rows that states are compared with, in the order of their times.
+
+    Not of the time 0 or earlier, when nothing acts yet, nor of the time of the reference, which differs from itself by
+    nothing; nor tracked points of weight zero.
+    """
+    times = times_of(recording)
+    counts = times > 0.0
+    if recording.reference is not None:
+        counts &= times != recording.reference
+    weights = getattr(recording, "weights", None)
+    if weights is not None:
+        counts &= weights != 0.0
+    rows = np.flatnonzero(counts)
+    return np.asarray(rows[np.argsort(times[rows], kind="stable")], dtype=np.int64)
+
+
+def components_of(recording: Recording) -> int:
+    """How many numbers a row holds: of points 3, of a surface its distance, of a force what was recorded of it."""
+    if isinstance(recording, PointsRecording):
+        return 3
+    if isinstance(recording, ForceRecording):
+        return int(np.isfinite(recording.force).all(axis=0).sum())
+    return 1
 
 
 def rows_at(recording: AnyRecording, time: float | None = None) -> Rows:
@@ -48,8 +83,7 @@ def rows_at(recording: AnyRecording, time: float | None = None) -> Rows:
         if time is not None:
             raise InputError(f"recording '{recording.name}' has no times: it can be compared with an end state only")
         single = isinstance(recording, TestRecording)
-        count = len(recording.imposed if isinstance(recording, TestRecording) else _rows(recording))
-        return np.arange(count - 1 if single else 0, count)
+        return np.arange(_count(recording) - 1 if single else 0, _count(recording))
     ids = recording.ids if isinstance(recording, PointsRecording) else None
     groups = np.zeros(len(times), dtype=np.int64) if ids is None else np.unique(ids, return_inverse=True)[1]
     apart = -times if time is None else np.abs(times - time)
@@ -63,8 +97,9 @@ def rows_at(recording: AnyRecording, time: float | None = None) -> Rows:
     return rows
 
 
-def _rows(recording: PointsRecording | SurfaceRecording | ForceRecording) -> Floats:
-    return recording.force if isinstance(recording, ForceRecording) else recording.points
+def _count(recording: Recording) -> int:
+    names = ("imposed", "force", "points")
+    return len(next(getattr(recording, name) for name in names if hasattr(recording, name)))
 
 
 def _half_interval(times: Floats) -> float:

@@ -1,9 +1,11 @@
-"""Every recording of a case beside a simulated state."""
+"""Every recording of a case beside simulated states."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -11,10 +13,15 @@ from numpy.typing import NDArray
 
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
+from warpbrain.cases.moments import Moments, goes_on
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
-from warpbrain.recordings.comparison import Comparison, compare_force, compare_points, compare_surface
+from warpbrain.recordings.comparison import Comparison, compare_force, compare_points, compare_surface, joined
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
+from warpbrain.recordings.times import compared_rows, rows_at, times_of
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
 
 class State(Protocol):
@@ -25,11 +32,11 @@ class State(Protocol):
         """The simulated mesh, undeformed."""
 
     @property
-    def u(self) -> NDArray[np.float64]:
+    def u(self) -> Floats:
         """Displacement [m], shape (n, 3)."""
 
     @property
-    def reactions(self) -> NDArray[np.float64]:
+    def reactions(self) -> Floats:
         """What holds the constrained components [N], shape (n, 3)."""
 
 
@@ -49,8 +56,13 @@ class Observed:
     skipped: tuple[str, ...]
 
 
-def observe(case: Case, result: State, time: float | None = None) -> Observed:
-    """Compare a state with the recordings of its case.
+def observe(
+    case: Case, result: State, time: float | None = None, others: Mapping[float, State] | None = None
+) -> Observed:
+    """Compare states with the recordings of their case.
+
+    Every row is compared with the state of its time, less that of its recording's reference. A row without a time is
+    one of the end.
 
     Parameters
     ----------
@@ -58,14 +70,15 @@ def observe(case: Case, result: State, time: float | None = None) -> Observed:
     result : State
         Of the case's model.
     time : float, optional
-        Of the state [s]; None for a state at rest, which is compared with the end of each recording. A recording
-        without times is one of the end, and compared with whatever state there is.
+        Of the state [s]; None for a state at rest long after everything.
+    others : mapping of float to State, optional
+        States of earlier times. Without them, rows of other times are compared with the state at rest if what acts then
+        is the same; a motion is compared with the rows of its own time alone.
     """
     comparisons, skipped = [], []
     for recording in case.recordings:
-        at = None if getattr(recording, "time", None) is None else time
         try:
-            comparisons.append(_compare(case, recording, result, at))
+            comparisons.append(_compare(case, recording, result, time, others or {}))
         except InputError as error:
             skipped.append(f"{error}")
         if isinstance(recording, ForceRecording) and recording.torque is not None:
@@ -73,19 +86,80 @@ def observe(case: Case, result: State, time: float | None = None) -> Observed:
     return Observed(tuple(comparisons), tuple(skipped))
 
 
-def _compare(case: Case, recording: Recording, result: State, time: float | None) -> Comparison:
+def _compare(
+    case: Case, recording: Recording, result: State, time: float | None, others: Mapping[float, State]
+) -> Comparison:
+    groups = _rows_by_time(case, recording, time, others)
+    state_of = partial(_state_at, case, recording, result, time, others)
+    before = None if recording.reference is None else state_of(recording.reference)
+    return joined([_compared(case, recording, state_of(at), at, before, rows) for at, rows in groups])
+
+
+def _rows_by_time(
+    case: Case, recording: Recording, time: float | None, others: Mapping[float, State]
+) -> list[tuple[float, Rows]]:
+    """Rows of a recording that are compared, by the time of the state that they are compared with."""
+    assert isinstance(recording, PointsRecording | SurfaceRecording | ForceRecording)
+    times = times_of(recording)
+    rows = compared_rows(recording)
+    if recording.time is None:
+        return [(math.inf, rows_at(recording))]
+    if time is not None and others:
+        rows = rows[np.isin(times[rows], [*others, time])]
+        if not len(rows):
+            return [(time, rows_at(recording, time))]
+    elif time is not None:
+        return [(time, rows_at(recording, time))]
+    elif goes_on(case):
+        return [(math.inf, rows_at(recording))]
+    elif not others:
+        moments = Moments.of(case, {*times[rows].tolist(), math.inf})
+        last = moments.number(math.inf)
+        rows = rows[[moments.number(at) == last for at in times[rows].tolist()]]
+    if not len(rows):
+        raise InputError(
+            f"recording '{recording.name}' has nothing of a time at which what acts is as it is in the end"
+        )
+    return [(at, rows[times[rows] == at]) for at in np.unique(times[rows]).tolist()]
+
+
+def _state_at(
+    case: Case, recording: Recording, result: State, time: float | None, others: Mapping[float, State], at: float
+) -> State:
+    """The state of a time; `InputError` if it is not known."""
+    if at in others:
+        return others[at]
+    if math.isinf(at) or at == time:
+        return result
+    if time is None and not goes_on(case):
+        moments = Moments.of(case, (at, math.inf))
+        if len(moments.cases) == 1:
+            return result
+    raise InputError(
+        f"recording '{recording.name}' is counted from the state at {at:g} s, which this run does not compute"
+    )
+
+
+def _compared(
+    case: Case, recording: Recording, state: State, time: float, before: State | None, rows: Rows
+) -> Comparison:
+    u = state.u if before is None else state.u - before.u
     if isinstance(recording, PointsRecording):
-        return compare_points(recording, result.mesh, result.u, time)
+        return compare_points(recording, state.mesh, u, rows=rows)
     if isinstance(recording, SurfaceRecording):
-        return compare_surface(recording, result.mesh, result.u, time)
+        return compare_surface(recording, state.mesh, u, rows=rows)
     assert isinstance(recording, ForceRecording)  # tests belong to specimens, which have no such state
-    return compare_force(recording, _resultant(case, recording, result, time), time)
+    force = _resultant(case, recording, state, time)
+    if before is not None:
+        assert recording.reference is not None
+        force = force - _resultant(case, recording, before, recording.reference)
+    return compare_force(recording, force, rows=rows)
 
 
-def _resultant(case: Case, recording: ForceRecording, result: State, time: float | None) -> NDArray[np.float64]:
+def _resultant(case: Case, recording: ForceRecording, result: State, time: float) -> Floats:
     """Force (3,) [N] with which the recording's boundary acts on the tissue."""
     boundary = case.boundary(recording.boundary)
     if isinstance(boundary, Forced):
         times, factors = zip(*boundary.ramp, strict=True) if boundary.ramp else ((0.0,), (1.0,))
-        return np.interp(math.inf if time is None else time, times, factors) * np.array(boundary.total)
+        return np.interp(time, times, factors) * np.array(boundary.total)
     return np.asarray(result.reactions[result.mesh.node_sets[boundary.nodes]].sum(axis=0))

@@ -25,7 +25,8 @@ def sensors() -> Sensors:
     computed = np.concatenate([np.zeros(n - 3), [0.0, 0.0, -4.0]])
     residual = np.concatenate([np.zeros(n - 3), [0.0, 3.0, 4.0 - 4.0]])
     rest = (nothing, nothing, np.zeros((n, 6)), np.ones(n), positions, directions, groups)
-    return Sensors(residual, computed, *rest, np.zeros(n, dtype=int), np.zeros(n), ("all",))
+    from_rest = (np.zeros(n, dtype=int), np.full(n, -1), np.zeros(n))
+    return Sensors(residual, computed, *rest, np.zeros(n, dtype=int), np.zeros(n), ("all",), *from_rest)
 
 
 def test_a_surface_may_be_off_as_much_everywhere(sensors: Sensors) -> None:

@@ -223,6 +223,14 @@ _SIGMA = Key(
     above=0.0,
 )
 
+_REFERENCE = Key(
+    "reference",
+    ("number",),
+    "Time of the loaded state from which displacements and forces are counted; the body at rest if absent.",
+    unit="s",
+    above=0.0,
+)
+
 RECORDING = Table(
     "recording",
     "What was observed.",
@@ -242,9 +250,10 @@ RECORDING = Table(
                 "What a point outside the mesh is: an error, or observed at the nearest point; error if absent.",
                 choices=("error", "nearest"),
             ),
+            _REFERENCE,
         ),
-        "surface": (Key("nodes", ("text",), "Node set whose faces are compared with it.", needed=True),),
-        "force": (Key("boundary", ("text",), "Name of the boundary that acts with it.", needed=True),),
+        "surface": (Key("nodes", ("text",), "Node set whose faces are compared with it.", needed=True), _REFERENCE),
+        "force": (Key("boundary", ("text",), "Name of the boundary that acts with it.", needed=True), _REFERENCE),
         "test": (
             Key("mode", ("text",), "How the specimen was loaded.", needed=True, choices=MODES),
             Key(

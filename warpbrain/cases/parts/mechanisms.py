@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,10 @@ from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.ramps import read_ramp
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
+from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing, Says
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.ramp import take_turns
 
 #: What to do where something of the case itself is missing.
 _CURES = {"gravity_axis": "gravity_axis = [0, -1, 0] for a patient who lies on the back, in RAS"}
@@ -41,7 +44,7 @@ def read_mechanisms(
     tables = [(place, t.variant, t) for place, t in enumerate(context.lists(MECHANISM)) if t.variant is not None]
     for place, kind, table in sorted(tables, key=lambda entry: not issubclass(mechanisms()[entry[1]], Removing)):
         mechanism = mechanisms()[kind]
-        if kind in kinds and not mechanism.several:
+        if kind in kinds and not mechanism.several and not issubclass(mechanism, Load):
             table.problem("kind", f"a second '{kind}': it would act twice")
         kinds.add(kind)
         ramp = read_ramp(table)
@@ -61,7 +64,23 @@ def read_mechanisms(
             _note(context, table, error)
         except InputError as error:
             table.problem("kind", str(error))
+    _require_turns(tables, found)
     return tuple(found[place] for place in sorted(found))
+
+
+def _require_turns(tables: Sequence[tuple[int, str, Reading]], found: Mapping[int, Mechanism]) -> None:
+    """Note a problem where loads of a kind of which a case has one at a time act together."""
+    for kind in dict.fromkeys(kind for _, kind, _ in tables):
+        of_kind = [(place, table) for place, name, table in tables if name == kind]
+        loads = [found[place] for place, _ in of_kind if place in found]
+        if (
+            len(loads) > 1
+            and not mechanisms()[kind].several
+            and issubclass(mechanisms()[kind], Load)
+            and not take_turns(loads)
+        ):
+            cure = "give each a ramp, so that their factors add up to no more than 1 at any time"
+            of_kind[-1][1].problem("kind", f"a second '{kind}': it would act twice", cure)
 
 
 def _value(context: Context, table: Reading, named: Named, name: str, says: Says) -> Any:

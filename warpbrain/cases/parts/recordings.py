@@ -12,6 +12,7 @@ from warpbrain.cases.parts.node_sets import NodeSets
 from warpbrain.errors import InputError
 from warpbrain.recordings.reading import read_force, read_points, read_surface, read_test
 from warpbrain.recordings.recording import Recording, turn_of
+from warpbrain.recordings.times import compared_rows
 
 
 def read_recordings(context: Context, sets: NodeSets | None, boundaries: set[str]) -> tuple[Recording, ...]:
@@ -32,6 +33,10 @@ def read_recordings(context: Context, sets: NodeSets | None, boundaries: set[str
             continue
         recording = _READERS[table.variant](context, table, sets, boundaries)
         if recording is not None:
+            recording = replace(recording, reference=table.get("reference"))
+            if not specimen and recording.reference is not None and not len(compared_rows(recording)):
+                at = f"{recording.reference:g} s"
+                table.problem("reference", f"no row is of another time than {at}: there is no difference to compare")
             found.append(recording)
     return tuple(found)
 

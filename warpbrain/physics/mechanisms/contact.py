@@ -165,7 +165,7 @@ class Contact(Mechanism):
             on_surface=True,
             centre=patch.centre,
             radius=patch.radius,
-            region=patch.name,
+            region=patch.surface.replace("-", " ").replace("_", " "),
         )
 
     def skull(self, mesh: TetMesh) -> tuple[NDArray[np.float64], NDArray[np.int32]]:

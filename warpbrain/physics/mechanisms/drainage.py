@@ -115,6 +115,7 @@ class Drainage(Mechanism):
     )
     elements: str = parameter("Element set that has pores; all if empty.", default="", kind="element set")
     kind: ClassVar[str] = "drainage"
+    changes_by_itself: ClassVar[bool] = True
     example: ClassVar[str] = "drainage:permeability=1e-9,exchange=1e-6,capillary_pressure=1000"
     enters: ClassVar[Enters] = Enters("beside", "W_fluid")
     together: ClassVar[Mapping[str, str]] = {

@@ -52,6 +52,8 @@ CSF_DENSITY = 1007.0
 BRAIN_DENSITY = 1040.0
 #: Where it is looked for: levels, standard deviation of how much of the weight acts, and of the head's pose [rad].
 _LEVELS, _SHARE, _POSE = 9, 0.1, 0.12
+#: Standard deviation of a level that changes, of the height of the body.
+_FALL = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,7 +168,8 @@ class Gravity(BodyForce, Mechanism):
         found = []
         for level in np.linspace(-0.05, 0.9, _LEVELS) * height:
 
-            def drained(c: NDArray[np.float64], level: float = float(level)) -> Gravity:
+            def drained(c: NDArray[np.float64], middle: float = float(level)) -> Gravity:
+                level = middle + (float(c[3]) if len(c) > 3 else 0.0)
                 direction = down + c[1] * across[0] + c[2] * across[1]
                 # of a head that is tilted another point is the lowest one, as for a case that is read
                 lowest = float((-points @ unit_vector("direction", tuple(direction.tolist()))).min())
@@ -181,6 +184,19 @@ class Gravity(BodyForce, Mechanism):
             sd = np.array([_SHARE, _POSE, _POSE])
             usual = np.array([1.0, 0.0, 0.0])
             found.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(3)))
+            found.append(
+                Proposal(
+                    drained,
+                    np.append(usual, 0.0),
+                    np.append(sd, _FALL * height),
+                    "smooth",
+                    np.append(usual, 0.0),
+                    np.zeros(4),
+                    varying=(3,),
+                    in_turns=True,
+                    only_over_time=True,
+                )
+            )
         return found
 
     @classmethod

@@ -112,7 +112,7 @@ class Pressure(Mechanism):
         if not situation.free:
             raise NotTestableError("needs a part of the surface that nothing holds")
         return [
-            Proposal.of_one(partial(_pressing, surface.name), 0.0, 400.0, region=surface.words)
+            Proposal.of_one(partial(_pressing, surface.name), 0.0, 400.0, region=surface.words, varying=(0,))
             for surface in situation.free
         ]
 

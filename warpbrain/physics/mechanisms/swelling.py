@@ -69,12 +69,14 @@ class Swelling(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """All tissue, or balls of two sizes throughout it."""
-        everywhere = Proposal.of_one(lambda g: cls(amount=g), 0.0, _EVERYWHERE, "smooth", region="all tissue")
+        everywhere = Proposal.of_one(
+            lambda g: cls(amount=g), 0.0, _EVERYWHERE, "smooth", region="all tissue", varying=(0,)
+        )
 
         def ball(g: float, centre: tuple[float, float, float], radius: float) -> Swelling:
             return cls(amount=g, centre=centre, radius=radius)
 
-        return [everywhere, *Proposal.in_balls(ball, _SOMEWHERE, _RADII, situation)]
+        return [everywhere, *Proposal.in_balls(ball, _SOMEWHERE, _RADII, situation, varying=(0,))]
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import ClassVar
 
 import numpy as np
@@ -86,7 +86,8 @@ class Traction(Load, Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Patches of two sizes all over the free surface."""
-        return [cls._pulling(site, radius) for site in situation.surface_sites for radius in _RADII]
+        pulling = partial(cls._pulling, situation)
+        return [pulling(site, radius) for site in situation.surface_sites for radius in _RADII]
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
@@ -98,7 +99,7 @@ class Traction(Load, Mechanism):
         return [f"it acts with {measured(size.value, size.sd, 'Pa')} {where}".rstrip(), *radius_in_words(values)]
 
     @classmethod
-    def _pulling(cls, site: NDArray[np.float64], radius: float) -> Proposal:
+    def _pulling(cls, situation: Situation, site: NDArray[np.float64], radius: float) -> Proposal:
         x, y, z = site.tolist()
 
         def make(c: NDArray[np.float64]) -> Traction:
@@ -108,10 +109,12 @@ class Traction(Load, Mechanism):
             make,
             np.zeros(3),
             np.full(3, _USUAL),
-            elsewhere=cls._pulling,
+            elsewhere=partial(cls._pulling, situation),
             on_surface=True,
             centre=site,
             radius=radius,
+            region=situation.surface_at(site),
+            varying=(0, 1, 2),
         )
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:

@@ -78,6 +78,7 @@ class Viscoelasticity(Mechanism):
         source="Budday et al. 2017 (diagnosis design, M8)",
     )
     kind: ClassVar[str] = "viscoelasticity"
+    changes_by_itself: ClassVar[bool] = True
     of_specimens: ClassVar[bool] = True
     enters: ClassVar[Enters] = Enters("energy", "Psi_viscous")
     together: ClassVar[Mapping[str, str]] = {

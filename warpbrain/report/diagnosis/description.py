@@ -75,6 +75,7 @@ def _unknown(traits: Traits | None) -> dict[str, Any] | None:
         "net_moment_nm": traits.moment,
         "net_moment_sd_nm": traits.moment_sd,
         "from_outside": traits.outside,
+        "net_force_hidden": traits.hidden,
         "turning": traits.turning,
         "surface_over_depth_nats": traits.surface_nats,
         "centre_m": traits.centre,
@@ -102,6 +103,7 @@ def _when(onset: Onset | None) -> dict[str, Any] | None:
         "probability": onset.probability,
         "course": onset.course,
         "intervals": [{"seconds": [a, b], "probability": p} for a, b, p in onset.intervals],
+        "sizes": None if onset.sizes is None else asdict(onset.sizes),
     }
 
 

@@ -8,10 +8,13 @@ from typing import Any
 
 from warpbrain.inference.decide import NOTHING
 from warpbrain.inference.probability import percent
+from warpbrain.physics.words import measured
 from warpbrain.report.diagnosis.saved import STATES
 from warpbrain.report.files import MILLIMETRES
 
 _WIDTH = 110
+#: Times at which a size that changes is said.
+_SHOWN = 5
 
 
 def diagnosis_lines(summary: Mapping[str, Any]) -> list[str]:
@@ -56,10 +59,20 @@ def when_in_words(when: Mapping[str, Any]) -> str:
     if "course" not in when:
         # of a laboratory test it is the part of the record
         return f"{first:.3g} to {last:.3g} s"
+    if when.get("sizes") is not None:
+        return _sizes_in_words(when["sizes"])
     between = f"by {last:.3g} s" if first == 0.0 else f"between {first:.3g} and {last:.3g} s"
     sure = "" if when["probability"] is None else f" (probability {percent(when['probability'])})"
     course = f", {when['course']}" if when["course"] else ""
     return f"it set in {between}{sure}{course}"
+
+
+def _sizes_in_words(sizes: Mapping[str, Any]) -> str:
+    """A size over time: at the first and the last time, and at a few between."""
+    rows = list(zip(sizes["seconds"], sizes["values"], sizes["deviations"], strict=True))
+    chosen = sorted({round(k * (len(rows) - 1) / (_SHOWN - 1)) for k in range(_SHOWN)})
+    each = (f"{measured(value, sd, sizes['unit'])} at {time:.3g} s" for time, value, sd in (rows[k] for k in chosen))
+    return f"it changes with time: {sizes['says']} {', '.join(each)}"
 
 
 def _line(one: Mapping[str, Any]) -> str:

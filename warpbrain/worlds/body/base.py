@@ -251,7 +251,7 @@ class _LinearModel:
 
     def __init__(self, finder: BaseFinder, state: SolvedState, errors: MeshErrors | None) -> None:
         sensors, states = state.sensors, finder.states
-        self.at = Linearisation(state.system, state.u, state.reactions, sensors)
+        self.at = state.linearised()
         self.switch_states: dict[str, SolvedState] = {}
         self.effects = Effects(self.at, SolvedSwitches(states, state, sensors, self.switch_states), errors)
         # first, since it makes the compliance, with which nuisances are products instead of equilibria

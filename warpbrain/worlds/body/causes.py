@@ -15,7 +15,7 @@ from warpbrain.inference.hypothesis import Member
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import Candidates
 from warpbrain.worlds.body.effects import Effect
-from warpbrain.worlds.body.time_courses import main_courses
+from warpbrain.worlds.body.time_courses import factor_of_rows, main_courses
 
 UNKNOWN = "unknown"
 
@@ -110,7 +110,8 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
         effects[kind] = of_kind
     # setting in at any recorded time
     courses = main_courses(base.states.times)
-    causes.append(unknown_cause(base, [course.factor(base.at.sensors.times) for course in courses]))
+    factors = [factor_of_rows(course, base.at.sensors) for course in courses]
+    causes.append(unknown_cause(base, [factor for factor in factors if factor.any()]))
     return BodyCauses(tuple(causes), effects)
 
 

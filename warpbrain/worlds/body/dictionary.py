@@ -16,11 +16,12 @@ from warpbrain.physics.composition import CompositionError, require_composable
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.threads import in_threads
+from warpbrain.worlds.body.courses import over_time
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.states import SolvedState
-from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, with_free_surfaces
+from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, named_triangles, with_free_surfaces
 
 #: About how many sites a scan has in the tissue, and on its surface.
 _VOLUME_SITES, _SURFACE_SITES = 350, 480
@@ -75,6 +76,7 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
         mesh.centres[spread_points(mesh.centres, spacing)],
         np.concatenate(sites),
         spacing,
+        named=named_triangles(case, free),
     )
 
 
@@ -88,8 +90,20 @@ def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
     return [Patch(nodes, nodes, held, held, where.mean(axis=0), size), *(part for part in parts if part is not None)]
 
 
-def dictionary_of(case: Case, kinds: Sequence[str] | None = None, instants: int = 1) -> Dictionary:
+def dictionary_of(
+    case: Case, kinds: Sequence[str] | None = None, instants: int = 1, times: Sequence[float] = ()
+) -> Dictionary:
     """Proposals of all kinds, or of some.
+
+    Parameters
+    ----------
+    case : Case
+    kinds : sequence of str, optional
+    instants : int
+        See `Situation`.
+    times : sequence of float
+        Of states that are looked at [s]: with several, what may change from one to the next is proposed with a course,
+        too.
 
     Raises
     ------
@@ -106,7 +120,8 @@ def dictionary_of(case: Case, kinds: Sequence[str] | None = None, instants: int 
     rejected: dict[str, str] = {}
     for kind in requested:
         try:
-            proposals[kind] = _composable(case, situation.mesh, registry[kind].proposals(situation))
+            found = over_time(registry[kind].proposals(situation), times)
+            proposals[kind] = _composable(case, situation.mesh, found)
         except NotTestableError as error:
             rejected[kind] = f"not testable with these data: {error}"
     return Dictionary(situation, proposals, rejected)
@@ -180,6 +195,8 @@ def candidates_at(
                 of_this_kind.append(result)
             else:
                 rejected[kind] = f"{proposal.region}: cannot be simulated here: {result}"
+        # what is there all the time changes nothing between two states
+        of_this_kind = [e for e in of_this_kind if e.columns.any() or e.mean.any()] or of_this_kind
         within = [effect for effect in of_this_kind if is_linear(effect, effects.at)]
         if of_this_kind and not within:
             rejected[kind] = "its effect is not linear here: its usual size would move the body by more than its own"
@@ -245,7 +262,7 @@ def candidates_about_fit(
         Of each kind, numbers of the places whose columns are made anew.
     """
     mesh_errors = None if candidates.source is None else candidates.source.mesh_errors
-    effects = Effects(Linearisation(state.system, state.u, state.reactions, state.sensors), mesh_errors=mesh_errors)
+    effects = Effects(state.linearised(), mesh_errors=mesh_errors)
     acting_mechanisms = [effect.proposed.make(effect.proposed.mean) for effect in acting]
     acting_kinds = {mechanism.kind for mechanism in acting_mechanisms if not mechanism.several}
     all_effects: list[Effect] = []

@@ -14,7 +14,7 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
-from warpbrain.physics.proposal import Proposal
+from warpbrain.physics.proposal import Proposal, Varying
 from warpbrain.simulation.assumed import substituted
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.consolidation import Course, bound_term, consolidation
@@ -34,6 +34,9 @@ _ACTING = _PUSHING | {Weakening, Growing}
 
 class SwitchEffects(Protocol):
     """Effects of switches, which are solved, not differentiated: `warpbrain.worlds.body.switching.SolvedSwitches`."""
+
+    def at(self, instant: int, sensors: Sensors) -> SwitchEffects:
+        """The same of other sensors, at the time of a number."""
 
     def effect_of(self, mechanism: Mechanism) -> Floats:
         """What sensors (n,) record in the state with a mechanism, less that without it."""
@@ -119,6 +122,30 @@ class Effects:
         present : Mechanism, optional
             Mechanism of that kind that acts at the state already.
         """
+        bases = [proposal if proposal.over_time is None else proposal.over_time.base for proposal in proposals]
+        if not self.at.moments:
+            constant = self._at_one_time(_each_once(bases), present)
+            effects = [constant[id(base)] for base in bases]
+            times = self.at.sensors.times
+            return [
+                _over_time(proposal, [(effect, slice(None), 1.0, times)])
+                for proposal, effect in zip(proposals, effects, strict=True)
+            ]
+        by_moment = []
+        for moment in self.at.moments:
+            switches = None if self._switches is None else self._switches.at(moment.number, moment.at.sensors)
+            here = Effects(moment.at, switches, self.mesh_errors)
+            by_moment.append((here._at_one_time(_each_once(bases), present), moment))
+        return [
+            _over_time(
+                proposal,
+                [(effects[id(base)], m.rows, m.sign, np.full(len(m.rows), m.time)) for effects, m in by_moment],
+            )
+            for proposal, base in zip(proposals, bases, strict=True)
+        ]
+
+    def _at_one_time(self, proposals: Sequence[Proposal], present: Mechanism | None) -> dict[int, Effect]:
+        """Effects at one state by the identity of their proposals."""
         courses = self._courses([proposal for proposal in proposals if proposal.pace is not None])
         instant = self._instantaneous([proposal for proposal in proposals if proposal.history is not None], present)
         stencils = [self._stencil(proposal) for proposal in proposals]
@@ -133,7 +160,7 @@ class Effects:
                 effects.append(self._fading(proposal, instant[repr(proposal.make(proposal.start))]))
             else:
                 effects.append(self._effect(proposal, columns))
-        return effects
+        return dict(zip(map(id, proposals), effects, strict=True))
 
     def _courses(self, proposals: Sequence[Proposal]) -> dict[str, Course]:
         """Courses of proposals by the mechanism at their starts, each computed once."""
@@ -275,6 +302,76 @@ class Effects:
         change = at.internal_forces() - self._internal
         system.set_materials(materials)
         return change
+
+
+def _each_once(proposals: Sequence[Proposal]) -> list[Proposal]:
+    """Proposals without repetition."""
+    return list({id(proposal): proposal for proposal in proposals}.values())
+
+
+#: An effect at one state, rows of its sensors among all, 1 or -1, and the time of each of these rows [s].
+AtTime = tuple[Effect, Any, float, Floats]
+
+
+def _over_time(proposal: Proposal, parts: Sequence[AtTime]) -> Effect:
+    """The effect over all rows: of each at its time, less at that from which it is counted."""
+    varying = proposal.over_time
+    effect, rows, _, _ = parts[0]
+    if varying is None and isinstance(rows, slice):
+        return effect
+    count = max(int(np.max(rows)) + 1 for _, rows, _, _ in parts) if not isinstance(rows, slice) else len(effect.mean)
+
+    def total(of: Callable[[Effect], Floats], expanded: bool) -> Floats:
+        summed: Floats | None = None
+        for effect, rows, sign, times in parts:
+            change = _expanded(of(effect), varying, times) if expanded and varying is not None else of(effect)
+            summed = np.zeros((count, *change.shape[1:])) if summed is None else summed
+            summed[rows] += sign * change
+        assert summed is not None
+        return summed
+
+    columns_at = None
+    if effect.columns_at is not None:
+
+        def columns_at(c: Floats) -> Floats:
+            return total(lambda e: e.columns if e.columns_at is None else e.columns_at(c), False)
+
+    return Effect(proposal, total(lambda e: e.mean, False), total(lambda e: e.columns, True), columns_at)
+
+
+def _expanded(columns: Floats, varying: Varying, times: Floats) -> Floats:
+    """Columns (n, k) of what acts at one time as those of modes, for rows at times (n,)."""
+    modes = varying.modes_at(times)
+    each = [columns[:, k, None] * modes for k in varying.base.varying]
+    return np.column_stack([columns[:, list(varying.fixed)], *each])
+
+
+def columns_over_time(at: Linearisation, proposal: Proposal, c: Floats, mesh_errors: MeshErrors | None) -> Floats:
+    """Columns (n, k) of a proposal that varies, about coefficients (k,) with which it acts."""
+    varying = proposal.over_time
+    assert varying is not None
+
+    def about(one: Linearisation, time: float) -> Floats:
+        here = varying.at(c, time)
+        smooth = replace(varying.base, follows="smooth", start=here, sd=_sd_of(proposal, varying))
+        return Effects(one, mesh_errors=mesh_errors).of([smooth], varying.base.make(here))[0].columns
+
+    if not at.moments:
+        return _expanded(about(at, float(varying.times[-1])), varying, at.sensors.times)
+    columns = np.zeros((len(at.sensors), len(c)))
+    for moment in at.moments:
+        times = np.full(len(moment.rows), moment.time)
+        columns[moment.rows] += moment.sign * _expanded(about(moment.at, moment.time), varying, times)
+    return columns
+
+
+def _sd_of(proposal: Proposal, varying: Varying) -> Floats:
+    """Standard deviations (k,) of what acts at one time, of a proposal whose own may have been scaled."""
+    sd = varying.base.sd.copy()
+    fixed = list(varying.fixed)
+    sd[fixed] = proposal.sd[: len(fixed)]
+    sd[list(varying.base.varying)] = proposal.sd[len(fixed) :].reshape(len(varying.base.varying), -1)[:, 0]
+    return sd
 
 
 def _started(proposals: Sequence[Proposal]) -> dict[str, Mechanism]:

@@ -12,7 +12,7 @@ from warpbrain.errors import SolveError
 from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import is_linear
-from warpbrain.worlds.body.effects import Effect, Effects, column_slices, parts_of, width_of
+from warpbrain.worlds.body.effects import Effect, Effects, column_slices, columns_over_time, parts_of, width_of
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.mesh_share import MeshShare
@@ -93,7 +93,7 @@ def columns_about(
         If a mechanism is not linear there.
     """
     try:
-        at = Linearisation(state.system, state.u, state.reactions, state.sensors)
+        at = state.linearised()
     except SolveError:
         return columns, None
     columns = columns.copy()
@@ -106,6 +106,8 @@ def columns_about(
         c = effect.coefficients(z[part])
         if effect.columns_at is not None:
             columns[:, part] = effect.columns_at(c)
+        elif effect.proposed.over_time is not None:
+            columns[:, part] = columns_over_time(at, effect.proposed, c, mesh_errors)
         elif not effect.proposed.is_there_or_not:
             made = Effects(at, mesh_errors=mesh_errors)
             about = made.of([_proposal_about(effect.proposed, c)], effect.proposed.make(c))[0]

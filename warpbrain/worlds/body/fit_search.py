@@ -17,6 +17,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.marginal import Marginal
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.extrapolated import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
@@ -283,9 +284,10 @@ class FitSearch:
     def _evaluate(self, z: Floats, nearby: SolvedState) -> tuple[SolvedState, Floats]:
         """State and residual at coordinates."""
         base, layout, mesh = self._base, self._layout, self.mesh_errors
-        mechanisms, patches = [], []
+        mechanisms: list[Mechanism] = []
+        patches = []
         for effect, part in zip(self.effects, layout.effects, strict=True):
-            mechanisms.append(effect.proposed.make(effect.coefficients(z[part])))
+            mechanisms += effect.proposed.acting(effect.coefficients(z[part]))
             if effect.proposed.patch is not None:
                 patches.append(effect.proposed.patch)
         theta = base.prior.mean + base.prior.factor @ z[layout.tissue]

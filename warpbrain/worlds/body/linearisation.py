@@ -14,14 +14,15 @@ from __future__ import annotations
 import copy
 import itertools
 import threading
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.mesh import TetMesh, vertex_normals
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.chord import toward_equilibrium
@@ -50,6 +51,30 @@ class _Grown(Mechanism):
         return np.full(len(mesh.tetrahedra), scale * self.relative)
 
 
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """Rows that are compared with, or counted from, the state of one time.
+
+    Attributes
+    ----------
+    number : int
+        Of the time.
+    time : float
+        [s]
+    at : Linearisation
+        About that state, of these rows.
+    rows : (k,) int array
+    sign : float
+        -1 if they are counted from it.
+    """
+
+    number: int
+    time: float
+    at: Linearisation
+    rows: Ints
+    sign: float
+
+
 class Linearisation:
     """A state of a system, and the response of the sensors to forces there.
 
@@ -74,7 +99,53 @@ class Linearisation:
         self._surface_lock = threading.Lock()
         # forces whose response was computed by an equilibrium each so far
         self._equilibria = 0
+        # time, linear model and share of the end of each state, where several count
+        self._states: tuple[tuple[float, Linearisation, float], ...] = ()
         self._factorise()
+
+    def in_time(self, states: Sequence[tuple[float, Linearisation, float]]) -> Linearisation:
+        """The same, where rows are of states at several times or are counted from one.
+
+        Parameters
+        ----------
+        states : sequence of (float, Linearisation, float)
+            Of each time [s] that time, the linear model about its state, and the part of the last state that it is.
+        """
+        other = copy.copy(self)
+        other._states = tuple(states)
+        other.__dict__.pop("moments", None)
+        return other
+
+    @cached_property
+    def moments(self) -> tuple[Moment, ...]:
+        """By the time of the state; none where all rows are of one state, counted from rest."""
+        sensors, found = self.sensors, []
+        for number, (time, about, share) in enumerate(self._states):
+            last = number == len(self._states) - 1
+            for sign, of_rows in ((1.0, sensors.after), (-1.0, sensors.before)):
+                rows = np.flatnonzero((of_rows == number) | (last and sign > 0.0 and of_rows < 0))
+                if len(rows):
+                    own = about.with_sensors(replace(sensors.of_rows(rows, time), share=share))
+                    found.append(Moment(number, time, own.in_time(()), rows, sign))
+        return tuple(found)
+
+    def summed(self, answer: Callable[[Linearisation], Floats]) -> Floats:
+        """What something changes of each row (n, ...): at its time, less at that from which it is counted.
+
+        Parameters
+        ----------
+        answer : callable
+            From the linear model about one state to what it changes of the rows of that.
+        """
+        if not self.moments:
+            return answer(self)
+        total: Floats | None = None
+        for moment in self.moments:
+            change = answer(moment.at)
+            total = np.zeros((len(self.sensors), *change.shape[1:])) if total is None else total
+            total[moment.rows] += moment.sign * change
+        assert total is not None
+        return total
 
     def _factorise(self) -> None:
         system = self.system
@@ -95,7 +166,7 @@ class Linearisation:
         other = copy.copy(self)
         other.sensors = sensors
         other._surface_responses, other._equilibria = {}, 0
-        for name in ("compliance", "_rows"):
+        for name in ("compliance", "_rows", "moments"):
             other.__dict__.pop(name, None)
         return other
 
@@ -242,8 +313,6 @@ class Linearisation:
     @cached_property
     def growth_forces(self) -> Any:
         """Their derivative, SciPy CSR (3 N, m), by a relative growth of volume of each element."""
-        from dataclasses import replace
-
         sides = []
         for amount in (-_GROWTH, _GROWTH):
             model = self.system.model

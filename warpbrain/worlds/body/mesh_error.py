@@ -80,7 +80,7 @@ def expected(known: Difference) -> Difference:
 def expected_answer(sensors: Sensors, known: Difference) -> Floats:
     """Response (n,) of the sensors to the whole error."""
     change = expected(known)
-    return sensors.answer(change.u, change.reactions)
+    return sensors.share * sensors.answer(change.u, change.reactions)
 
 
 class FinerStates:

@@ -31,7 +31,11 @@ def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]
         "registration": sensors.rigid
         * np.repeat([belief("registration.wrong_shift"), belief("registration.wrong_turn")], 3),
         "stiffness": belief("tissue.larger")
-        * at.answers_of_elements(at.element_forces, stiffness_modes(mesh, int(belief("tissue.wrong_modes")))),
+        * at.summed(
+            lambda one: one.answers_of_elements(
+                one.element_forces, stiffness_modes(mesh, int(belief("tissue.wrong_modes")))
+            )
+        ),
         "loads": belief("tissue.larger") * by_name["known loads"],
     }
     if "mesh" in by_name:

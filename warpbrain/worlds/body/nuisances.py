@@ -159,13 +159,19 @@ def nuisances_at(
     ]
     if mesh_errors is not None:
         error = mesh_errors.error
-        families.append(Family("mesh", Discretisation().deviation * sensors.answer(error.u, error.reactions)[:, None]))
+        answer = sensors.share * sensors.answer(error.u, error.reactions)
+        families.append(Family("mesh", Discretisation().deviation * answer[:, None]))
     families.append(Family(UNKNOWN_MESH, _fractional(at, anchors, fraction)))
     return Nuisances(tuple(families), anchors, fraction)
 
 
 def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
     """What one standard deviation of each parameter of the tissues changes of what is recorded: (n, p)."""
+    return at.summed(lambda one: _tissue_columns(one, states, theta, prior))
+
+
+def _tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
+    """The same about one state."""
     system = at.system
     forces = np.zeros((len(theta), system.size, 3))
     for k in range(len(theta)):
@@ -185,7 +191,7 @@ def _materials(system: System, states: States, theta: Floats) -> Mapping[int, Ma
 
 def field_columns(at: Linearisation, states: States) -> Floats:
     """What one standard deviation of each mode of the stiffness field changes of what is recorded: (n, k)."""
-    return at.answers_of_elements(at.element_forces, states.modes)
+    return at.summed(lambda one: one.answers_of_elements(one.element_forces, states.modes))
 
 
 def _law_columns(effects: Effects, proposals: list[Proposal]) -> Floats:
@@ -235,15 +241,20 @@ def _other_shape(states: States) -> list[Proposal]:
 
 def _known_loads(at: Linearisation) -> Floats:
     """All known loads larger or smaller by one factor, and all prescribed displacements."""
+    columns = at.summed(_known_loads_at)
+    return columns[:, columns.any(axis=0)]
+
+
+def _known_loads_at(at: Linearisation) -> Floats:
+    """The same about one state: (n, 2)."""
     model = at.system.model
-    columns = [belief("loads.size") * at.answers(model.external_forces()[None])]
+    columns = [belief("loads.size") * at.answers(model.external_forces()[None]), np.zeros((len(at.sensors), 1))]
     if model.prescribed.any():
         forces = (at.stiffness @ model.prescribed.ravel()).reshape(-1, 3)
         direct = at.sensors.answer(model.prescribed, np.where(model.constrained, forces, 0.0))
         answer = direct + at.answers(np.where(model.constrained, 0.0, -forces)[None])[:, 0]
-        columns.append(belief("loads.size") * answer[:, None])
-    all_columns = np.concatenate(columns, axis=1)
-    return all_columns[:, all_columns.any(axis=0)]
+        columns[1] = belief("loads.size") * answer[:, None]
+    return np.concatenate(columns, axis=1)
 
 
 def _fractional(at: Linearisation, anchors: Floats, fraction: float) -> Floats:
@@ -255,8 +266,14 @@ def _fractional(at: Linearisation, anchors: Floats, fraction: float) -> Floats:
     if not len(rows):
         return np.zeros((len(sensors), 0))
     places = sensors.positions[rows]
-    nearest = cKDTree(at.system.model.mesh.points).query(places)[1]
-    size = np.linalg.norm(at.u, axis=1)[nearest]
+    nearest = np.zeros(len(sensors), dtype=np.int64)
+    nearest[rows] = cKDTree(at.system.model.mesh.points).query(places)[1]
+    moved = at.u[nearest]
+    if at.moments:
+        moved = np.zeros((len(sensors), 3))
+        for moment in at.moments:
+            moved[moment.rows] += moment.sign * moment.at.u[nearest[moment.rows]]
+    size = np.linalg.norm(moved[rows], axis=1)
     weights = kernel_columns(places, anchors, belief("mesh.alike"))
     columns = np.zeros((len(sensors), 3 * len(anchors)))
     directions = sensors.directions[rows]

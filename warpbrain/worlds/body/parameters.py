@@ -65,7 +65,11 @@ def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:
             **{f"centre_{axis}": (x, "m") for axis, x in zip("xyz", centre.tolist(), strict=True)},
             "radius": (1e3 * radius, "mm"),
         }
-    mechanism: Mechanism = effect.proposed.make(effect.coefficients(z))
+    return mechanism_numbers(effect.proposed.make(effect.coefficients(z)))
+
+
+def mechanism_numbers(mechanism: Mechanism) -> dict[str, tuple[float, str]]:
+    """Numbers of a mechanism by name, with units."""
     parameters: dict[str, tuple[float, str]] = {}
     if mechanism.ramp:
         parameters["share"] = (mechanism.factor(), "")

@@ -14,7 +14,7 @@ from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.not_physics import not_physics_at
 from warpbrain.worlds.body.observable import require_observable
-from warpbrain.worlds.body.states import States
+from warpbrain.worlds.body.states import States, instants_of
 from warpbrain.worlds.listener import Listener
 
 
@@ -62,7 +62,7 @@ def screened(
     require_observable(case)
     listener = listener or Listener()
     states = States(case, device)
-    dictionary = dictionary_of(case, mechanisms, len(states.times))
+    dictionary = dictionary_of(case, mechanisms, instants_of(case, states.times), states.times)
     spacing = dictionary.situation.spacing
     with one_thread_of_blas():
         with timed("base"):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
-from warpbrain.estimation.observations import Observation, Observations, Residuals
+from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.registration import rigid_columns
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.location import locate
@@ -27,7 +27,7 @@ class Sensors:
     computed : (n,) array
         What was computed; of surfaces the displacement along their normals.
     by_displacement, by_reactions : (n, 3 N) SciPy CSR
-        Derivatives of what was computed by displacement and reactions.
+        Derivatives of what was computed by displacement and reactions at its time.
     rigid : (n, 6) array
         Derivatives of what was recorded by a rigid motion of it.
     sigma : (n,) array
@@ -44,6 +44,13 @@ class Sensors:
         When [s]; infinite of the end.
     names : tuple of str
         Of the recordings.
+    after, before : (n,) int array
+        Numbers of the times of states that each row is compared with, and counted from; -1: from rest.
+    references : (n,) array
+        When the state was from which it is counted [s]; 0: rest.
+    share : (n,) array or float
+        How many times what changes the last state alike at all times changes a row: 1, and less where a state is
+        smaller.
     """
 
     residual: Floats
@@ -58,6 +65,10 @@ class Sensors:
     recordings: Ints
     times: Floats
     names: tuple[str, ...]
+    after: Ints
+    before: Ints
+    references: Floats
+    share: Floats | float = 1.0
 
     def __len__(self) -> int:
         return len(self.residual)
@@ -72,8 +83,31 @@ class Sensors:
         """Which rows are of points of a surface: each of these has one number, along the normal."""
         return np.asarray(self.is_displacement & (np.bincount(self.groups)[self.groups] == 1))
 
+    def of_rows(self, rows: Ints, time: float) -> Sensors:
+        """Some of the rows (k,) as if they were recorded at a time [s], and counted from rest."""
+        count = len(rows)
+        each = {
+            name: getattr(self, name)[rows]
+            for name in ("residual", "computed", "by_displacement", "by_reactions", "rigid", "sigma", "positions")
+        }
+        more = {name: getattr(self, name)[rows] for name in ("directions", "groups", "recordings")}
+        return Sensors(
+            **each,
+            **more,
+            times=np.full(count, time),
+            names=self.names,
+            after=np.zeros(count, dtype=np.int64),
+            before=np.full(count, -1),
+            references=np.zeros(count),
+        )
+
+    @property
+    def is_counted_from_rest(self) -> bool:
+        """Whether all rows are."""
+        return bool((self.before < 0).all())
+
     def answer(self, du: Floats, dR: Floats) -> Floats:
-        """Change (n,) of what is computed by changes of displacement and reactions (N, 3)."""
+        """Change (n,) of what is computed by changes of displacement and reactions (N, 3) at its time alone."""
         return np.asarray(self.by_displacement @ du.ravel() + self.by_reactions @ dR.ravel())
 
 
@@ -93,50 +127,47 @@ def kernel_columns(places: Floats, anchors: Floats, reach: float) -> Floats:
     return np.asarray(weights / np.sqrt(np.sum(weights**2, axis=1, keepdims=True)))
 
 
-#: What was recorded at a time, with displacement and reactions (N, 3) then.
-Instant = tuple[float, Observations, Floats, Floats]
+def sensors_at(observations: Observations, u: Floats, reactions: Floats, centre: Floats) -> Sensors:
+    """The rows of all recordings at the states of one or several times.
 
-
-def sensors_at(instants: Sequence[Instant], centre: Floats) -> Sensors:
-    """The rows of all recordings at the states of one or several times; `centre` as in `Observations.at`."""
+    Parameters
+    ----------
+    observations : Observations
+    u, reactions : (s N, 3) array
+        Displacement [m] and reactions [N] in s states, one after the other.
+    centre : (3,) array
+        As in `Observations.at`.
+    """
     from scipy.sparse import vstack
 
-    parts = [row for time, observations, u, R in instants for row in _rows(time, observations, u, R, centre)]
-    states = [(u, R) for _, observations, u, R in instants for _ in observations.recordings]
-    first = np.cumsum([0, *(len(part.values) for _, _, part in parts)])
-    sizes = [part.values.size for _, _, part in parts]
-    repeat = [observation.size for _, observation, _ in parts]
-    names = tuple(dict.fromkeys(observation.name for _, observation, _ in parts))
-    rigid = np.concatenate([part.rigid.reshape(-1, 6) for _, _, part in parts])
-    sigma = [np.full(len(o.rows), np.nan) if o.sigma is None else o.sigma for _, o, _ in parts]
-    positions = [o.positions if len(o.positions) else np.full((len(o.rows), 3), np.nan) for _, o, _ in parts]
-    numbers = [start + np.arange(len(part.values)) for start, (_, _, part) in zip(first, parts, strict=False)]
-    return Sensors(
-        np.concatenate([part.values.ravel() for _, _, part in parts]),
-        np.concatenate(
-            [
-                part.by_displacement @ u.ravel() + part.by_reactions @ R.ravel()
-                for (_, _, part), (u, R) in zip(parts, states, strict=True)
-            ]
-        ),
-        vstack([part.by_displacement for _, _, part in parts]).tocsr(),
-        vstack([part.by_reactions for _, _, part in parts]).tocsr(),
-        rigid,
-        np.concatenate([np.repeat(values, size) for values, size in zip(sigma, repeat, strict=True)]),
-        np.concatenate([np.repeat(where, size, axis=0) for where, size in zip(positions, repeat, strict=True)]),
-        rigid[:, :3].copy(),
-        np.concatenate([np.repeat(values, size) for values, size in zip(numbers, repeat, strict=True)]),
-        np.repeat([names.index(observation.name) for _, observation, _ in parts], sizes),
-        np.repeat([time for time, _, _ in parts], sizes),
-        names,
-    )
-
-
-def _rows(
-    time: float, observations: Observations, u: Floats, reactions: Floats, centre: Floats
-) -> list[tuple[float, Observation, Residuals]]:
+    recordings = observations.recordings
     parts = observations.at(u, reactions, centre)
-    return [(time, observation, part) for observation, part in zip(observations.recordings, parts, strict=True)]
+    sizes = [part.values.size for part in parts]
+
+    def each(values: Sequence[Floats | Ints]) -> Any:
+        """Values of rows, for each of their numbers."""
+        return np.concatenate([np.repeat(v, o.size, axis=0) for v, o in zip(values, recordings, strict=True)])
+
+    first = np.cumsum([0, *(len(part.values) for part in parts)])
+    names = tuple(dict.fromkeys(observation.name for observation in recordings))
+    rigid = np.concatenate([part.rigid.reshape(-1, 6) for part in parts])
+    return Sensors(
+        np.concatenate([part.values.ravel() for part in parts]),
+        np.concatenate([-part.derivative(u[None], reactions[None]).ravel() for part in parts]),
+        vstack([part.by_displacement for part in parts]).tocsr(),
+        vstack([part.by_reactions for part in parts]).tocsr(),
+        rigid,
+        each([np.full(len(o.rows), np.nan) if o.sigma is None else o.sigma for o in recordings]),
+        each([o.positions if len(o.positions) else np.full((len(o.rows), 3), np.nan) for o in recordings]),
+        rigid[:, :3].copy(),
+        each([start + np.arange(len(part.values)) for start, part in zip(first, parts, strict=False)]),
+        np.repeat([names.index(observation.name) for observation in recordings], sizes),
+        each([o.times for o in recordings]),
+        names,
+        each([part.after for part in parts]),
+        each([part.before for part in parts]),
+        each([o.references for o in recordings]),
+    )
 
 
 def tracked_points(mesh: TetMesh, points: Floats, centre: Floats) -> Sensors:
@@ -159,6 +190,9 @@ def tracked_points(mesh: TetMesh, points: Floats, centre: Floats) -> Sensors:
         np.zeros(count, dtype=np.int64),
         np.full(count, np.inf),
         ("points",),
+        np.full(count, -1),
+        np.full(count, -1),
+        np.zeros(count),
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.cases.boundary import Boundary, Fixed
 from warpbrain.cases.case import Case
+from warpbrain.cases.moments import Moments, goes_on, recorded_times
 from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.observations import Observations
@@ -22,7 +23,7 @@ from warpbrain.physics.composition import CompositionError
 from warpbrain.physics.mechanism import Following, Mechanism
 from warpbrain.physics.proposal import Patch
 from warpbrain.simulation.assumed import all_substituted
-from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
+from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.keeping import kept_for
 from warpbrain.simulation.kept_factors import KeptFactors
 from warpbrain.simulation.locking import elements_of_fits
@@ -65,6 +66,16 @@ class Hypothesis:
 
 
 @dataclass(frozen=True, eq=False)
+class Instant:
+    """An equilibrium at a time [s]: its system, displacement [m] and reactions [N], (N, 3)."""
+
+    time: float
+    system: System
+    u: Floats
+    reactions: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class SolvedState:
     """An equilibrium under a hypothesis.
 
@@ -78,6 +89,8 @@ class SolvedState:
         them a point in a narrow ventricle would be taken for one of the opposite wall.
     course : tuple of (N, 3) arrays
         Displacement [m] at each of `steps_to` where it was followed over time; empty where it was not.
+    instants : tuple of Instant
+        The state at each of the times, of which `system`, `u` and `reactions` are the last.
     """
 
     hypothesis: Hypothesis
@@ -86,6 +99,30 @@ class SolvedState:
     reactions: Floats
     sensors: Sensors
     course: tuple[Floats, ...] = ()
+    instants: tuple[Instant, ...] = ()
+
+    def linearised(self, sensors: Sensors | None = None) -> Linearisation:
+        """The linear model about the state; of its own sensors unless given.
+
+        A state that was followed over time is linear about its end.
+
+        Raises
+        ------
+        SolveError
+            If it is unstable.
+        """
+        sensors = self.sensors if sensors is None else sensors
+        last = Linearisation(self.system, self.u, self.reactions, sensors)
+        systems = {id(instant.system) for instant in self.instants}
+        if sensors.is_counted_from_rest and (self.course or len(systems) <= 1):
+            return last
+        made = {id(self.system): last}
+        for instant in self.instants:
+            if id(instant.system) not in made:
+                made[id(instant.system)] = Linearisation(instant.system, instant.u, instant.reactions, sensors)
+        shares = [_projection(instant.u, self.u) for instant in self.instants]
+        abouts = (made[id(instant.system)] for instant in self.instants)
+        return last.in_time([(i.time, about, s) for i, about, s in zip(self.instants, abouts, shares, strict=True)])
 
 
 class States:
@@ -95,23 +132,30 @@ class States:
     ----------
     case : Case
     device : str, optional
+    role : {"fit", "check"}
+        Of the recordings that states are compared with.
 
     Attributes
     ----------
     times : tuple of float
-        Recorded ones [s], increasing; infinity alone if no times were recorded, or they do not matter.
+        Those of rows and of what they are counted from [s], increasing; infinity alone if there is one state.
     motion : (6,) array
         Rigid motion that recordings are taken to have been moved by.
     solves : int
     """
 
-    def __init__(self, case: Case, device: str | None = None) -> None:
+    def __init__(self, case: Case, device: str | None = None, role: str = "fit") -> None:
         self.case = case = with_free_surfaces(case)
         self.device = device
         self.parameters = Parameters.of(case)
-        self.times = recorded_times(case)
+        self.times = times_of_states(case, role)
         self.motion = np.zeros(6)
-        self.centre = Observations.to_fit(case).centre
+        self._role = role
+        # every time has a state of its own, even where it is the same one
+        self._each = Moments(self.times, (case,), tuple(range(len(self.times))))
+        # where the equilibrium of each time was found last
+        self._near: dict[float, Floats] = {}
+        self.centre = self._observations_of(case).centre
         self.realign(self.motion)
         self.modes = stiffness_modes(case.remaining[0])
         self.solves = 0
@@ -120,8 +164,10 @@ class States:
     def realign(self, motion: Floats) -> None:
         """Move recordings back by a rigid motion (6,); see `realigned`."""
         self.motion = motion
-        case = realigned(self.case, motion, self.centre)
-        self.observations = tuple(Observations.to_fit(case, None if np.isinf(time) else time) for time in self.times)
+        self.observations = self._observations_of(realigned(self.case, motion, self.centre))
+
+    def _observations_of(self, case: Case) -> Observations:
+        return (Observations.to_fit if self._role == "fit" else Observations.to_check)(case, self._each)
 
     @property
     def motion_coordinates(self) -> Floats:
@@ -182,32 +228,70 @@ class States:
         if flowing is not None:
             return self._drained(hypothesis, flowing, start, expected, iterations, nearby)
         self.solves += 1
-        model, external = system.model, system.model.external_forces()
-        options = EquilibriumOptions(tolerance=TOLERANCE, max_total_newton=iterations)
         # relaxing stress or a fluid of the case's own: no other memory of a term changes a state in time
         in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
-        if in_time and np.isfinite(self.times[0]):
+        options = EquilibriumOptions(tolerance=TOLERANCE, max_total_newton=iterations)
+        taken: tuple[Floats, ...] = ()
+        if in_time and np.isfinite(self.times).all():
             starts, factors = course or (() if start is None else (start,)), self._factors_of(system)
             moments = follow_slowly(system, steps_to(self.times), options, near=starts, factors=factors)
             by_time = {moment.time: moment.state for moment in moments}
-            course = tuple(state.u for state in by_time.values())
-            states = [by_time[time] for time in self.times]
+            taken = tuple(state.u for state in by_time.values())
+            instants = [
+                self._instant(time, system, by_time[time], system.model.external_forces(time)) for time in self.times
+            ]
         else:
-            course = ()
+            instants = self._at_rest(hypothesis, system, start, options, nearby)
+        sensors = self._sensors(instants, expected)
+        last = instants[-1]
+        return SolvedState(hypothesis, last.system, last.u, last.reactions, sensors, taken, tuple(instants))
+
+    def _at_rest(
+        self,
+        hypothesis: Hypothesis,
+        system: System,
+        start: Floats | None,
+        options: EquilibriumOptions,
+        nearby: Linearisation | None,
+    ) -> list[Instant]:
+        """The equilibrium at each time, under what acts then."""
+        case = self.case_of(hypothesis)
+        moments = Moments.of(case, self.times)
+        found: dict[int, Instant] = {}
+        # the last first: it is what others begin at
+        for time, number in sorted(zip(moments.times, moments.numbers, strict=True), reverse=True):
+            if number in found:
+                continue
+            own = system if moments.cases[number] is case else self._system(hypothesis, moments.cases[number])
+            near = start if not found else self._near.get(time, start)
+            external = own.model.external_forces()
             # on a CPU conjugate gradients solve a single state in the time that factors take
-            factors = None if system.device.is_cpu else self._factors_of(system)
-            if nearby is not None and start is not None:
-                start = nearby.toward_equilibrium(system, external, start, TOLERANCE)
-            solver = EquilibriumSolver(system, options, factors=factors)
-            states = [solver.solve(external, start)] * len(self.times)
-        reactions = [model.reactions(state.internal, external) for state in states]
-        sensors = self._sensors([(state.u, R) for state, R in zip(states, reactions, strict=True)], expected)
-        return SolvedState(hypothesis, system, states[-1].u, reactions[-1], sensors, tuple(course))
+            factors = None if own.device.is_cpu else self._factors_of(own)
+            solver = EquilibriumSolver(own, options, factors=factors)
+            if nearby is not None and near is not None and not found:
+                near = nearby.toward_equilibrium(own, external, near, TOLERANCE)
+            try:
+                state = solver.solve(external, near)
+            except SolveError:
+                if not found or near is None:
+                    raise
+                state = solver.solve(external)
+            found[number] = self._instant(time, own, state, external)
+            if len(moments.cases) > 1:
+                self._near[time] = state.u
+        return [replace(found[number], time=time) for time, number in zip(moments.times, moments.numbers, strict=True)]
 
     def _flowing(self, hypothesis: Hypothesis, system: System) -> Mechanism | None:
-        """The mechanism of a hypothesis whose fluid flows while recordings are made, where no stress relaxes, too."""
-        followed = np.isfinite(self.times[0]) and all(term.forgets_in is None for term in system.terms)
+        """The mechanism of a hypothesis whose fluid flows while recordings are made.
+
+        None where the course to one end does not say it all: stress relaxes, too, loads change, or recordings are
+        counted from another state than rest.
+        """
+        followed = np.isfinite(self.times).all() and all(term.forgets_in is None for term in system.terms)
         if not followed or all(term.coupling is None for term in system.terms):
+            return None
+        counted_from_rest = all(getattr(each, "reference", None) is None for each in self.case.recordings)
+        if not counted_from_rest or len(Moments.of(self.case_of(hypothesis), self.times).cases) > 1:
             return None
         bound = ((m, bound_term(system, m)) for m in hypothesis.mechanisms if isinstance(m, Following))
         return next((cast(Mechanism, m) for m, term in bound if term.coupling is not None), None)
@@ -227,28 +311,32 @@ class States:
         """
         others = tuple(mechanism for mechanism in hypothesis.mechanisms if mechanism is not flowing)
         end = self.solve(replace(hypothesis, mechanisms=others), start, expected, (), iterations, nearby)
-        at = Linearisation(end.system, end.u, end.reactions, end.sensors)
+        at = end.linearised()
         change = consolidation(at, bound_term(end.system, cast(Following, flowing))).at(1.0)
         sensors = replace(end.sensors, residual=end.sensors.residual - change, computed=end.sensors.computed + change)
         return replace(end, hypothesis=hypothesis, sensors=sensors)
 
-    def corrected(self, state: SolvedState, expected: Difference) -> SolvedState:
-        """A state that does not change in time, with sensors where it is without the error of the mesh."""
-        return replace(state, sensors=self._sensors([(state.u, state.reactions)] * len(self.times), expected))
+    @staticmethod
+    def _instant(time: float, system: System, state: Equilibrium, external: Floats) -> Instant:
+        return Instant(time, system, state.u, system.model.reactions(state.internal, external))
 
-    def _sensors(self, moments: Sequence[tuple[Floats, Floats]], expected: Difference | None) -> Sensors:
+    def corrected(self, state: SolvedState, expected: Difference | None) -> SolvedState:
+        """A state with sensors where it is without the error of the mesh."""
+        return replace(state, sensors=self._sensors(state.instants, expected))
+
+    def _sensors(self, instants: Sequence[Instant], expected: Difference | None) -> Sensors:
+        u, reactions = ([getattr(instant, name) for instant in instants] for name in ("u", "reactions"))
+        shares = np.array([_projection(each, u[-1]) for each in u])
         if expected is not None:
             # known for the end; earlier in proportion to the state
-            u_end, reactions_end = moments[-1]
-            moments = [
-                (
-                    u + _projection(u, u_end) * expected.u,
-                    reactions + _projection(reactions, reactions_end) * expected.reactions,
-                )
-                for u, reactions in moments
-            ]
-        parts = zip(self.times, self.observations, moments, strict=True)
-        return sensors_at([(time, observations, *moment) for time, observations, moment in parts], self.centre)
+            of_reactions = [_projection(each, reactions[-1]) for each in reactions]
+            u = [each + share * expected.u for each, share in zip(u, shares, strict=True)]
+            pairs = zip(reactions, of_reactions, strict=True)
+            reactions = [each + share * expected.reactions for each, share in pairs]
+        sensors = sensors_at(self.observations, np.concatenate(u), np.concatenate(reactions), self.centre)
+        if len({id(instant.system) for instant in instants}) == 1 and sensors.is_counted_from_rest:
+            return sensors
+        return replace(sensors, share=shares[sensors.after] - np.where(sensors.before < 0, 0.0, shares[sensors.before]))
 
     def _factors_of(self, system: System) -> KeptFactors | None:
         """Kept while the same mechanisms act: a fit has many states of those, one after the other.
@@ -261,9 +349,10 @@ class States:
             self._factors = {acting: kept_for(system.device)}
         return self._factors[acting]
 
-    def _system(self, hypothesis: Hypothesis) -> System:
+    def _system(self, hypothesis: Hypothesis, case: Case | None = None) -> System:
+        """Of a hypothesis; `case`: at one time."""
         try:
-            model, _ = model_of(self.case_of(hypothesis))
+            model, _ = model_of(self.case_of(hypothesis) if case is None else case)
         except CompositionError as error:
             # treated like loads without an equilibrium
             raise SolveError(str(error)) from None
@@ -313,20 +402,25 @@ def _released(case: Case, patches: tuple[Patch, ...]) -> tuple[TetMesh, tuple[Bo
     return case.mesh.with_node_sets(sets), tuple(boundaries)
 
 
-def recorded_times(case: Case) -> tuple[float, ...]:
-    """Times [s] at which all that a case is fitted to was recorded, under loads that no longer change.
+def times_of_states(case: Case, role: str = "fit") -> tuple[float, ...]:
+    """Times [s] of the states that recordings of a role are compared with.
 
-    Infinity alone, for the end, where there is one time or none, or where loads or motions change after the first.
+    Infinity alone, for the end, where what is fitted has one state: of one time, with loads that stay after it. Where
+    stress relaxes or fluid flows as the case says, there is nothing but the end either if loads change, or something
+    was recorded at the end and at no time.
     """
-    fitted = [recording for recording in case.recordings if recording.role == "fit"]
-    series: list[set[float]] = []
-    for recording in fitted:
-        times = getattr(recording, "time", None)
-        series.append(set() if times is None else set(np.unique(times).tolist()))
-    common = sorted(set.intersection(*series)) if series else []
-    if len(common) < 2 or common[0] <= 0.0:
+    times = recorded_times(case, (role,))
+    moments = Moments.of(case, (*times, np.inf))
+    constant = len(moments.cases) == 1
+    # a cause that is found may change where nothing does that is declared: what is checked keeps its time
+    if not times or (constant and len(times) < 2 and role == "fit"):
         return (np.inf,)
-    ramps = [ramp for acting in (*case.boundaries, *case.mechanisms) if (ramp := getattr(acting, "ramp", ()))]
-    changing = any(ramp[-1][0] > common[0] for ramp in ramps)
-    moving = any(getattr(boundary, "has_history", False) for boundary in case.boundaries)
-    return (np.inf,) if changing or moving else tuple(common)
+    if goes_on(case) and not (constant and np.isfinite(times).all()):
+        return (np.inf,)
+    return times
+
+
+def instants_of(case: Case, times: Sequence[float]) -> int:
+    """At how many times something is recorded under loads that came at once and stay: what flows or relaxes shows."""
+    constant = len(Moments.of(case, (*times, np.inf)).cases) == 1
+    return len(times) if constant and np.isfinite(times).all() else 1

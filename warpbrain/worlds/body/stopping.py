@@ -40,6 +40,8 @@ def next_to_fit(
     named = [candidate for candidate in sets if frozenset(candidate.mechanisms) == frozenset(decision.causes)]
     if named and named[0].mechanisms and not _is_settled(named, expanded):
         chosen = next((candidate for candidate in named if candidate.refit is not None), named[0])
+    elif part := _part_not_fitted(decision, sets):
+        return part
     else:
         open_sets = _not_fitted(sets, probabilities)
         matters = (candidate for candidate in open_sets if _may_be_regretted(candidate, sets, decision))
@@ -97,6 +99,17 @@ def _is_settled(named: Sequence[WeightedSet], expanded: Collection[frozenset[str
     if not fitted:
         return all(candidate.failure for candidate in named)
     return any(candidate.names in expanded or len(candidate.names) > 2 for candidate in fitted)
+
+
+def _part_not_fitted(decision: Decision, sets: Sequence[WeightedSet]) -> WeightedSet | None:
+    """A set of all but one of several mechanisms that are named, which was not fitted; None if there is none.
+
+    What two explain in the linear model one may explain as well that is far from linear, such as a course in time.
+    """
+    named = frozenset(decision.causes)
+    parts = (candidate for candidate in sets if candidate.names < named and len(candidate.names) == len(named) - 1)
+    open_parts = (part for part in parts if part.names and part.refit is None and not part.failure)
+    return next(open_parts, None)
 
 
 def _not_fitted(sets: Sequence[WeightedSet], probabilities: Floats) -> Iterator[WeightedSet]:

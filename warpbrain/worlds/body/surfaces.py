@@ -80,6 +80,12 @@ def free_surfaces(case: Case) -> tuple[FreeSurface, ...]:
     return tuple(surfaces)
 
 
+def named_triangles(case: Case, surfaces: Sequence[FreeSurface]) -> tuple[tuple[str, NDArray[np.int32]], ...]:
+    """Triangles (k, 3) that can move with what people call them: connected parts, and free surfaces, each of them."""
+    parts = [(words, part.faces) for words, part in _named_parts(case, connected_parts(case))]
+    return (*parts, *((surface.words, surface.faces) for surface in surfaces))
+
+
 def connected_parts(case: Case) -> list[FreePart]:
     """The connected free surfaces of what is left of a body, whatever node sets there are: no triangle is in two."""
     mesh, nodes = case.remaining

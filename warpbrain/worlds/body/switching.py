@@ -23,13 +23,24 @@ class SolvedSwitches:
         Whose response is computed.
     solved_states : dict of str to SolvedState
         States that were solved already, by the mechanism; further ones are added.
+    instant : int
+        Number of the time of the states.
     """
 
     def __init__(
-        self, states: States, state: SolvedState, sensors: Sensors, solved_states: dict[str, SolvedState]
+        self,
+        states: States,
+        state: SolvedState,
+        sensors: Sensors,
+        solved_states: dict[str, SolvedState],
+        instant: int = -1,
     ) -> None:
         self._states, self._state, self._sensors = states, state, sensors
-        self._solved_states = solved_states
+        self._solved_states, self._instant = solved_states, instant
+
+    def at(self, instant: int, sensors: Sensors) -> SolvedSwitches:
+        """The same of other sensors at the time of a number."""
+        return SolvedSwitches(self._states, self._state, sensors, self._solved_states, instant)
 
     def effect_of(self, mechanism: Mechanism) -> Floats:
         """What sensors (n,) record in the state with a mechanism, less that without it."""
@@ -38,5 +49,5 @@ class SolvedSwitches:
             hypothesis = replace(state.hypothesis, mechanisms=(mechanism,))
             # the loads act already: one load step, or the state is taken not to exist
             self._solved_states[key] = self._states.solve(hypothesis, state.u, iterations=EquilibriumOptions.max_newton)
-        solved = self._solved_states[key]
-        return self._sensors.answer(solved.u - state.u, solved.reactions - state.reactions)
+        solved, without = self._solved_states[key].instants[self._instant], state.instants[self._instant]
+        return self._sensors.answer(solved.u - without.u, solved.reactions - without.reactions)

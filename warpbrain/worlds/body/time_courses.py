@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.worlds.body.sensors import Sensors
 
 AT_ONCE, EVENLY, SLOWER = "all at once", "growing evenly", "growing ever more slowly"
 #: Size over the elapsed part of the time from onset to the last recording.
@@ -57,11 +58,25 @@ def time_courses(times: Sequence[float]) -> list[TimeCourse]:
     """All courses for recorded times [s]; with one time or none only that of a constant cause."""
     if len(times) < 2:
         return [TimeCourse(0, 0.0, np.inf, AT_ONCE)]
+    times = finite_times(np.array(times)).tolist()
     courses = []
     for number, begin in enumerate((0.0, *times[:-1])):
         shapes = (AT_ONCE,) if number == len(times) - 1 else tuple(_SHAPES)
         courses += [TimeCourse(number, begin, times[-1], shape) for shape in shapes]
     return courses
+
+
+def finite_times(times: Floats) -> Floats:
+    """Times [s] with an end that is as far from the last of the others as that is from the load."""
+    known = times[np.isfinite(times)]
+    return np.where(np.isfinite(times), times, 2.0 * known.max() if len(known) else np.inf)
+
+
+def factor_of_rows(course: TimeCourse, sensors: Sensors) -> Floats:
+    """Part (n,) of the full size by which each row differs from the state that it is counted from."""
+    times = np.concatenate([sensors.times, sensors.references])
+    after, before = np.split(course.factor(finite_times(times)), 2)
+    return np.where(sensors.before < 0, after, after - before)
 
 
 def main_courses(times: Sequence[float]) -> list[TimeCourse]:

@@ -62,15 +62,40 @@ def tractions(at: Linearisation, length: float) -> Floats:
 
 def eigenstresses(at: Linearisation, length: float) -> Floats:
     """Columns (n, k) of an eigenstress of a length [m], all six components."""
+    mesh = at.system.model.mesh
+    columns = _stress_patches(at, mesh.centres[spread_points(mesh.centres, length, 700)], length)
+    return _visible_modes(columns, at.sensors.is_displacement)
+
+
+def stress_beside_held(at: Linearisation, length: float) -> Floats:
+    """Columns (n, k) of patches of an eigenstress of a length [m] which what is held is a part of.
+
+    What they exert on nodes that can move has a net force: held nodes carry its counterpart. Of 1 m root mean square.
+    """
+    from scipy.spatial import cKDTree
+
+    model = at.system.model
+    held = model.mesh.points[model.constrained[: len(model.mesh.points)].all(axis=1)]
+    sites = model.mesh.centres[spread_points(model.mesh.centres, length, 700)]
+    if not len(held):
+        return np.zeros((len(at.sensors), 0))
+    # two lengths away a patch has an eighth of its stress
+    columns = _stress_patches(at, sites[cKDTree(held).query(sites)[0] < 2.0 * length], length)
+    rows = at.sensors.is_displacement
+    size = float(np.sqrt(np.mean(np.sum(columns[rows] ** 2, axis=1)))) if rows.any() and columns.size else 0.0
+    return columns / size if size > 0.0 else np.zeros((len(at.sensors), 0))
+
+
+def _stress_patches(at: Linearisation, sites: Floats, length: float) -> Floats:
+    """Response (n, 6 s) to each component of a stress of 1 Pa, spread about sites (s, 3) with a Gaussian."""
     from scipy.spatial.distance import cdist
 
     mesh = at.system.model.mesh
-    sites = mesh.centres[spread_points(mesh.centres, length, 700)]
     weights = np.exp(-0.5 * (cdist(mesh.centres, sites) / length) ** 2)
     # on deformed elements, where a symmetric stress has no moment
     forces = _unit_stresses((mesh.points + at.u)[at.system.tetrahedra])
     columns = [at.answers_of_elements(forces[component], weights) for component in range(len(_PAIRS))]
-    return _visible_modes(np.concatenate(columns, axis=1), at.sensors.is_displacement)
+    return np.concatenate(columns, axis=1)
 
 
 def _unit_stresses(corners: Floats) -> Floats:

@@ -1,0 +1,116 @@
+"""A case at the times of its recordings: what acts at each is all there, and nothing moves on.
+
+A load with a ramp has the size at each time that its ramp says. At rest under loads that are held at that size a body
+without memory is where it is then; so every time of a case is a case of its own, in which nothing depends on time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from warpbrain.cases.boundary import Boundary, Displaced
+from warpbrain.cases.case import Case
+from warpbrain.physics.load import Load
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.ramp import Ramped
+from warpbrain.recordings.times import compared_rows, times_of
+
+
+def case_at(case: Case, time: float) -> Case:
+    """The case with everything held as it is at a time [s]; infinity is long after everything."""
+    boundaries = tuple(_boundary_at(boundary, time) for boundary in case.boundaries)
+    mechanisms = tuple(_mechanism_at(m, time) for m in case.mechanisms if not _absent(m, time))
+    return replace(case, boundaries=boundaries, mechanisms=mechanisms)
+
+
+def _boundary_at(boundary: Boundary, time: float) -> Boundary:
+    if isinstance(boundary, Displaced):
+        if not boundary.has_history:
+            return boundary
+        x, y, z = (float(np.interp(time, boundary.times, component)) for component in np.array(boundary.values).T)
+        return replace(boundary, times=(0.0,), values=((x, y, z),), file="")
+    ramp = getattr(boundary, "ramp", ())
+    return replace(boundary, ramp=_held(ramp, time)) if ramp else boundary  # type: ignore[call-arg]
+
+
+def _mechanism_at(mechanism: Mechanism, time: float) -> Mechanism:
+    return replace(mechanism, ramp=_held(mechanism.ramp, time)) if mechanism.ramp else mechanism
+
+
+def _absent(mechanism: Mechanism, time: float) -> bool:
+    """Whether another one of its kind has its turn."""
+    return isinstance(mechanism, Load) and not mechanism.several and mechanism.factor(time) == 0.0
+
+
+def _held(ramp: Any, time: float) -> tuple[tuple[float, float]]:
+    return ((0.0, Ramped(ramp=ramp).factor(time)),)
+
+
+def _key(case: Case, time: float) -> tuple[Any, ...]:
+    """What is equal at times at which the same acts."""
+    factors = [m.factor(time) for m in case.mechanisms]
+    held = (_boundary_at(boundary, time) for boundary in case.boundaries)
+    return (*factors, *(getattr(b, "values", None) or getattr(b, "ramp", None) for b in held))
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Times, and the cases at them.
+
+    Attributes
+    ----------
+    times : tuple of float
+        [s], increasing; infinity is the end.
+    cases : tuple of Case
+        What differs; the case itself if nothing does from its end.
+    numbers : tuple of int
+        For each time the number of its case.
+    """
+
+    times: tuple[float, ...]
+    cases: tuple[Case, ...]
+    numbers: tuple[int, ...]
+
+    @classmethod
+    def of(cls, case: Case, times: Iterable[float]) -> Moments:
+        """The cases at some times [s]; with none at the end alone."""
+        series = tuple(sorted(set(times))) or (np.inf,)
+        keys = [_key(case, time) for time in series]
+        different = list(dict.fromkeys(keys))
+        numbers = tuple(different.index(key) for key in keys)
+        if different == [_key(case, np.inf)]:
+            return cls(series, (case,), numbers)
+        first = [series[keys.index(key)] for key in different]
+        return cls(series, tuple(case_at(case, time) for time in first), numbers)
+
+    @classmethod
+    def recorded(cls, case: Case, roles: Iterable[str] = ("fit", "check")) -> Moments:
+        """At which recordings of some roles are compared with a state; at the end alone where one goes on by itself."""
+        if goes_on(case):
+            return cls.of(case, ())
+        wanted = set(roles)
+        return cls.of(case, recorded_times(case, wanted))
+
+    def number(self, time: float) -> int:
+        """The number of the case at one of the times."""
+        return self.numbers[self.times.index(time)]
+
+
+def goes_on(case: Case) -> bool:
+    """Whether a state changes in time while loads do not: stress relaxes, or fluid flows."""
+    return any(mechanism.changes_by_itself for mechanism in case.mechanisms)
+
+
+def recorded_times(case: Case, roles: Iterable[str]) -> tuple[float, ...]:
+    """Times [s] of the rows of recordings that are compared, and of their references, increasing."""
+    wanted, times = set(roles), set()
+    for recording in case.recordings:
+        rows = compared_rows(recording) if recording.role in wanted else ()
+        if len(rows):
+            times |= set(times_of(recording)[rows].tolist())
+            times |= set() if recording.reference is None else {recording.reference}
+    return tuple(sorted(times))
