@@ -18,6 +18,7 @@ from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.marginal import Marginal
 from warpbrain.physics.mechanism import Mechanism
+from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.extrapolated import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
@@ -311,10 +312,18 @@ class FitSearch:
     ) -> SolvedState:
         """The state at nonlinear coordinates, begun at an extrapolation of those of this fit."""
         states = self._base.states
-        start = extrapolated(self._solved, nonlinear) if self._solved else nearby.u
+        start, course = (
+            extrapolated(self._solved, nonlinear) if self._solved else nearby.u,
+            nearby.course or self._course,
+        )
+        # where states of this fit are known a step that leads to none nearby is shortened: from rest, in load steps, a
+        # law that stiffens exponentially takes minutes to fail
+        most = EquilibriumOptions.max_newton if self._solved else EquilibriumOptions.max_total_newton
         try:
-            state = states.solve(hypothesis, start, error, nearby.course or self._course, nearby=self._nearby)
+            state = states.solve(hypothesis, start, error, course, most, self._nearby)
         except SolveError:
+            if self._solved:
+                raise
             state = states.solve(hypothesis, None, error)
         self._solved = [*self._solved[-_KEPT:], (nonlinear, state.u)]
         return state
