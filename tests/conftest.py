@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -90,6 +91,15 @@ def _default_device(request: pytest.FixtureRequest) -> Iterator[None]:
     name = request.getfixturevalue("device") if "device" in request.fixturenames else "cpu"
     with wp.ScopedDevice(name):
         yield
+
+
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """Ctrl-C reaches what a test starts, where the tests run in the background of a shell that ignores it, too."""
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="session")
