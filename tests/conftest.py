@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # processes of tests that run beside each other have one thread of BLAS each: before NumPy is loaded
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
 import warp as wp
