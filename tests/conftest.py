@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # processes of tests that run beside each other have one thread of BLAS each: before NumPy is loaded
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
 import warp as wp
@@ -90,6 +96,15 @@ def _default_device(request: pytest.FixtureRequest) -> Iterator[None]:
     name = request.getfixturevalue("device") if "device" in request.fixturenames else "cpu"
     with wp.ScopedDevice(name):
         yield
+
+
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """Ctrl-C reaches what a test starts, where the tests run in the background of a shell that ignores it, too."""
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from warpbrain.cases.shipped import BEAM, find_case
+from warpbrain.recordings.location import locate
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
@@ -21,8 +22,9 @@ def test_it_bends_as_was_recorded_with_a_modulus_of_its_weight_alone(name, verif
     model = replace(model_of(case)[0], elements="tet10-mixed")
     u = EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u[: len(case.mesh.points)]
     recording = case.recordings[0]
-    nearest = np.argmin(np.linalg.norm(case.mesh.points - recording.points[:3, None], axis=2), axis=1)
-    error = 1e3 * np.sqrt(np.mean((u[nearest, 2] - recording.displacement[:3, 2]) ** 2))
+    # where the markers are, not at the nearest nodes: near the tip 1.4 mm along the beam are 0.3 mm of its fall
+    at_markers = locate(case.mesh.points, case.mesh.tetrahedra, recording.points[:3]).interpolate(u)
+    error = 1e3 * np.sqrt(np.mean((at_markers[:, 2] - recording.displacement[:3, 2]) ** 2))
     verify(
         f"{name}: fall of the tip, root mean square", "motion capture, Dubied et al. 2022", error, TOLERANCE[name], "mm"
     )

@@ -22,6 +22,7 @@ def test_the_list_names_every_case_and_says_what_a_stand_in_is():
     assert "not the patient's images" in done.out and "not these patients' anatomy" in done.out
 
 
+@pytest.mark.usefixtures("drawn")
 @pytest.mark.parametrize("name", ["0529", "phantom"])
 def test_show(tmp_path, name):
     done = warpbrain("cases", "show", name, "--tissue", "single", "--out", tmp_path / "a.png")
@@ -31,6 +32,7 @@ def test_show(tmp_path, name):
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.usefixtures("drawn")
 def test_show_refuses_a_place_it_cannot_write_to(tmp_path):
     done = warpbrain("cases", "show", "phantom", "--out", tmp_path / "none" / "a.png")
     assert done.status == 2

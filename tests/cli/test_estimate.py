@@ -31,6 +31,7 @@ def estimate(*arguments) -> Ran:
     return warpbrain("estimate", "--device", "cpu", "--case", *arguments)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_tables_files_and_figures(folder, tmp_path):
     out = tmp_path / "out"
     done = estimate(folder, "--out", out, "--samples", "25", "--registration", "0.5", "0.5")
@@ -103,6 +104,7 @@ def test_too_few_points_to_know_what_else_may_act(tmp_path):
     assert json.loads((out / "estimate.json").read_text(encoding="utf-8"))["nothing_else"] is None
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_sweep_goes_on_where_it_was_interrupted(folder, tmp_path):
     out = tmp_path / "out"
     done = estimate(folder, "--method", "grid", "--out", out)

@@ -11,6 +11,14 @@ def largest(out):
     return json.loads((out / "summary.json").read_text())["result"]["displacement_mm"]["top"]["largest"]
 
 
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """Largest displacement of the block with nothing added [mm]."""
+    out = tmp_path_factory.mktemp("plain")
+    assert run(write_folder(out / "case"), "--out", out / "out").status == 0
+    return largest(out / "out")
+
+
 @pytest.mark.parametrize(
     "said",
     [
@@ -25,13 +33,11 @@ def largest(out):
         "contact:nodes=top",
     ],
 )
-def test_each_changes_what_happens(tmp_path, said):
-    folder = write_folder(tmp_path / "case")
-    plain = run(folder, "--out", tmp_path / "plain")
-    done = run(folder, "--with", said, "--out", tmp_path / "with")
-    assert (plain.status, done.status) == (0, 0), done.err
+def test_each_changes_what_happens(tmp_path, plain, said):
+    done = run(write_folder(tmp_path / "case"), "--with", said, "--out", tmp_path / "with")
+    assert done.status == 0, done.err
     kind = said.split(":")[0]
-    assert abs(largest(tmp_path / "with") - largest(tmp_path / "plain")) > 1e-4, kind
+    assert abs(largest(tmp_path / "with") - plain) > 1e-4, kind
 
 
 @pytest.mark.parametrize(

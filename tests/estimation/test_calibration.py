@@ -106,7 +106,7 @@ def test_intervals_of_all_settings_together_cover(drawn, verify) -> None:
 
 
 def test_intervals_of_a_few_draws_cover() -> None:
-    found = ranks(Setting("block", 1, 0.4, 0.1), 16, 100)
+    found = ranks(Setting("block", 1, 0.4, 0.1), 8, 100)
     for probability in PROBABILITIES:
         assert excess(int(covered(found, probability)[0]), len(found), probability, 0.999) == 0.0
     assert kstest(found[:, 0], "uniform").pvalue > 1e-3

@@ -11,7 +11,10 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends POSIX signals")
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="sends POSIX signals"),
+    pytest.mark.usefixtures("ctrl_c"),
+]
 
 #: Seconds from the signal to the end: one is promised, one more for a busy machine.
 PATIENCE = 2.0

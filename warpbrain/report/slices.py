@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Floats, Ints
 
 _EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
+_SIDES = np.array([(0, 1), (1, 2), (2, 0)])
 
 
 @dataclass(frozen=True)
@@ -50,19 +51,35 @@ def cut(points: Floats, tetrahedra: NDArray[np.integer], values: Floats, axis: i
     above = points[:, axis] >= position
     crossing = above[tetrahedra].any(axis=1) & ~above[tetrahedra].all(axis=1)
     elements = np.flatnonzero(crossing)
+    polygons: list[Floats] = [np.empty((0, 2))] * len(elements)
+    at_corners: list[Floats] = [np.empty(0)] * len(elements)
+    means = np.empty(len(elements))
+    corners_of = above[tetrahedra[elements]].sum(axis=1)
+    # one node or three on a side make a triangle, two a quadrangle
+    for count, rows in ((3, np.flatnonzero(corners_of != 2)), (4, np.flatnonzero(corners_of == 2))):
+        corners, t, ends = _crossings(points, tetrahedra[elements[rows]][:, _EDGES], above, axis, position)
+        corners, ends = corners.reshape(-1, count, 2), ends.reshape(-1, count, 2)
+        x, y = np.moveaxis(corners - corners.mean(axis=1, keepdims=True), -1, 0)
+        around = np.argsort(np.arctan2(y, x), axis=1)
+        first, last = values[ends[..., 0]], values[ends[..., 1]]
+        carried = np.take_along_axis(first + t.reshape(-1, count) * (last - first), around, axis=1)
+        means[rows] = carried.mean(axis=1)
+        for row, polygon, carries in zip(
+            rows, np.take_along_axis(corners, around[..., None], axis=1), carried, strict=True
+        ):
+            polygons[row], at_corners[row] = polygon, carries
+    return Cut(polygons, elements, means, at_corners)
+
+
+def _crossings(
+    points: Floats, edges: NDArray[np.integer], above: NDArray[np.bool_], axis: int, position: float
+) -> tuple[Floats, Floats, NDArray[np.integer]]:
+    """Of edges (k, e, 2) those that cross a plane: where in it, how far along, and their ends, one after another."""
+    ends = edges[above[edges[..., 0]] != above[edges[..., 1]]]
+    p, q = points[ends[:, 0]], points[ends[:, 1]]
+    t = (position - p[:, axis]) / (q[:, axis] - p[:, axis])
     plane_axes = [k for k in range(3) if k != axis]
-    polygons, found = [], []
-    for tetrahedron in tetrahedra[elements]:
-        ends = tetrahedron[_EDGES]
-        ends = ends[above[ends[:, 0]] != above[ends[:, 1]]]
-        p, q = points[ends[:, 0]], points[ends[:, 1]]
-        t = (position - p[:, axis]) / (q[:, axis] - p[:, axis])
-        corners = (p + t[:, None] * (q - p))[:, plane_axes]
-        centre = corners.mean(axis=0)
-        around = np.argsort(np.arctan2(corners[:, 1] - centre[1], corners[:, 0] - centre[0]))
-        polygons.append(corners[around])
-        found.append((values[ends[:, 0]] + t * (values[ends[:, 1]] - values[ends[:, 0]]))[around])
-    return Cut(polygons, elements, np.array([corners.mean() for corners in found]), found)
+    return (p + t[:, None] * (q - p))[:, plane_axes], t, ends
 
 
 def level_line(section: Cut, level: float) -> Floats:
@@ -83,12 +100,5 @@ def outline(points: Floats, faces: NDArray[np.integer], axis: int, position: flo
     """Segments in which triangles cross the plane ``x[axis] = position``, shape (k, 2, 2)."""
     above = points[:, axis] >= position
     crossed = faces[above[faces].any(axis=1) & ~above[faces].all(axis=1)]
-    plane_axes = [k for k in range(3) if k != axis]
-    segments = []
-    for face in crossed:
-        ends = face[[(0, 1), (1, 2), (2, 0)]]
-        ends = ends[above[ends[:, 0]] != above[ends[:, 1]]]
-        p, q = points[ends[:, 0]], points[ends[:, 1]]
-        t = (position - p[:, axis]) / (q[:, axis] - p[:, axis])
-        segments.append((p + t[:, None] * (q - p))[:, plane_axes])
-    return np.array(segments).reshape(-1, 2, 2)
+    corners, _, _ = _crossings(points, crossed[:, _SIDES], above, axis, position)
+    return corners.reshape(-1, 2, 2)

@@ -58,9 +58,9 @@ def counted_anew(case: Case) -> Case:
 
 _TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
 _ANEW: dict[str, Callable[[Case], Case]] = {
-    "shifted": lambda case: in_frame(case, np.eye(3), np.array([0.3, -0.2, 0.1])),
-    "turned": lambda case: in_frame(case, _TURN * np.linalg.det(_TURN), np.zeros(3)),
-    "mirrored": lambda case: in_frame(case, np.diag([-1.0, 1.0, 1.0]), np.zeros(3)),
+    "turned, mirrored and shifted": lambda case: in_frame(
+        case, -_TURN * np.linalg.det(_TURN), np.array([0.3, -0.2, 0.1])
+    ),
     "counted anew": counted_anew,
 }
 
