@@ -29,8 +29,8 @@ CELLS = (20, 6, 6)
 MU = 82100.0
 #: Standard deviation of a component [mm] of the tip, which was held by hand: two releases 0.4 mm apart across and
 #: 0.1 mm down, and how much lower than undeformed is known to 0.3 mm. With a weight in the hand it was held 1.8 mm to
-#: the side of that and turned by 4 degrees. Markers at the clamp are taken to be as accurate: with the weight one of them, on the
-#: silicone beside the clamp, moves by 0.9 mm.
+#: the side of that and turned by 4 degrees. Markers at the clamp are taken to be as accurate: with the weight one of
+#: them, on the silicone beside the clamp, moves by 0.9 mm.
 HELD, HELD_WITH_WEIGHT = 0.35, 0.6
 GRAVITY_FILES = ("beam_gravity_V2_a.c3d", "beam_gravity_V2_b.c3d")
 #: Its standard deviation there, relative: of a beam with a weight it is known. The weight of the beam is what tells it.
