@@ -6,7 +6,7 @@ import pytest
 from command import run, warpbrain
 from folders import write_folder, write_recorded
 
-from warpbrain.cases.shipped import RESECT, SHIPPED, STAND_INS
+from warpbrain.cases.shipped import BEAM, RESECT, SHIPPED, STAND_INS
 
 
 def test_the_list_names_every_case_and_says_what_a_stand_in_is():
@@ -14,11 +14,14 @@ def test_the_list_names_every_case_and_says_what_a_stand_in_is():
     assert done.status == 0 and done.err == ""
     head, *lines = done.out.splitlines()
     assert head.split() == ["case", "tissue", "origin", "nodes", "elements", "cm3", "recordings"]
-    rows = {(line.split()[0], line.split()[1]): line.split() for line in lines if line.strip() and line[0] in "0pr"}
+    listed = [line.split() for line in lines]
+    rows = {(row[0], row[1]): row for row in listed if row and row[0] in SHIPPED}
     assert set(rows) == {(name, tissue) for name, variants in SHIPPED.items() for tissue in variants}
     for (name, _), row in rows.items():
-        assert row[2] == ("stand-in" if name in STAND_INS else "measured" if name in RESECT else "synthetic")
-        assert int(row[3]) > 2000 and int(row[4]) > 10000 and 1000 < float(row[5]) < 1700
+        measured = name in (*RESECT, *BEAM)
+        assert row[2] == ("stand-in" if name in STAND_INS else "measured" if measured else "synthetic")
+        assert int(row[3]) > 1000 and int(row[4]) > 4000
+        assert float(row[5]) == 90.0 if name in BEAM else 1000.0 < float(row[5]) < 1700.0
     assert "not the patient's images" in done.out and "not these patients' anatomy" in done.out
 
 
@@ -115,7 +118,7 @@ def test_a_history_is_followed(tmp_path):
     folder = write_folder(tmp_path, (force, 'kind = "displacement"\nvalue = "pull.csv"'))
     (folder / "pull.csv").write_text("t,ux,uy,uz\n0,0,0,0\n0.002,0,0,-0.4\n0.004,0,0,0.2\n")
     for steps, size in (("1", 0.2), ("2", 0.4), ("3", 0.1), ("4", 0.2), ("6", 0.2)):
-        done = run(folder, "--steps", steps, "--out", tmp_path / "out")
+        done = run(folder, "--steps", steps, "--out", tmp_path / "out", "--overwrite")
         assert done.status == 0, done.err
         summary = json.loads((tmp_path / "out" / "summary.json").read_text())
         assert summary["result"]["displacement_mm"]["top"]["largest"] == pytest.approx(size), steps

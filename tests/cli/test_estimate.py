@@ -95,7 +95,7 @@ def nothing_else_acts(printed, said):
 
 def test_too_few_points_to_know_what_else_may_act(tmp_path):
     case = block({"brain": WHITE}, "pushed")
-    recording = replace(beads(truth(case), count=9, noise=1e-4), file="b.csv")
+    recording = replace(beads(truth(case), count=4, noise=1e-4), file="b.csv")
     write_case(tmp_path / "block", replace(case, recordings=(recording,)))
     out = tmp_path / "out"
     done = estimate(tmp_path / "block", "--out", out, *QUICK, "--no-discretisation", "--causes")

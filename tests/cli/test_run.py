@@ -116,7 +116,7 @@ def test_summary_file(block_run, folder):
     said = summary(out)
     assert set(said) == {
         "case", "device", "solution", "result", "recordings", "seconds_by_phase", "calls_by_phase",
-        "seconds_to_first_step", "versions",
+        "seconds_to_first_step", "versions", "inputs_sha256",
     }  # fmt: skip
     case = said["case"]
     assert (case["name"], case["title"], case["origin"]) == ("block", "A block of gel", "synthetic")

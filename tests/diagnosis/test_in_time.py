@@ -86,11 +86,10 @@ def _followed(states: States, hypothesis: Hypothesis) -> Floats:
     system, external = System(model, "cpu"), model.external_forces()
     moments = follow_slowly(system, steps_to(states.times), EquilibriumOptions(tolerance=TOLERANCE))
     by_time = {moment.time: moment.state for moment in moments}
-    parts = [
-        (time, observations, by_time[time].u, model.reactions(by_time[time].internal, external))
-        for time, observations in zip(states.times, states.observations, strict=True)
-    ]
-    return sensors_at(parts, states.centre).computed
+    recorded = [by_time[time] for time in states.times]
+    u = np.concatenate([state.u for state in recorded])
+    reactions = np.concatenate([model.reactions(state.internal, external) for state in recorded])
+    return sensors_at(states.observations, u, reactions, states.centre).computed
 
 
 def test_one_course_is_that_of_every_permeability(tmp_path) -> None:

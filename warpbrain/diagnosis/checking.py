@@ -17,6 +17,7 @@ from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
 from warpbrain.worlds.body.refit import Refit
+from warpbrain.worlds.body.rigid_motion import RigidMotion
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState, States
 from warpbrain.worlds.body.time_courses import finite_times
@@ -43,12 +44,12 @@ def _error(checks: States, base: Base, fit: Refit) -> float:
     error = None if base.mesh_errors is None else _mesh_error(base, base.mesh_errors, fit)
     sensors = _sensors(checks, fit.state, error)
     nuisances, _ = base.for_sensors(_at_nearest_times(sensors, base.states.times))
-    # less tissue and field, which the state has, and the motion by which recordings were realigned
-    coordinates = nuisances.coordinates(base.prior, fit.state.hypothesis)
-    coordinates[nuisances.part("registration")] = base.states.motion_coordinates
-    linear = fit.nuisances[: len(coordinates)] - coordinates
+    rigid = RigidMotion(checks, nuisances)
+    # less tissue and field, which the state has
+    linear = fit.nuisances[: nuisances.columns.shape[1]] - nuisances.coordinates(base.prior, fit.state.hypothesis)
+    linear[rigid.part] = 0.0
     residual = sensors.residual - nuisances.columns @ linear
-    return distance(sensors, residual)
+    return distance(sensors, residual + rigid.change(sensors, fit.nuisances))
 
 
 def _sensors(checks: States, state: SolvedState, error: Difference | None) -> Sensors:

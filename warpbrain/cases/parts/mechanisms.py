@@ -55,7 +55,8 @@ def read_mechanisms(
             for name, says in mechanism.parameters().items()
             if table.has(name)
         }
-        if any(value is None for value in values.values()):
+        wrong = [name for name in mechanism.parameters() if table.named(name) and not table.has(name)]
+        if wrong or any(value is None for value in values.values()):
             continue
         try:
             facts = Facts(named.mesh, axis, density, tuple(m for m in found.values() if isinstance(m, Removing)))

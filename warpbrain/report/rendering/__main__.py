@@ -8,15 +8,15 @@ from pathlib import Path
 
 def main(folder: Path) -> None:
     """Render; what the graphics library says of displays that are not there is nobody's business."""
-    from vtkmodules.vtkCommonCore import vtkLogger
-
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     import numpy as np
+    import pyvista
 
     from warpbrain.report.rendering.drawing import screenshot
     from warpbrain.report.rendering.scene import read_scene
 
-    np.save(folder / "pictures.npy", screenshot(*read_scene(folder)))
+    with pyvista.vtk_verbosity("off"):
+        pictures = screenshot(*read_scene(folder))
+    np.save(folder / "pictures.npy", pictures)
 
 
 if __name__ == "__main__":
