@@ -96,15 +96,31 @@ class Confirming:
         return held_out.predict(weighted_set.marginal.model, weighted_set.residual)
 
     def confirmations(self, weighted_set: WeightedSet) -> tuple[Confirmation, ...]:
-        """Of each mechanism of a set, given all others of it."""
-        return tuple(self._confirm(weighted_set, name) for name in weighted_set.mechanisms)
+        """Of each mechanism of a set, given those that explain more.
 
-    def _confirm(self, weighted_set: WeightedSet, name: str) -> Confirmation:
-        others = self.search.get(weighted_set.names - {name})
+        The one without which a set is most probable is left out first. Given all others, what two causes explain alike
+        would confirm neither, and the weaker one where the stronger one is more like a third.
+        """
+        confirmed = {}
+        while weighted_set.mechanisms:
+            without = self._without(weighted_set)
+            weakest = max(without, key=lambda name: without[name].hypothesis.log_evidence)
+            confirmed[weakest] = self._confirm(weighted_set, weakest, without[weakest])
+            weighted_set = without[weakest]
+        return tuple(reversed(confirmed.values()))
+
+    def _without(self, weighted_set: WeightedSet) -> dict[str, WeightedSet]:
+        """Sets without one of the mechanisms of a set, by its name: those that were weighed, if any was.
+
+        About a fit of all, what is left may do the work of a large cause that would be nothing without that.
+        """
+        every = {name: self.search.get(weighted_set.names - {name}) for name in weighted_set.mechanisms}
+        weighed = {name: known for name, known in every.items() if known is not None}
+        return weighed or {name: weighted_set.without(name, self.search.base) for name in every}
+
+    def _confirm(self, weighted_set: WeightedSet, name: str, others: WeightedSet) -> Confirmation:
         effect = weighted_set.effects[weighted_set.mechanisms.index(name)]
         held_out = self._held_out[effect.proposed.centre is not None]
-        if others is None:
-            others = weighted_set.without(name, self.search.base)
         full, reduced = self.predict(weighted_set, held_out), self.predict(others, held_out)
         patterns = self._patterns(others, held_out, effect.columns.shape[1], len(self.search.causes.named(name).places))
         return Confirmation(

@@ -203,9 +203,9 @@ class Diagnosing:
         if decision.verdict not in (NAMED, NAMED_AND_REST):
             return _Checked(decision, doubts, nothing, confirmations, p_left)
         if set(decision.causes) != set(by_posterior.causes):
-            best = search.fitted_with(frozenset(decision.causes))
+            best = search.fitted_with(frozenset(decision.causes), best)
             if best is None:
-                # what the checks leave is no set that was worth weighing by itself, or has no equilibrium
+                # what the checks leave has no equilibrium
                 return _Checked(Decision(CANNOT_SAY, by_posterior.causes), doubts, nothing, confirmations, p_left)
             p_left = confirming.p_left(best)
         return _Checked(decision, doubts, best, confirmations, p_left)

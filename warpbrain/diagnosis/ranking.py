@@ -103,7 +103,7 @@ def about_base(search: HypothesisSearch, weighted_set: WeightedSet, name: str) -
         [base.nuisances.columns, *(effect.columns for effect in others), weighted_set.marginal.excess]
     )
     residual = base.residual - sum((effect.mean for effect in others), start=np.zeros(len(base.residual)))
-    return GaussianModel(base.model.noise_factor, columns, model.scale), residual
+    return GaussianModel(model.noise_factor, columns, model.scale), residual
 
 
 def _place(effect: Effect, scanned: tuple[Effect, ...], weights: Floats) -> tuple[Floats | None, float | None]:

@@ -21,6 +21,7 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.estimation.observations import Observations, Residuals
+from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import Outliers, with_gross_errors
 from warpbrain.inference.noise import log_scale_density, noise_covariance, outliers, scales
@@ -50,6 +51,10 @@ class Rows:
         Rows of each point that may be a gross error, those of a recording together; forces have none.
     times : (n,) array, optional
         When [s]; all at the end unless given.
+    over_element : (n, 3) array, optional
+        As of `noise_covariance`; zero unless given.
+    unresolved : float
+        Part of it that the mesh does not show.
     """
 
     positions: Floats
@@ -59,6 +64,8 @@ class Rows:
     declared: Bools
     points: tuple[Ints, ...]
     times: Floats | None = None
+    over_element: Floats | None = None
+    unresolved: float = 0.0
 
     @classmethod
     def of(cls, observations: Observations, parts: tuple[Residuals, ...]) -> Rows:
@@ -83,12 +90,14 @@ class Rows:
             np.array([recording.sigma is not None for recording in observations.recordings]),
             tuple(points),
             np.concatenate(times),
+            np.concatenate([recording.over_element.reshape(-1, 3) for recording in observations.recordings]),
         )
 
     def covariance(self, sigma: Floats) -> Floats:
         """Of the noise at a scale of 1, (n, n), with standard deviations (n,)."""
         times = np.full(len(sigma), np.inf) if self.times is None else self.times
-        return noise_covariance(self.positions, self.directions, times, sigma)
+        beyond = None if self.over_element is None else self.unresolved * self.over_element
+        return noise_covariance(self.positions, self.directions, times, sigma, beyond)
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +253,15 @@ class Likelihood:
             self._settled(Noise(rows, sigma, scale, sound, self.outliers), expected, columns)
             for scale in self._starts(rows, sigma, expected, columns)
         ]
-        return max(candidates, key=lambda noise: _log_evidence(noise, expected, columns))
+        found = max(candidates, key=lambda noise: _log_evidence(noise, expected, columns))
+        if rows.over_element is None or not rows.over_element.any() or self.outliers is None:
+            return found
+        for part in beliefs("mesh.unresolved")[1:].tolist():
+            other = self._settled(replace(found, rows=replace(rows, unresolved=part)), expected, columns)
+            if _log_evidence(other, expected, columns) < _log_evidence(found, expected, columns):
+                break
+            found = other
+        return found
 
     def _starts(self, rows: Rows, sigma: Floats, expected: Floats, columns: Floats) -> tuple[float, ...]:
         """Scales to begin with: gross errors first, and all points sound first."""

@@ -22,6 +22,7 @@ from warpbrain.cases.enough import too_few_for_noise
 from warpbrain.cases.moments import Moments
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
+from warpbrain.estimation.within_element import change_over_element
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.feature_normals import feature_normals
 from warpbrain.recordings.closest import closest_points
@@ -91,6 +92,8 @@ class Observation:
         Components of a row.
     positions : (k, 3) array
         What a wrong registration moves [m]; empty for forces.
+    over_element : (n, size, 3) array
+        Of `change_over_element`; zero of all but points.
     times, references : (n,) array
         When each row was recorded, and the time from which it is counted [s]: infinity is the end, 0 is rest.
     at : callable
@@ -106,6 +109,7 @@ class Observation:
     weights: Floats
     size: int
     positions: Floats
+    over_element: Floats
     times: Floats
     references: Floats
     at: Callable[[Floats, Floats, Floats, Floats], Residuals]
@@ -217,6 +221,7 @@ class _Part:
     weights: Floats
     size: int
     positions: Floats
+    over_element: Floats
     at: _At
 
 
@@ -271,6 +276,7 @@ def _observation(case: Case, recording: Recording, moments: Moments) -> Observat
         weights,
         parts[0].size,
         np.concatenate([part.positions for part in parts]),
+        np.concatenate([part.over_element for part in parts]),
         times[rows],
         np.full(len(rows), recording.reference or 0.0),
         at,
@@ -285,7 +291,7 @@ def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Part:
     if not (np.isfinite(weights) & (weights >= 0.0)).all():
         raise InputError(f"recording '{recording.name}': a weight is negative or no number")
     rows, weights = rows[weights > 0.0], weights[weights > 0.0]
-    matrix, by_displacement = _located(mesh, recording.points[rows].astype(np.float64).tobytes())
+    matrix, by_displacement, edges = _located(mesh, recording.points[rows].astype(np.float64).tobytes())
     nothing = csr_matrix(by_displacement.shape)
     positions = recording.points[rows] + recording.displacement[rows]
 
@@ -296,19 +302,23 @@ def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Part:
         rigid = -moved_back_columns(positions, motion, centre)
         return displacement - matrix @ u, rigid, directions, by_displacement, nothing
 
-    return _Part(rows, weights, 3, positions, at)
+    over_element = change_over_element(recording.points[rows], recording.displacement[rows], edges)
+    return _Part(rows, weights, 3, positions, over_element, at)
 
 
 @lru_cache(maxsize=_KEPT)
-def _located(mesh: TetMesh, points: bytes) -> tuple[Any, Any]:
+def _located(mesh: TetMesh, points: bytes) -> tuple[Any, Any, Floats]:
     """From values at nodes to those at points, given as bytes of (n, 3) [m]: SciPy CSR (n, N) and (3 n, 3 N).
+
+    With them the mean length of the edges of each point's element (n,) [m].
 
     Recordings that are taken to have been moved are of the same points of the body each time.
     """
     from scipy.sparse import eye, kron
 
-    matrix = locate(mesh.points, mesh.tetrahedra, np.frombuffer(points).reshape(-1, 3)).matrix(len(mesh.points))
-    return matrix, kron(matrix, eye(3), format="csr")
+    location = locate(mesh.points, mesh.tetrahedra, np.frombuffer(points).reshape(-1, 3))
+    matrix = location.matrix(len(mesh.points))
+    return matrix, kron(matrix, eye(3), format="csr"), location.edge
 
 
 def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Part:
@@ -342,7 +352,7 @@ def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Part:
         values = (side * closest.distance)[:, None]
         return values, rigid, directions[:, None, :], by_displacement, csr_matrix(shape)
 
-    return _Part(rows, np.ones(len(rows)), 1, positions, at)
+    return _Part(rows, np.ones(len(rows)), 1, positions, np.zeros((len(rows), 1, 3)), at)
 
 
 def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Part:
@@ -367,7 +377,7 @@ def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Part:
         values = force - reactions[nodes].sum(axis=0)[recorded]
         return values, np.zeros((len(rows), size, 6)), np.zeros((len(rows), size, 3)), nothing, by_reactions
 
-    return _Part(rows, np.ones(len(rows)), size, np.empty((0, 3)), at)
+    return _Part(rows, np.ones(len(rows)), size, np.empty((0, 3)), np.zeros((len(rows), size, 3)), at)
 
 
 def _sigma(recording: Recording, rows: Ints, weights: Floats) -> Floats | None:

@@ -162,7 +162,7 @@ def predictions(
 
 def _unseen(observation: Observation, part: Residuals, jacobian: Floats, joint: Floats, fitted: Noise) -> Noise:
     """The noise of a recording that was not fitted, its gross errors beside what the estimate knows of it."""
-    rows = Rows.of(Observations((observation,), ()), (part,))
+    rows = replace(Rows.of(Observations((observation,), ()), (part,)), unresolved=fitted.rows.unresolved)
     noise = Noise(rows, rows.sigma, fitted.scale, np.ones(len(rows.points)), fitted.outliers)
     if observation.sigma is None or fitted.outliers is None:
         return noise

@@ -10,13 +10,13 @@ from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decisi
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What a cause of a fit explains that all others of it do not.
+    """What a cause of a fit explains that those of it that explain more do not.
 
     Attributes
     ----------
     name : str
     log_evidence : float
-        Log Bayes factor of the fit over that without the cause.
+        Log Bayes factor of a set with these over that without the cause.
     heldout_log_density : float
         By how much held-out rows are more probable with it [nats].
     gain : (part, low, high)

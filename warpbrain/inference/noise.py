@@ -1,10 +1,12 @@
 """The noise of recorded rows: independent, partly shared by neighbours, of an uncertain scale, with gross errors.
 
-    e ~ N(0, kappa^2 R),   R_ij = sigma_i sigma_j (delta_ij + s^2 exp(-|x_i - x_j|^2 / (2 l^2)) d_i . d_j)
+    e ~ N(0, kappa^2 R),
+    R_ij = sigma_i sigma_j (delta_ij + s^2 exp(-|x_i - x_j|^2 / (2 l^2)) d_i . d_j) + m_i . m_j delta(x_i, x_j)
 
-for rows i, j that were recorded at one time, at the places `x` in the directions `d`; rows without a direction, such as
-forces, are independent. `s` and `l` are `noise.shared` and `noise.reach` of `priors.toml`. The logarithm of `kappa`
-is a Student t. Of a few points the noise is many times larger, see `gross_errors`.
+for rows i, j that were recorded at one time, at the places `x` in the directions `d`, with errors `m` of what the mesh
+does not resolve (`warpbrain.estimation.within_element`); rows without a direction, such as forces, are independent. `s`
+and `l` are `noise.shared` and `noise.reach` of `priors.toml`. The logarithm of `kappa` is a Student t. Of a few points
+the noise is many times larger, see `gross_errors`.
 """
 
 from __future__ import annotations
@@ -18,7 +20,9 @@ from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.gross_errors import Outliers
 
 
-def noise_covariance(positions: Floats, directions: Floats, times: Floats, sigma: Floats) -> Floats:
+def noise_covariance(
+    positions: Floats, directions: Floats, times: Floats, sigma: Floats, unresolved: Floats | None = None
+) -> Floats:
     """Covariance `R` (n, n) of the noise of rows at a scale of 1.
 
     Parameters
@@ -31,22 +35,30 @@ def noise_covariance(positions: Floats, directions: Floats, times: Floats, sigma
         When [s]; infinite of the end.
     sigma : (n,) array
         Standard deviation of the independent part, in the unit of the row.
+    unresolved : (n, 3) array, optional
+        Error of a row if its place is off by one standard deviation along each axis, in the unit of the row; a place is
+        off alike for all rows of a point.
     """
     from scipy.spatial.distance import cdist
 
     covariance = np.diag(np.asarray(sigma, dtype=np.float64) ** 2)
     rows = np.flatnonzero(directions.any(axis=1))
     places, axes = positions[rows], directions[rows]
-    shared = np.exp(-0.5 * (cdist(places, places) / belief("noise.reach")) ** 2) * (axes @ axes.T)
+    distances = cdist(places, places)
+    shared = np.exp(-0.5 * (distances / belief("noise.reach")) ** 2) * (axes @ axes.T)
+    shared *= belief("noise.shared") ** 2 * np.outer(sigma[rows], sigma[rows])
+    if unresolved is not None and unresolved.any():
+        shared += np.where(distances == 0.0, unresolved[rows] @ unresolved[rows].T, 0.0)
     # noise at different times is independent
-    shared *= times[rows][:, None] == times[rows][None]
-    covariance[np.ix_(rows, rows)] += belief("noise.shared") ** 2 * np.outer(sigma[rows], sigma[rows]) * shared
+    covariance[np.ix_(rows, rows)] += shared * (times[rows][:, None] == times[rows][None])
     return covariance
 
 
-def noise_factor(positions: Floats, directions: Floats, times: Floats, sigma: Floats) -> Floats:
+def noise_factor(
+    positions: Floats, directions: Floats, times: Floats, sigma: Floats, unresolved: Floats | None = None
+) -> Floats:
     """Lower triangular factor (n, n) of `noise_covariance`, with its parameters."""
-    covariance = noise_covariance(positions, directions, times, sigma)
+    covariance = noise_covariance(positions, directions, times, sigma, unresolved)
     # rows in metres and in newtons: scaled to a unit diagonal before they are factorised
     return np.asarray(sigma[:, None] * np.linalg.cholesky(covariance / np.outer(sigma, sigma)))
 

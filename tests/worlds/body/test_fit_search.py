@@ -35,7 +35,7 @@ def search(sets: HypothesisSearch, base: Base) -> FitSearch:
     """A fit of the set with the weight, at the most probable point of the linear model."""
     weighed = sets.get(("gravity",))
     assert weighed is not None
-    columns = base.nuisances.at_fraction(weighed.columns, base.nuisances.fraction)
+    columns = base.nuisances.with_unknown_mesh(weighed.columns, base.nuisances.families[-1].columns)
     fit = FitSearch(base, None, weighed.effects, columns, weighed.marginal)
     fit.start([weighed.coordinates], base.state)
     return fit
@@ -50,12 +50,13 @@ def test_a_result_says_the_point_in_its_own_columns(search):
 def test_another_size_of_the_mesh_error_is_the_same_point(base, search):
     nuisances = base.nuisances
     fit = search.result()
-    part, fraction = nuisances.part(UNKNOWN_MESH), 3.0 * nuisances.fraction_of(fit.columns)
+    part = nuisances.part(UNKNOWN_MESH)
+    unknown = 3.0 * fit.columns[:, part]
     search.z[part] = np.linspace(-1.0, 1.0, part.stop - part.start)
     linear = search.residual + search.columns @ search.z
-    other = replace(fit, columns=nuisances.at_fraction(fit.columns, fraction))
+    other = replace(fit, columns=nuisances.with_unknown_mesh(fit.columns, unknown))
     assert search.update_noise(other)
-    np.testing.assert_allclose(nuisances.fraction_of(search.columns), fraction)
+    np.testing.assert_array_equal(search.columns[:, part], unknown)
     np.testing.assert_allclose(search.residual + search.columns @ search.z, linear, atol=1e-12)
     # now it is fitted with what the result has
     assert not search.update_noise(other)

@@ -24,7 +24,7 @@ def sensors() -> Sensors:
     nothing = np.zeros((n, 1))
     computed = np.concatenate([np.zeros(n - 3), [0.0, 0.0, -4.0]])
     residual = np.concatenate([np.zeros(n - 3), [0.0, 3.0, 4.0 - 4.0]])
-    rest = (nothing, nothing, np.zeros((n, 6)), np.ones(n), positions, directions, groups)
+    rest = (nothing, nothing, np.zeros((n, 6)), np.ones(n), positions, directions, np.zeros((n, 3)), groups)
     from_rest = (np.zeros(n, dtype=int), np.full(n, -1), np.zeros(n))
     return Sensors(residual, computed, *rest, np.zeros(n, dtype=int), np.zeros(n), ("all",), *from_rest)
 

@@ -85,7 +85,8 @@ def write_covariance(path: Path, found: Diagnosis) -> None:
     """
     base = found.base
     sensors = base.at.sensors
-    noise = found.weighted_sets[REFITTED].marginal.scale * base.model.noise_factor
+    without = found.weighted_sets[REFITTED].marginal
+    noise = without.scale * without.model.noise_factor
     factors = np.where(sensors.is_displacement, MILLIMETRES, 1.0)[:, None]
     parts = factors * np.column_stack([noise, base.nuisances.columns])
     # half the digits: variances are a million times the least of them, not more

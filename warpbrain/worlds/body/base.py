@@ -40,6 +40,8 @@ from warpbrain.worlds.listener import Listener
 _STEPS, _CONVERGED = 6, 0.5
 #: Part of the step before at most, for the next one to keep its columns.
 _CONTRACTION = 0.5
+#: What is smaller than this part of the noise everywhere is not looked for.
+_UNSEEN = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,10 @@ class Base:
     unknown : dict of str to (n, k) array
         Columns of unknown fields, of 1 m.
     model : GaussianModel
-        Of the rows if no cause acts: nuisances, and noise without gross errors.
+        Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
+    noises : tuple of GaussianModel
+        The same noise without columns, and with what the mesh does not resolve, of each size of `mesh.unresolved`; of
+        the first alone where all are next to nothing.
     noise : (n,) array
         Standard deviation of the independent noise of each row.
     points : tuple of int arrays
@@ -85,6 +90,7 @@ class Base:
     nuisances: Nuisances
     unknown: dict[str, Floats]
     model: GaussianModel
+    noises: tuple[GaussianModel, ...]
     noise: Floats
     points: tuple[Ints, ...]
     residual: Floats
@@ -201,6 +207,7 @@ class BaseFinder:
             nuisances,
             unknown,
             GaussianModel(factor, nuisances.columns),
+            _noises(linear, resolved=errors is None or self._without_nuisances),
             linear.noise,
             linear.points,
             linear.residual,
@@ -283,6 +290,18 @@ class _LinearModel:
         other = copy.copy(self)
         other.residual = self._residual_at_mean(state)
         return other
+
+
+def _noises(linear: _LinearModel, resolved: bool) -> tuple[GaussianModel, ...]:
+    """Noise with each size of what the mesh does not resolve; the first one alone if that is `resolved`."""
+    sensors, nothing = linear.at.sensors, np.zeros((len(linear.noise), 0))
+    sizes = beliefs("mesh.unresolved")
+    visible = sizes.max() * np.linalg.norm(sensors.over_element, axis=1) > _UNSEEN * linear.noise
+    factors = [linear.noise_factor]
+    for size in sizes[1:].tolist() if visible.any() and not resolved else []:
+        beyond = size * sensors.over_element
+        factors.append(noise_factor(sensors.positions, sensors.directions, sensors.times, linear.noise, beyond))
+    return tuple(GaussianModel(factor, nothing) for factor in factors)
 
 
 def _with_likely_fraction(nuisances: Nuisances, factor: Floats, residual: Floats, smooth: Floats) -> Nuisances:

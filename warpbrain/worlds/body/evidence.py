@@ -1,26 +1,32 @@
-"""Evidence of a set of causes of a body, summed over the size of what is not known of the mesh's error.
+"""Evidence of a set of causes of a body, summed over the sizes of what is not known of the mesh's error.
 
-That part of the error is correlated in space, as what a local cause moves is. A set that explains the recordings leaves
-a small one; under a wrong set it takes up what is left. With one size for all sets it would hide causes.
+One part of that error is correlated in space, as what a local cause moves is; another is what the mesh does not resolve
+(`warpbrain.estimation.within_element`). The first is relative to the displacement under the set, which is that of its
+causes where these move more than all else. A set that explains the recordings leaves small ones; under a wrong set they
+take up what is left. With one size for all sets they would hide causes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import beliefs
+from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
 from warpbrain.inference.marginal import Marginal, marginal
+from warpbrain.inference.noise import outliers
 from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 
 #: The sum over sizes ends where a term is below this part of the largest.
 _NEGLIGIBLE = 1e-2
 
 
 def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.0) -> tuple[Floats, Marginal]:
-    """Evidence of residuals, and the columns with the most probable size of the mesh's unknown error.
+    """Evidence of residuals, and the columns with the most probable size of the smooth part.
 
     Parameters
     ----------
@@ -36,32 +42,63 @@ def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.
     -------
     columns : (n, q) array
     marginal : Marginal
-        With these columns; its log evidence is the mean over all sizes.
+        With these columns and the most probable noise; its log evidence is the mean over all sizes.
     """
     nuisances, fractions = base.nuisances, beliefs("mesh.unknown")
-    if not nuisances.families[-1].columns.any():
-        # nothing moves, or no displacement was recorded
-        return columns, marginal(base.model.of_noise(columns), residual, base.points, scale)
-    logs = np.full(len(fractions), -np.inf)
-    weighed: dict[int, tuple[Floats, Marginal]] = {}
+    # of nothing that moves, or where no displacement was recorded, there is one size
+    moving = nuisances.families[-1].columns.any()
+    if moving:
+        unknown = _displacement(base, columns, residual, scale)[:, None] * nuisances.relative
+    else:
+        fractions, unknown = np.ones(1), nuisances.families[-1].columns
+    weighed: dict[tuple[int, int], tuple[Floats, Marginal]] = {}
 
-    def add(number: int) -> None:
-        at_fraction = nuisances.at_fraction(columns, float(fractions[number]))
-        # gross errors are nearly the same whatever the mesh's error
-        known = next((result for _, result in weighed.values()), None)
-        near = (scale, None) if known is None else (known.scale, known.inflation)
-        result = marginal(base.model.of_noise(at_fraction), residual, base.points, *near)
-        weighed[number], logs[number] = (at_fraction, result), result.log_evidence
+    def log_evidence(fraction: int, noise: int) -> float:
+        if (fraction, noise) not in weighed:
+            at_fraction = nuisances.with_unknown_mesh(columns, fractions[fraction] * unknown)
+            # gross errors are nearly the same whatever the smooth part; what is not resolved may look like some
+            known = next((result for (_, other), (_, result) in weighed.items() if other == noise), None)
+            near = (scale, None) if known is None else (known.scale, known.inflation)
+            result = marginal(base.noises[noise].of_noise(at_fraction), residual, base.points, *near)
+            weighed[fraction, noise] = (at_fraction, result)
+        return weighed[fraction, noise][1].log_evidence
 
-    first = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction_of(columns)))))
-    add(first)
+    first = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction))))
+    by_fraction = _around(lambda number: log_evidence(number, 0), first, len(fractions))
+    best = int(np.argmax(by_fraction))
+    by_noise = _around(lambda number: log_evidence(best, number), 0, len(base.noises))
+    noise = int(np.argmax(by_noise))
+    if noise > 0:
+        by_fraction = _around(lambda number: log_evidence(number, noise), best, len(fractions))
+        best = int(np.argmax(by_fraction))
+    # as if the evidence were a product of what depends on one size, and on the other
+    best_columns, found = weighed[best, noise]
+    means = [float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs.max()) for logs in (by_fraction, by_noise)]
+    return best_columns, replace(found, log_evidence=found.log_evidence + sum(means))
+
+
+def _displacement(base: Base, columns: Floats, residual: Floats, scale: float) -> Floats:
+    """Of the rows under a hypothesis (n,) [m], all that was recorded of a point: no less than at the base."""
+    model = base.noises[0].of_noise(columns).with_scale(scale)
+    inflation = with_gross_errors(model, residual, base.points, outliers()).inflation
+    excess = columns_of_inflation(model, base.points, inflation)
+    z = model.with_columns(excess).coefficients(residual)[0][: columns.shape[1]]
+    z[base.nuisances.part(UNKNOWN_MESH)] = 0.0
+    sensors = base.at.sensors
+    explained = sensors.residual + sensors.computed - (residual - columns @ z)
+    moved = np.sqrt(np.bincount(sensors.groups, explained**2))[sensors.groups]
+    return np.where(sensors.is_displacement, np.maximum(moved, base.nuisances.displacement), 0.0)
+
+
+def _around(log_evidence: Callable[[int], float], first: int, count: int) -> Floats:
+    """Log evidence (count,) by the number of a size, as far from the first one as it is not negligible."""
+    logs = np.full(count, -np.inf)
+    logs[first] = log_evidence(first)
     for step in (-1, 1):
         number = first + step
-        while 0 <= number < len(fractions):
-            add(number)
+        while 0 <= number < count:
+            logs[number] = log_evidence(number)
             if logs[number] < logs.max() + np.log(_NEGLIGIBLE):
                 break
             number += step
-    best_columns, best = weighed[int(np.argmax(logs))]
-    mean = float(np.logaddexp.reduce(logs) - np.log(len(fractions)))
-    return best_columns, replace(best, log_evidence=mean)
+    return logs

@@ -40,6 +40,8 @@ _DIFFERENCE = 0.05
 _KEPT = 9
 #: Steps shorter than this in standard deviations of the prior end the search.
 _SHORT = 0.03
+#: By what part the unknown part of the mesh's error changes that is worth going on.
+_SAME_MESH = 0.05
 
 
 class FitSearch:
@@ -115,7 +117,10 @@ class FitSearch:
         first, coefficients = self._U.shape[1], np.concatenate(subset.coefficients)
         z = np.zeros(len(self.z))
         z[: len(subset.nuisances)] = subset.nuisances
-        z = self._rescaled(z, subset.columns, self.columns)
+        # about as large as there
+        part = self._base.nuisances.part(UNKNOWN_MESH)
+        sizes = [float(np.linalg.norm(columns[:, part])) for columns in (subset.columns, self.columns)]
+        z[part] *= sizes[0] / sizes[1] if sizes[1] else 1.0
         z[first : first + len(coefficients)] = coefficients
         self._linearised_at = z
         if subset.mesh_share is not None:
@@ -167,13 +172,17 @@ class FitSearch:
         """Take noise, gross errors and the mesh's unknown error of a result; whether it was fitted with others."""
         marginal, nuisances = fit.marginal, self._base.nuisances
         same = marginal.scale == self._marginal.scale and np.array_equal(marginal.gross, self._marginal.gross)
+        same &= marginal.model.noise_factor is self._marginal.model.noise_factor
         self._marginal, self._noise = marginal, marginal.noise
-        fraction = nuisances.fraction_of(fit.columns)
-        if not np.isclose(fraction, nuisances.fraction_of(self.columns)):
+        part = nuisances.part(UNKNOWN_MESH)
+        unknown, before = fit.columns[:, part], self.columns[:, part]
+        if np.linalg.norm(unknown - before) > _SAME_MESH * np.linalg.norm(before):
             same = False
-            self.z = self._rescaled(self.z, self.columns, fit.columns)
-            self._U = nuisances.at_fraction(self._U, fraction)
-            self.columns = nuisances.at_fraction(self.columns, fraction)
+            self.residual = self.residual + before @ self.z[part] - unknown @ fit.nuisances[part]
+            self.z = self.z.copy()
+            self.z[part] = fit.nuisances[part]
+            self._U = nuisances.with_unknown_mesh(self._U, unknown)
+            self.columns = nuisances.with_unknown_mesh(self.columns, unknown)
         if not same:
             self._best = np.inf
             self._accept_if_better(self.z, self.state, self.residual)
@@ -197,7 +206,8 @@ class FitSearch:
         q = self._U.shape[1]
         linear = self.residual + self.columns @ self.z
         columns, evidence = evidence_of(self._base, self.columns, linear, self._marginal.scale)
-        z = self._rescaled(self.z, self.columns, columns)
+        part, z = self._base.nuisances.part(UNKNOWN_MESH), self.z.copy()
+        z[part] = evidence.coordinates(linear)[part]
         # what is not known of the mesh's share widens the sizes of mechanisms, not their evidence
         W = self._noise.whitened(np.column_stack([columns, *self._mesh_share_deviation(z[q:])]))
         covariance = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
@@ -210,20 +220,13 @@ class FitSearch:
             z[:q],
             tuple(z[part] for part in parts),
             tuple(covariance[part, part] + np.outer(shift[part], shift[part]) for part in parts),
-            self.residual,
+            linear - columns @ z,
             linear,
             columns,
             evidence,
             self.converged,
             self._mesh_share,
         )
-
-    def _rescaled(self, z: Floats, columns: Floats, others: Floats) -> Floats:
-        """The same point in coordinates of columns with another size of the mesh's unknown error."""
-        nuisances, scaled = self._base.nuisances, z.copy()
-        factor = nuisances.fraction_of(columns) / nuisances.fraction_of(others)
-        scaled[nuisances.part(UNKNOWN_MESH)] *= factor
-        return scaled
 
     def _mesh_share_deviation(self, z: Floats) -> list[Floats]:
         """Columns (n, 1) of what is not known of the mechanisms' share of the mesh's error.

@@ -7,7 +7,7 @@ weighed in the linear model about its fit, where what acts already is as large a
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -27,6 +27,7 @@ from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.fitting import Fitter
+from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
 from warpbrain.worlds.body.weighing import weigh, with_refined_places
@@ -148,14 +149,25 @@ class HypothesisSearch:
             else:
                 self._weigh_supersets(chosen, chosen.refit)
 
-    def fitted_with(self, mechanisms: frozenset[str]) -> WeightedSet | None:
-        """The most probable fitted set with exactly these mechanisms, fitted if none was; None if none can be."""
+    def fitted_with(self, mechanisms: frozenset[str], superset: WeightedSet | None = None) -> WeightedSet | None:
+        """The most probable fitted set with exactly these mechanisms, fitted if none was; None if none can be.
+
+        Parameters
+        ----------
+        mechanisms : frozenset of str
+        superset : WeightedSet, optional
+            A fitted set that has these and others, from whose optimum they are fitted if they were not weighed.
+        """
         sets = self._with_mechanisms(mechanisms)
         fitted = next((candidate for candidate in sets if candidate.refit is not None), None)
         for candidate in sets if fitted is None else []:
             self._fit(candidate.names)
             if self._sets[candidate.names].refit is not None:
                 return self._sets[candidate.names]
+        if fitted is None and superset is not None:
+            fitted = self._fitted_less(superset, [name for name in superset.mechanisms if name not in mechanisms])
+            if fitted is not None:
+                self._sets[fitted.names] = fitted
         return fitted
 
     def failure_with(self, mechanisms: frozenset[str]) -> str:
@@ -204,33 +216,39 @@ class HypothesisSearch:
         """
         superset = self._sets[names]
         assert superset.refit is not None
-        for number, mechanism in enumerate(superset.mechanisms):
+        for mechanism in superset.mechanisms:
             subset = self._sets.get(names - {mechanism})
             if subset is None or subset.refit is None or not subset.mechanisms:
                 continue
             reduced = superset.without(mechanism, self.base)
             if reduced.marginal.log_evidence < subset.marginal.log_evidence + _BETTER:
                 continue
-            begun = superset.refit.without(number)
-            try:
-                refit = self._fitter.fit(
-                    reduced.effects, reduced.columns, [reduced.coordinates], reduced.marginal, subset=begun
-                )
-            except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError):
+            refitted = self._fitted_less(superset, [mechanism])
+            if refitted is None or refitted.refit is None:
                 continue
-            gain = refit.log_evidence - subset.refit.log_evidence
+            gain = refitted.refit.log_evidence - subset.refit.log_evidence
             if gain > 0.0:
-                log_evidence = subset.hypothesis.log_evidence + gain
-                better = replace(
-                    subset,
-                    effects=reduced.effects,
-                    residual=refit.linear,
-                    columns=refit.columns,
-                    marginal=refit.marginal,
-                    refit=refit,
-                )
-                self._sets[subset.names] = better.with_evidence(log_evidence)
+                better = replace(refitted, hypothesis=subset.hypothesis)
+                self._sets[subset.names] = better.with_evidence(subset.hypothesis.log_evidence + gain)
                 self._forget_supersets(subset.names)
+
+    def _fitted_less(self, superset: WeightedSet, mechanisms: Sequence[str]) -> WeightedSet | None:
+        """A set with some mechanisms less than a fitted one, fitted from its optimum; None if it cannot be."""
+        begun, reduced = superset.refit, superset
+        assert begun is not None
+        for mechanism in mechanisms:
+            begun = begun.without(reduced.mechanisms.index(mechanism))
+            reduced = reduced.without(mechanism, self.base)
+        screened = reduced.marginal
+        try:
+            refit = self._fitter.fit(reduced.effects, reduced.columns, [reduced.coordinates], screened, subset=begun)
+        except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError):
+            return None
+        fitted = replace(reduced, residual=refit.linear, columns=refit.columns, marginal=refit.marginal, refit=refit)
+        gain = refit.log_evidence - screened.log_evidence
+        log_prior = sum(self.causes.named(mechanism).log_prior for mechanism in mechanisms)
+        hypothesis = replace(fitted.hypothesis, log_prior=fitted.hypothesis.log_prior - log_prior)
+        return replace(fitted, hypothesis=hypothesis).with_evidence(reduced.hypothesis.log_evidence + gain)
 
     def _forget_supersets(self, names: frozenset[str]) -> None:
         """Remove supersets whose linear model is about an earlier fit of a set; expanding it again weighs them anew."""
@@ -258,7 +276,7 @@ class HypothesisSearch:
         """The most probable coordinates of a set in the linear model about the fit without any cause."""
         columns = np.column_stack([nothing.columns, candidate.columns[:, len(nothing.nuisances) :]])
         nuisances = self.base.nuisances
-        columns = nuisances.at_fraction(columns, nuisances.fraction_of(candidate.columns))
+        columns = nuisances.with_unknown_mesh(columns, candidate.columns[:, nuisances.part(UNKNOWN_MESH)])
         model = GaussianModel(candidate.marginal.noise.noise_factor, columns)
         return model.coefficients(nothing.linear + candidate.residual - self.base.residual)[0]
 

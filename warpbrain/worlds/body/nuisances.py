@@ -64,11 +64,17 @@ class Nuisances:
         Points [m] of the kernel functions of the unknown part of the mesh's error.
     fraction : float
         That part, relative to the displacement.
+    displacement : (n,) array
+        Of the state at each row [m]; zero of forces.
+    relative : (n, k) array
+        Columns of that part if it were as large as a displacement of 1 m.
     """
 
     families: tuple[Family, ...]
     anchors: Floats
     fraction: float
+    displacement: Floats
+    relative: Floats
 
     @property
     def columns(self) -> Floats:
@@ -77,7 +83,8 @@ class Nuisances:
 
     def weakened(self) -> Nuisances:
         """The same with columns that are next to nothing, so that they explain nothing."""
-        return replace(self, families=tuple(Family(f.name, 1e-9 * f.columns) for f in self.families))
+        families = tuple(Family(f.name, 1e-9 * f.columns) for f in self.families)
+        return replace(self, families=families, relative=1e-9 * self.relative)
 
     def with_fraction(self, fraction: float) -> Nuisances:
         """The same with another size of the unknown part of the mesh's error."""
@@ -85,16 +92,11 @@ class Nuisances:
         scaled = Family(last.name, last.columns * (fraction / self.fraction))
         return replace(self, families=(*others, scaled), fraction=fraction)
 
-    def at_fraction(self, columns: Floats, fraction: float) -> Floats:
-        """Columns (n, q + k) that begin with these nuisances, with another size of that part."""
+    def with_unknown_mesh(self, columns: Floats, unknown: Floats) -> Floats:
+        """Columns (n, q + k) that begin with these nuisances, with others (n, k) of the unknown part of the error."""
         changed = columns.copy()
-        changed[:, self.part(UNKNOWN_MESH)] = self.families[-1].columns * (fraction / self.fraction)
+        changed[:, self.part(UNKNOWN_MESH)] = unknown
         return changed
-
-    def fraction_of(self, columns: Floats) -> float:
-        """The size of that part in columns of `at_fraction`; of no columns that of the nuisances."""
-        usual = float(np.linalg.norm(self.families[-1].columns))
-        return self.fraction * (float(np.linalg.norm(columns[:, self.part(UNKNOWN_MESH)])) / usual if usual else 1.0)
 
     def coordinates(self, prior: Gaussian, hypothesis: Hypothesis) -> Floats:
         """Coordinates (q,) of the tissue, by its prior, and of the field of a hypothesis; the others are zero."""
@@ -161,8 +163,9 @@ def nuisances_at(
         error = mesh_errors.error
         answer = sensors.share * sensors.answer(error.u, error.reactions)
         families.append(Family("mesh", Discretisation().deviation * answer[:, None]))
-    families.append(Family(UNKNOWN_MESH, _fractional(at, anchors, fraction)))
-    return Nuisances(tuple(families), anchors, fraction)
+    displacement, relative = _displacement(at), _alike(sensors, anchors)
+    families.append(Family(UNKNOWN_MESH, fraction * displacement[:, None] * relative))
+    return Nuisances(tuple(families), anchors, fraction, displacement, relative)
 
 
 def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
@@ -257,27 +260,30 @@ def _known_loads_at(at: Linearisation) -> Floats:
     return np.concatenate(columns, axis=1)
 
 
-def _fractional(at: Linearisation, anchors: Floats, fraction: float) -> Floats:
-    """A part of the displacement in any direction, correlated among neighbours."""
+def _displacement(at: Linearisation) -> Floats:
+    """Of the state at each row (n,) [m], counted from its reference; zero of forces."""
     from scipy.spatial import cKDTree
 
     sensors = at.sensors
-    rows = np.flatnonzero(sensors.is_displacement)
-    if not len(rows):
-        return np.zeros((len(sensors), 0))
-    places = sensors.positions[rows]
+    rows = sensors.is_displacement
+    moved = np.zeros((len(sensors), 3))
+    if not rows.any():
+        return np.zeros(len(sensors))
     nearest = np.zeros(len(sensors), dtype=np.int64)
-    nearest[rows] = cKDTree(at.system.model.mesh.points).query(places)[1]
-    moved = at.u[nearest]
+    nearest[rows] = cKDTree(at.system.model.mesh.points).query(sensors.positions[rows])[1]
     if at.moments:
-        moved = np.zeros((len(sensors), 3))
         for moment in at.moments:
             moved[moment.rows] += moment.sign * moment.at.u[nearest[moment.rows]]
-    size = np.linalg.norm(moved[rows], axis=1)
-    weights = kernel_columns(places, anchors, belief("mesh.alike"))
+    else:
+        moved = at.u[nearest]
+    return np.where(rows, np.linalg.norm(moved, axis=1), 0.0)
+
+
+def _alike(sensors: Sensors, anchors: Floats) -> Floats:
+    """Columns (n, k) of a displacement of 1 m in any direction, correlated among neighbours."""
+    rows = np.flatnonzero(sensors.is_displacement)
     columns = np.zeros((len(sensors), 3 * len(anchors)))
-    directions = sensors.directions[rows]
-    columns[rows] = (fraction * size[:, None, None] * weights[:, :, None] * directions[:, None, :]).reshape(
-        len(rows), -1
-    )
+    if len(rows):
+        weights = kernel_columns(sensors.positions[rows], anchors, belief("mesh.alike"))
+        columns[rows] = (weights[:, :, None] * sensors.directions[rows][:, None, :]).reshape(len(rows), -1)
     return columns

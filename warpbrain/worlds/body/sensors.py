@@ -36,6 +36,8 @@ class Sensors:
         Where [m]; NaN of forces.
     directions : (n, 3) array
         In which direction a displacement was recorded; zero of forces.
+    over_element : (n, 3) array
+        Change over an element of the mesh along each axis, as of `Observation` [m].
     groups : (n,) int array
         Number of the point, or of the row of a recording, that each belongs to.
     recordings : (n,) int array
@@ -61,6 +63,7 @@ class Sensors:
     sigma: Floats
     positions: Floats
     directions: Floats
+    over_element: Floats
     groups: Ints
     recordings: Ints
     times: Floats
@@ -90,7 +93,7 @@ class Sensors:
             name: getattr(self, name)[rows]
             for name in ("residual", "computed", "by_displacement", "by_reactions", "rigid", "sigma", "positions")
         }
-        more = {name: getattr(self, name)[rows] for name in ("directions", "groups", "recordings")}
+        more = {name: getattr(self, name)[rows] for name in ("directions", "over_element", "groups", "recordings")}
         return Sensors(
             **each,
             **more,
@@ -160,6 +163,7 @@ def sensors_at(observations: Observations, u: Floats, reactions: Floats, centre:
         each([np.full(len(o.rows), np.nan) if o.sigma is None else o.sigma for o in recordings]),
         each([o.positions if len(o.positions) else np.full((len(o.rows), 3), np.nan) for o in recordings]),
         rigid[:, :3].copy(),
+        np.concatenate([o.over_element.reshape(-1, 3) for o in recordings]),
         each([start + np.arange(len(part.values)) for start, part in zip(first, parts, strict=False)]),
         np.repeat([names.index(observation.name) for observation in recordings], sizes),
         each([o.times for o in recordings]),
@@ -186,6 +190,7 @@ def tracked_points(mesh: TetMesh, points: Floats, centre: Floats) -> Sensors:
         np.ones(count),
         np.repeat(points, 3, axis=0),
         np.tile(np.eye(3), (len(points), 1)),
+        np.zeros((count, 3)),
         np.repeat(np.arange(len(points)), 3),
         np.zeros(count, dtype=np.int64),
         np.full(count, np.inf),

@@ -108,7 +108,7 @@ def with_refined_places(
         if number < placed or effect.proposal is None or effect.proposed.elsewhere is None:
             continue
         others = np.delete(candidate.columns, np.r_[part], axis=1)
-        without = GaussianModel(base.model.noise_factor, others, candidate.marginal.scale)
+        without = GaussianModel(candidate.marginal.model.noise_factor, others, candidate.marginal.scale)
         assert effect.proposed.centre is not None and effect.proposed.radius is not None
         usual = effect.proposed.elsewhere(effect.proposed.centre, effect.proposed.radius)
         size = float(np.max(effect.proposed.sd / usual.sd))

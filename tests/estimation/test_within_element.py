@@ -1,0 +1,49 @@
+"""What a mesh does not resolve: the gradient of what was recorded, times the edge of an element."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from warpbrain.estimation.within_element import change_over_element
+from warpbrain.inference.noise import noise_covariance
+
+RANDOM = np.random.default_rng(4)
+CLOUD = RANDOM.uniform(-0.03, 0.03, size=(40, 3))
+GRADIENT = RANDOM.normal(size=(3, 3))
+EDGES = RANDOM.uniform(0.004, 0.009, size=40)
+
+
+def test_a_linear_field_changes_by_its_gradient() -> None:
+    moved = CLOUD @ GRADIENT.T + [0.001, 0.0, -0.002]
+    np.testing.assert_allclose(change_over_element(CLOUD, moved, EDGES), EDGES[:, None, None] * GRADIENT, atol=1e-12)
+
+
+def test_the_gradient_across_a_plane_is_not_known() -> None:
+    flat = CLOUD * [1.0, 1.0, 0.0]
+    changes = change_over_element(flat, flat @ GRADIENT.T, EDGES)
+    expected = np.column_stack([GRADIENT[:, :2], np.zeros(3)])
+    np.testing.assert_allclose(changes, EDGES[:, None, None] * expected, atol=1e-12)
+
+
+def test_it_turns_with_the_body() -> None:
+    turn = Rotation.from_rotvec([0.3, -1.0, 0.5]).as_matrix()
+    moved = 0.002 * np.sin(40.0 * CLOUD)
+    turned = change_over_element(CLOUD @ turn.T, moved @ turn.T, EDGES)
+    np.testing.assert_allclose(turned, turn @ change_over_element(CLOUD, moved, EDGES) @ turn.T, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_too_few_points_tell_nothing(count: int) -> None:
+    assert not change_over_element(CLOUD[:count], CLOUD[:count], EDGES[:count]).any()
+
+
+def test_it_is_noise_of_each_point_by_itself() -> None:
+    changes = change_over_element(CLOUD, 0.1 * CLOUD @ GRADIENT.T, EDGES)
+    positions, directions = np.repeat(CLOUD, 3, axis=0), np.tile(np.eye(3), (40, 1))
+    about = positions, directions, np.full(120, np.inf), np.full(120, 3e-4)
+    added = noise_covariance(*about, 0.3 * changes.reshape(-1, 3)) - noise_covariance(*about)
+    expected = np.zeros((120, 120))
+    for number, change in enumerate(changes):
+        own = slice(3 * number, 3 * number + 3)
+        expected[own, own] = 0.09 * change @ change.T
+    np.testing.assert_allclose(added, expected, atol=1e-18)

@@ -1,0 +1,50 @@
+"""How much what was recorded changes within an element of the mesh: there a mesh shows it for the most part alone.
+
+A wall that was cut out of elements is a staircase, and a linear element has one gradient. Where displacement changes
+much from place to place the mesh has a recorded point beside where it is, by a part of the edge of its element, and its
+displacement is wrong by that part of the change over an edge (errors in variables, by effective variances: Orear, Am.
+J. Phys. 50 (1982) 912). A finer mesh with the same wall does not show this error. It is local, and as large as what
+acts there; taken for noise alone it would look like a second force beside the first.
+
+The change is that of what was recorded, so that it is the same whatever is thought to act.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpbrain.arrays import Floats
+from warpbrain.inference.beliefs import belief
+
+
+def change_over_element(points: Floats, displacement: Floats, edges: Floats) -> Floats:
+    """Change of recorded displacement over an edge of the element in which each point is.
+
+    Parameters
+    ----------
+    points, displacement : (n, 3) array
+        Recorded at one time [m].
+    edges : (n,) array
+        Mean length of the edges of the element [m].
+
+    Returns
+    -------
+    (n, 3, 3) array
+        Of each component of the displacement, along each axis [m]; zero of points that are too few to tell.
+    """
+    neighbours = min(round(belief("mesh.neighbours")), len(points) - 1)
+    if neighbours < 3:
+        return np.zeros((len(points), 3, 3))
+    return edges[:, None, None] * _gradients(points, displacement, neighbours)
+
+
+def _gradients(points: Floats, displacement: Floats, neighbours: int) -> Floats:
+    """Least-squares gradients (n, 3, 3) of displacement over each point and its neighbours."""
+    from scipy.spatial import cKDTree
+
+    near = cKDTree(points).query(points, neighbours + 1)[1]
+    offsets = points[near] - points[near].mean(axis=1, keepdims=True)
+    changes = displacement[near] - displacement[near].mean(axis=1, keepdims=True)
+    # of points in one plane the gradient across it is not known, and taken for zero
+    gradients = np.linalg.pinv(offsets, rcond=belief("mesh.flat")) @ changes
+    return np.asarray(gradients.transpose(0, 2, 1))
