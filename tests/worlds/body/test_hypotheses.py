@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from sinking_block import OPTIONS, write_sinking
 
+from warpbrain.diagnosis.confirming import Confirming
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import NAMED, decide
@@ -95,3 +96,35 @@ def test_a_fit_that_has_missed_its_optimum_is_mended_by_one_with_a_cause_more(se
     assert subset.names not in mended._expanded
     left = [one for one in mended.weighted_sets if subset.names < one.names and one.inherited_gain is None]
     assert all(one.refit is not None for one in left)
+
+
+@pytest.fixture(scope="module")
+def pair(search: HypothesisSearch) -> HypothesisSearch:
+    """With the weight and a swelling, which is none, fitted, too."""
+    fitted = copy.copy(search)
+    fitted._sets, fitted._expanded = dict(search._sets), dict(search._expanded)
+    weight = search.get(("gravity",))
+    if weight.names not in fitted._expanded:
+        fitted._weigh_supersets(weight, weight.refit)
+    fitted._fit(frozenset(("gravity", "swelling")))
+    return fitted
+
+
+def test_what_was_not_weighed_is_fitted_from_more(pair):
+    without = copy.copy(pair)
+    without._sets = {names: one for names, one in pair._sets.items() if "gravity" not in names or len(names) == 2}
+    refitted = without.fitted_with(frozenset(("gravity",)), pair.get(("gravity", "swelling")))
+    expected = pair.get(("gravity",)).hypothesis
+    # both are sums over places, in different linear models
+    np.testing.assert_allclose(refitted.hypothesis.log_evidence, expected.log_evidence, atol=2.0)
+    np.testing.assert_allclose(refitted.hypothesis.log_prior, expected.log_prior)
+
+
+def test_causes_are_checked_beside_those_that_explain_more(pair):
+    both = pair.get(("gravity", "swelling"))
+    weight, swelling = Confirming(pair, 100, np.random.default_rng(0)).confirmations(both)
+    assert (weight.name, swelling.name) == ("gravity", "swelling")
+    # the weight beside nothing, the swelling beside the weight
+    evidence = [pair.get(names).hypothesis.log_evidence for names in ((), ("gravity",), ("gravity", "swelling"))]
+    np.testing.assert_allclose([weight.log_evidence, swelling.log_evidence], np.diff(evidence))
+    assert weight.why_not(0.05) == "" and swelling.why_not(0.05) != ""
