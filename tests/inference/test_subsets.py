@@ -1,5 +1,6 @@
 """Probabilities of sets against the densities of joint normal distributions written out, and against their draws."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -78,6 +79,22 @@ def test_evidence_is_the_sum_of_the_densities_written_out() -> None:
         # with a beam that leaves nothing out the sum over the best configurations of pairs is a lower bound
         expected = by_hand(one, residual, causes, members)
         assert expected - 1.5 < found[tuple(causes[c].name for c in members)].log_evidence < expected + 1e-9
+
+
+def test_a_place_has_its_share_of_the_evidence() -> None:
+    random = np.random.default_rng(6)
+    one, causes = model(random), some_causes(random)
+    residual = one.draws(1, random)[:, 0] + 0.5 * causes[0].places[2].columns @ [1.0, -0.4, 0.2]
+    for hypothesis in posterior(one, residual, causes, SCALES).hypotheses:
+        if len(hypothesis.causes) != 1:
+            assert hypothesis.best.log_share == 0.0
+            continue
+        [cause] = [cause for cause in causes if cause.name == hypothesis.causes[0]]
+        place = cause.places[hypothesis.best.members[0].place]
+        alone = by_hand(one, residual, [replace(cause, places=(place,))], (0,))
+        weight = place.weight / sum(other.weight for other in cause.places)
+        share = alone + np.log(weight) - hypothesis.log_evidence
+        np.testing.assert_allclose(hypothesis.best.log_share, share, atol=1e-8)
 
 
 def test_best_configuration_has_the_greatest_density() -> None:

@@ -21,11 +21,22 @@ class Member:
 
 @dataclass(frozen=True)
 class Configuration:
-    """Causes with places and sizes at a scale of the noise, and the log of its joint density with the rows."""
+    """Causes with places and sizes at a scale of the noise.
+
+    Attributes
+    ----------
+    members : tuple of Member
+    scale : float
+    log_density : float
+        Of it and the rows.
+    log_share : float
+        Of a single cause, the log of the part that its place has in the evidence, all sizes and scales together.
+    """
 
     members: tuple[Member, ...]
     scale: float
     log_density: float
+    log_share: float = 0.0
 
 
 @dataclass(frozen=True)

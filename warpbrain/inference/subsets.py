@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,8 @@ class _Sums:
         self.best: dict[frozenset[int], Configuration] = {}
         #: Of each single cause, the best configuration at each of so many places.
         self.at_places: dict[int, dict[int, Configuration]] = {}
+        #: Sums of each single cause by the numbers of its places.
+        self.by_place: dict[int, dict[int, float]] = {}
         self._places = places
 
     def add(self, causes: frozenset[int], log: float, best: Configuration) -> None:
@@ -77,7 +79,12 @@ class _Sums:
             row = int(np.argmax(greatest))
             best.append(self._configuration(blocks, low + row, of_cause[row], members, scale))
             causes = frozenset(acting | {best[-1].members[-1].cause})
-            self.add(causes, float(np.logaddexp.reduce(of_cause, axis=None)), best[-1])
+            of_places = np.logaddexp.reduce(of_cause, axis=1)
+            self.add(causes, float(np.logaddexp.reduce(of_places)), best[-1])
+            if not members:
+                known = self.by_place.setdefault(int(blocks.cause[low]), {})
+                for place, log in zip(blocks.place[low:high].tolist(), of_places.tolist(), strict=True):
+                    known[place] = float(np.logaddexp(known.get(place, -np.inf), log))
             for other in np.argsort(-greatest)[: 0 if members else self._places].tolist():
                 self._add_place(self._configuration(blocks, low + other, of_cause[other], (), scale))
         return best
@@ -96,6 +103,14 @@ class _Sums:
         places = self.at_places.setdefault(member.cause, {})
         if member.place not in places or configuration.log_density > places[member.place].log_density:
             places[member.place] = configuration
+
+    def with_share(self, configuration: Configuration) -> Configuration:
+        """A configuration with the share of its place, if it is of a single cause."""
+        if len(configuration.members) != 1:
+            return configuration
+        [member] = configuration.members
+        share = self.by_place[member.cause][member.place] - self.logs[frozenset((member.cause,))]
+        return replace(configuration, log_share=min(share, 0.0))
 
     def elsewhere(self, causes: frozenset[int]) -> tuple[Configuration, ...]:
         """Of a single cause, the best configurations at other places than the best."""
@@ -142,8 +157,8 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
             tuple(causes[c].kind for c in sorted(members)),
             log,
             sum(causes[c].log_prior for c in members),
-            sums.best[members],
-            sums.elsewhere(members),
+            sums.with_share(sums.best[members]),
+            tuple(sums.with_share(other) for other in sums.elsewhere(members)),
         )
         for members, log in sums.logs.items()
     ]

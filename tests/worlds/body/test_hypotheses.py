@@ -13,7 +13,7 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import NAMED, decide
 from warpbrain.worlds.body.evidence import evidence_of
-from warpbrain.worlds.body.hypotheses import HypothesisSearch
+from warpbrain.worlds.body.hypotheses import HypothesisSearch, _of_all_places
 from warpbrain.worlds.body.screened import screened
 
 
@@ -98,6 +98,15 @@ def test_a_fit_that_has_missed_its_optimum_is_mended_by_one_with_a_cause_more(se
     assert all(one.refit is not None for one in left)
 
 
+@pytest.mark.parametrize("share", [1.0, 0.3, 0.01])
+@pytest.mark.parametrize("gain", [-4.0, 0.0, 2.0, 40.0])
+def test_a_gain_at_a_place_is_of_its_share(gain: float, share: float) -> None:
+    of_all = _of_all_places(gain, np.log(share))
+    # a sum over places of equal evidence, one of which is fitted
+    expected = np.log(share * np.exp(gain) + 1.0 - share) if gain > 0.0 else gain
+    np.testing.assert_allclose(of_all, expected, atol=1e-12)
+
+
 @pytest.fixture(scope="module")
 def pair(search: HypothesisSearch) -> HypothesisSearch:
     """With the weight and a swelling, which is none, fitted, too."""
@@ -111,9 +120,9 @@ def pair(search: HypothesisSearch) -> HypothesisSearch:
 
 
 def test_what_was_not_weighed_is_fitted_from_more(pair):
-    without = copy.copy(pair)
-    without._sets = {names: one for names, one in pair._sets.items() if "gravity" not in names or len(names) == 2}
-    refitted = without.fitted_with(frozenset(("gravity",)), pair.get(("gravity", "swelling")))
+    without, both = copy.copy(pair), pair.get(("gravity", "swelling"))
+    without._sets = {names: one for names, one in pair._sets.items() if "gravity" not in names or one is both}
+    refitted = without.fitted_with(frozenset(("gravity",)), both)
     expected = pair.get(("gravity",)).hypothesis
     # both are sums over places, in different linear models
     np.testing.assert_allclose(refitted.hypothesis.log_evidence, expected.log_evidence, atol=2.0)

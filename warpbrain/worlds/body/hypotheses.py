@@ -203,7 +203,9 @@ class HypothesisSearch:
             # that ended too early must not make everything else look better
             gain = max(gain, 0.0)
         fitted = replace(candidate, residual=refit.linear, columns=refit.columns, marginal=refit.marginal, refit=refit)
-        log_evidence = candidate.hypothesis.log_evidence - (candidate.inherited_gain or 0.0) + gain
+        inherited = candidate.inherited_gain or 0.0
+        gain = inherited + _of_all_places(gain - inherited, candidate.log_share)
+        log_evidence = candidate.hypothesis.log_evidence - inherited + gain
         self._sets[names] = fitted.with_evidence(log_evidence)
         self._pass_on(gain, names)
         self._refit_subsets(names)
@@ -316,6 +318,18 @@ class HypothesisSearch:
             known = self._sets.get(superset.names)
             if known is None or known.refit is None:
                 self._sets[superset.names] = superset
+
+
+def _of_all_places(gain: float, log_share: float) -> float:
+    """Gain of a sum over places of which those that were fitted, with a share, have a gain.
+
+    Of places that are not fitted it is not known. What is lost by a fit is lost by all: that the effect is not linear
+    is no matter of the place. A gain may be, and one place of many at which an effect is found to be another than in
+    the linear model must not count for all of them.
+    """
+    if gain <= 0.0 or log_share >= 0.0:
+        return gain
+    return float(np.logaddexp(log_share + gain, np.log(-np.expm1(log_share))))
 
 
 def _probabilities(sets: Iterable[WeightedSet]) -> Floats:

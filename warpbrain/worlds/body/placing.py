@@ -29,10 +29,20 @@ _RADII = (0.8, 1.0, 1.25)
 
 @dataclass(frozen=True, eq=False)
 class BestInCell:
-    """The best effect of a cell, and by how much [nats] the mean of the cell is more probable than its middle."""
+    """The best effect of a cell.
+
+    Attributes
+    ----------
+    effect : Effect
+    gain : float
+        By how much [nats] the mean of the cell is more probable than its middle.
+    log_share : float
+        Log of the part of the best place in that mean.
+    """
 
     effect: Effect
     gain: float
+    log_share: float
 
 
 def best_in_cell(
@@ -63,15 +73,16 @@ def best_in_cell(
         model = without.with_columns(tried.columns)
         return with_gross_errors(model, residual - tried.mean, base.points, outliers()).log_density
 
-    best, gain = effect, 0.0
+    best, gain, log_share = effect, 0.0, 0.0
     for step in (0.5, 0.25):
         around = _effects_of(effects, _around(base, best, step * spacing))
         tried = [best, *(scaled(other, size) for other in around)]
         logs = np.array(in_threads(log_density, tried))
         if step == 0.5:
-            gain = float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs[0])
+            total = float(np.logaddexp.reduce(logs))
+            gain, log_share = total - float(np.log(len(logs)) + logs[0]), float(logs.max()) - total
         best = tried[int(np.argmax(logs))]
-    return BestInCell(best, gain)
+    return BestInCell(best, gain, log_share)
 
 
 def _effects_of(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect]:

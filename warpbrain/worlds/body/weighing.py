@@ -50,7 +50,10 @@ def weigh(
     shares = np.array([configuration.log_density for configuration in configurations])
     logs = np.array([candidate.hypothesis.log_evidence for candidate in weighed]) + shares
     log_evidence = float(np.logaddexp.reduce(logs) - np.logaddexp.reduce(shares))
-    return weighed[int(np.argmax(logs))].with_evidence(log_evidence)
+    best = int(np.argmax(logs))
+    of_places = float(np.logaddexp.reduce([configuration.log_share for configuration in configurations]))
+    log_share = min(float(logs[best] - np.logaddexp.reduce(logs)) + of_places, 0.0)
+    return replace(weighed[best].with_evidence(log_evidence), log_share=log_share)
 
 
 def _weigh_at(
@@ -123,6 +126,11 @@ def with_refined_places(
         columns, refined = evidence_of(base, columns, residual, candidate.marginal.scale)
         effects[number] = best.effect
         candidate = replace(
-            candidate, effects=tuple(effects), residual=residual, columns=columns, marginal=refined
+            candidate,
+            effects=tuple(effects),
+            residual=residual,
+            columns=columns,
+            marginal=refined,
+            log_share=candidate.log_share + best.log_share,
         ).with_evidence(candidate.hypothesis.log_evidence + best.gain)
     return replace(candidate, refined=True)

@@ -38,6 +38,8 @@ class WeightedSet:
         it is fitted itself. None if its linear model is about a fit, whose gain it has already.
     refined : bool
         Whether its mechanisms are at the best places within their cells.
+    log_share : float
+        Log of the part of these places in the evidence of a set that is not fitted, which is a sum over all places.
     """
 
     hypothesis: Hypothesis
@@ -49,6 +51,7 @@ class WeightedSet:
     failure: str = ""
     inherited_gain: float | None = 0.0
     refined: bool = False
+    log_share: float = 0.0
 
     @property
     def names(self) -> frozenset[str]:
