@@ -124,8 +124,8 @@ def test_what_was_not_weighed_is_fitted_from_more(pair):
     without._sets = {names: one for names, one in pair._sets.items() if "gravity" not in names or one is both}
     refitted = without.fitted_with(frozenset(("gravity",)), both)
     expected = pair.get(("gravity",)).hypothesis
-    # both are sums over places, in different linear models
-    np.testing.assert_allclose(refitted.hypothesis.log_evidence, expected.log_evidence, atol=2.0)
+    # less what the places of the other cause cost
+    np.testing.assert_allclose(refitted.hypothesis.log_evidence, expected.log_evidence, atol=3.0)
     np.testing.assert_allclose(refitted.hypothesis.log_prior, expected.log_prior)
 
 
