@@ -9,7 +9,7 @@ from warpbrain.inference.noise import noise_covariance
 
 RANDOM = np.random.default_rng(4)
 CLOUD = RANDOM.uniform(-0.03, 0.03, size=(40, 3))
-GRADIENT = RANDOM.normal(size=(3, 3))
+GRADIENT = 0.2 * RANDOM.normal(size=(3, 3))
 EDGES = RANDOM.uniform(0.004, 0.009, size=40)
 
 
@@ -47,3 +47,18 @@ def test_it_is_noise_of_each_point_by_itself() -> None:
         own = slice(3 * number, 3 * number + 3)
         expected[own, own] = 0.09 * change @ change.T
     np.testing.assert_allclose(added, expected, atol=1e-18)
+
+
+def test_a_gross_error_is_no_gradient_of_its_neighbours() -> None:
+    moved = CLOUD @ GRADIENT.T
+    wrong = moved.copy()
+    wrong[7] += [0.02, -0.01, 0.03]
+    expected, changes = (change_over_element(CLOUD, u, EDGES) for u in (moved, wrong))
+    others = np.arange(40) != 7
+    np.testing.assert_allclose(changes[others], expected[others], atol=0.02 * np.abs(expected).max())
+
+
+def test_what_changes_faster_than_tissue_can_is_bounded() -> None:
+    torn = 0.05 * RANDOM.normal(size=(40, 3))
+    steepness = np.linalg.norm(change_over_element(CLOUD, torn, EDGES), ord=2, axis=(1, 2)) / EDGES
+    assert steepness.max() <= 1.0 + 1e-12 and steepness.min() > 0.3

@@ -16,6 +16,10 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 
+#: Rounds of weighted least squares that come to least absolute deviations, and the least of these, relative to the
+#: displacement: smaller ones are alike.
+_ROUNDS, _LEAST = 6, 1e-3
+
 
 def change_over_element(points: Floats, displacement: Floats, edges: Floats) -> Floats:
     """Change of recorded displacement over an edge of the element in which each point is.
@@ -39,12 +43,24 @@ def change_over_element(points: Floats, displacement: Floats, edges: Floats) -> 
 
 
 def _gradients(points: Floats, displacement: Floats, neighbours: int) -> Floats:
-    """Least-squares gradients (n, 3, 3) of displacement over each point and its neighbours."""
+    """Gradients (n, 3, 3) of displacement over each point and its neighbours, by least absolute deviations.
+
+    A gross error is no gradient of its neighbours, and what changes faster than tissue can is not tissue.
+    """
     from scipy.spatial import cKDTree
 
     near = cKDTree(points).query(points, neighbours + 1)[1]
-    offsets = points[near] - points[near].mean(axis=1, keepdims=True)
-    changes = displacement[near] - displacement[near].mean(axis=1, keepdims=True)
-    # of points in one plane the gradient across it is not known, and taken for zero
-    gradients = np.linalg.pinv(offsets, rcond=belief("mesh.flat")) @ changes
-    return np.asarray(gradients.transpose(0, 2, 1))
+    weights = np.ones((*near.shape, 1))
+    least = _LEAST * float(np.median(np.linalg.norm(displacement, axis=1)))
+    for _ in range(_ROUNDS):
+        share = weights / weights.sum(axis=1, keepdims=True)
+        offsets = points[near] - np.sum(share * points[near], axis=1, keepdims=True)
+        changes = displacement[near] - np.sum(share * displacement[near], axis=1, keepdims=True)
+        # of points in one plane the gradient across it is not known, and taken for zero
+        root = np.sqrt(weights)
+        gradients = np.linalg.pinv(root * offsets, rcond=belief("mesh.flat")) @ (root * changes)
+        left = np.linalg.norm(changes - offsets @ gradients, axis=2, keepdims=True)
+        weights = 1.0 / np.maximum(left, least + np.finfo(float).tiny)
+    steepest = belief("mesh.steepest")
+    sizes = np.linalg.norm(gradients, ord=2, axis=(1, 2), keepdims=True)
+    return np.asarray((gradients * np.minimum(1.0, steepest / np.maximum(sizes, steepest))).transpose(0, 2, 1))
