@@ -1,0 +1,224 @@
+"""Commands that are killed at a random moment, or that find the disk full, and what then lies in their folder.
+
+A command is run in a fork of this process, where its kernels are loaded, and ended by one of
+
+- `moment`: SIGKILL after a random time;
+- `event`: SIGKILL before a random one of its operations on the folder: open, rename, mkdir, remove;
+- `write`: killed by the system in the middle of a write, with so many bytes of a file on the disk;
+- `full`: the same write fails, as on a full disk, and the command has to say so.
+
+Then: each file that has its final name is whole and as it was before or as it is to be; a folder with the file that says
+what its results are holds all of one command; and the same command again ends as if nothing had been.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from damage.commands_to_kill import Command
+from warpbrain.cli import main
+from warpbrain.terminal.record import LOG
+from warpbrain.terminal.result_folder import MARKS
+
+WAYS = ("moment", "event", "write", "full")
+_EVENTS = {"open", "os.rename", "os.mkdir", "os.rmdir", "os.remove", "os.chmod", "os.truncate"}
+#: Keys of JSON whose values are not the same twice.
+_CLOCKS = ("second", "time_ms", "timing", "began", "phases", "versions")
+
+
+@dataclass(frozen=True)
+class Whole:
+    """What a command does if it is let: its files, and how often and how long it can be killed."""
+
+    files: dict[str, Any]
+    events: int
+    seconds: float
+    longest: int
+
+
+@dataclass(frozen=True)
+class Killed:
+    """What came of a try; `defect` is empty if nothing was wrong."""
+
+    seed: int
+    command: str
+    way: str
+    status: int
+    defect: str
+
+
+def whole_of(command: Command, place: Path) -> Whole:
+    """Let a command end."""
+    out, counter = place / "out", place / "count"
+    began = time.monotonic()
+    status, said = _forked(command, out, lambda: _count(place, counter))
+    if status != 0:
+        raise AssertionError(f"{command.name}: status {status}: {said}")
+    seconds = time.monotonic() - began
+    longest = max(path.stat().st_size for path in out.rglob("*") if path.is_file())
+    return Whole(contents(out), len(counter.read_bytes()), seconds, longest)
+
+
+def one_kill(command: Command, whole: Whole, earlier: Path | None, place: Path, seed: int) -> Killed:
+    """Kill a command in an empty folder, or where it replaces earlier results, look, and repeat it."""
+    rng = np.random.default_rng(seed)
+    way = WAYS[rng.integers(len(WAYS))]
+    out = place / "out"
+    before: dict[str, Any] = {}
+    replacing = earlier is not None and rng.random() < 0.5
+    if replacing:
+        shutil.copytree(earlier, out)
+        before = contents(out)
+    fraction = float(rng.random())
+    status, said = _forked(command, out, lambda: _end(way, fraction, whole, place), overwrite=replacing)
+    defect = _look(out, before, whole.files, command)
+    if way == "full" and status not in (0, 1):
+        defect += f"status {status} of a full disk; "
+    if way == "full" and status == 1 and (said.count("\n") != 1 or "Traceback" in said):
+        defect += "not one line; "
+    defect += _again(command, out, whole, said)
+    return Killed(seed, command.name, way, status, f"{defect}said {said[-300:]!r}" if defect else "")
+
+
+def _again(command: Command, out: Path, whole: Whole, said: str) -> str:
+    status, said = _forked(command, out, lambda: None)
+    if status == 2 and "has results already" in said:
+        status, said = _forked(command, out, lambda: None, overwrite=True)
+    if status != 0:
+        return f"the same command again: status {status}: {said}; "
+    after = contents(out)
+    wrong = [name for name in whole.files.keys() | after.keys() if whole.files.get(name) != after.get(name)]
+    return f"after the same command again {sorted(wrong)} differ; " if wrong else ""
+
+
+def _look(out: Path, before: dict[str, Any], to_be: dict[str, Any], command: Command) -> str:
+    """What is wrong with a folder that a command was killed in."""
+    now = {name: content for name, content in contents(out).items() if ".unfinished-" not in name}
+    defect = ""
+    for name, content in now.items():
+        if name.startswith("samples/") and content is not None:
+            continue
+        if content is None or content not in (before.get(name), to_be.get(name)):
+            defect += f"{name} is neither old nor new; "
+    for mark in set(MARKS) & now.keys() - set(command.goes_on_with):
+        generation = to_be if now[mark] == to_be.get(mark) else before
+        wrong = [n for n in command.told_of if now.get(n) != generation.get(n)]
+        if wrong:
+            defect += f"{mark} beside {wrong} that are not of it; "
+    return defect
+
+
+def contents(folder: Path) -> dict[str, Any]:
+    """What is to be the same twice of the files of a folder; None of a file that is not whole."""
+    found: dict[str, Any] = {}
+    for path in sorted(folder.rglob("*")):
+        name = path.relative_to(folder).as_posix()
+        if path.is_file() and path.name != LOG:
+            found[name] = _content(path)
+    return found
+
+
+def _content(path: Path) -> Any:
+    content = path.read_bytes()
+    if path.name.startswith(".unfinished-"):
+        return "unfinished"
+    if path.suffix == ".json":
+        try:
+            return _without_clocks(json.loads(content))
+        except ValueError:
+            return None
+    ends = {".html": b"</html>", ".png": b"IEND\xaeB`\x82"}
+    if path.suffix in ends:
+        # its clocks are in the middle of it
+        return "whole" if content.rstrip().endswith(ends[path.suffix]) else None
+    if path.suffix == ".npz":
+        with np.load(path) as arrays:
+            return {name: values.tobytes() for name, values in arrays.items()}
+    return content
+
+
+def _without_clocks(said: Any) -> Any:
+    if isinstance(said, dict):
+        return {
+            key: _without_clocks(value) for key, value in said.items() if not any(word in key for word in _CLOCKS)
+        }
+    return [_without_clocks(value) for value in said] if isinstance(said, list) else said
+
+
+# -- in the fork ----------------------------------------------------------------------------------------------------
+
+
+def _forked(command: Command, out: Path, prepare: Callable[[], None], overwrite: bool = False) -> tuple[int, str]:
+    """Run a command in a fork; its status, negative for a signal, and what it said on standard error."""
+    said = out.parent / "said"
+    sys.stdout.flush()
+    sys.stderr.flush()
+    process = os.fork()
+    if process == 0:
+        status = 99
+        try:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            os.dup2(os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
+            sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")
+            os.chdir(out.parent)
+            arguments = [*command.arguments, "--out", str(out), *(["--overwrite"] if overwrite else [])]
+            with command.prepared():
+                prepare()
+                status = main(arguments)
+            sys.stderr.flush()
+        finally:
+            os._exit(status)
+    _, ended = os.waitpid(process, 0)
+    return os.waitstatus_to_exitcode(ended), said.read_text(errors="replace")
+
+
+def _count(place: Path, counter: Path) -> None:
+    descriptor = os.open(counter, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    _at_events(place / "out", lambda: os.write(descriptor, b"."))
+
+
+def _end(way: str, fraction: float, whole: Whole, place: Path) -> None:
+    """Have this process end somewhere."""
+    if way == "moment":
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        # SIGALRM ends a process as SIGKILL does: the system does it, and no code of ours runs
+        signal.setitimer(signal.ITIMER_REAL, max(1e-4, fraction * whole.seconds))
+    elif way == "event":
+        left = [int(fraction * whole.events)]
+
+        def kill() -> None:
+            if not left[0]:
+                os.kill(os.getpid(), signal.SIGKILL)
+            left[0] -= 1
+
+        _at_events(place / "out", kill)
+    else:
+        signal.signal(signal.SIGXFSZ, signal.SIG_DFL if way == "write" else signal.SIG_IGN)
+        # small files are the many: bytes on a scale of orders
+        size = int(whole.longest**fraction)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+
+
+def _at_events(folder: Path, call: Callable[[], object]) -> None:
+    """Call something before each operation on what is in a folder."""
+    inside, there = str(folder), []
+
+    def hook(event: str, arguments: tuple[Any, ...]) -> None:
+        if event in _EVENTS and not there and str(arguments[0]).startswith(inside):
+            there.append(True)
+            call()
+            there.clear()
+
+    sys.addaudithook(hook)
