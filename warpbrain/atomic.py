@@ -17,8 +17,13 @@ from warpbrain.errors import InputError
 _unfinished: set[Path] = set()
 #: How their names begin: what a process that was killed leaves is known by it.
 UNFINISHED = ".unfinished-"
-#: The disk or what one may have of it is full: no fault of the input.
-_FULL = (errno.ENOSPC, errno.EDQUOT)
+#: The disk, or what one may have of it, is full.
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+def is_full(error: OSError) -> bool:
+    """Whether there is no place left to write to: no fault of the input."""
+    return error.errno in _FULL
 
 
 @contextmanager
@@ -36,7 +41,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f"{UNFINISHED}{path.stem}-", suffix=path.suffix)
     except OSError as error:
-        if error.errno in _FULL:
+        if is_full(error):
             raise
         raise InputError(f"{path.parent}: cannot be written to: {error.strerror}") from None
     os.close(handle)
@@ -69,7 +74,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
     try:
         temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix=f"{UNFINISHED}{target.name}-"))
     except OSError as error:
-        if error.errno in _FULL:
+        if is_full(error):
             raise
         raise InputError(f"{target.parent}: cannot be written to: {error.strerror}") from None
     _unfinished.add(temporary)
@@ -142,7 +147,7 @@ def output_folder(path: Path) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        if error.errno in _FULL:
+        if is_full(error):
             raise
         raise InputError(f"{path}: cannot be made a folder for output: {error.strerror}") from None
     # known now, not only when there is something to write

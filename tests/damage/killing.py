@@ -13,22 +13,27 @@ what its results are holds all of one command; and the same command again ends a
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import resource
 import shutil
 import signal
 import sys
+import tempfile
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stdout
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from damage.commands_to_kill import Command
+from damage.commands_to_kill import Command, commands
 from warpbrain.cli import main
+from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.terminal.record import LOG
 from warpbrain.terminal.result_folder import MARKS
 
@@ -57,6 +62,32 @@ class Killed:
     way: str
     status: int
     defect: str
+
+
+def killers(place: Path, names: Sequence[str] = ()) -> dict[str, Callable[[int], Killed]]:
+    """For each command, by name, what kills it: a function of the seed."""
+    start_warp_quietly()
+    killing: dict[str, Callable[[int], Killed]] = {}
+    for command in commands(place / "cases"):
+        if names and command.name not in names:
+            continue
+        room = place / command.name
+        (room / "whole").mkdir(parents=True)
+        # what it imports is there for all its forks
+        with command.prepared(), redirect_stdout(io.StringIO()):
+            main([*command.arguments, "--out", str(room / "warm")])
+        whole, earlier = whole_of(command, room / "whole"), None
+        if command.others:
+            (room / "earlier").mkdir()
+            whole_of(replace(command, arguments=command.others), room / "earlier")
+            earlier = room / "earlier" / "out"
+        killing[command.name] = partial(_in_a_room_of_its_own, command, whole, earlier, room)
+    return killing
+
+
+def _in_a_room_of_its_own(command: Command, whole: Whole, earlier: Path | None, room: Path, seed: int) -> Killed:
+    with tempfile.TemporaryDirectory(dir=room) as place:
+        return one_kill(command, whole, earlier, Path(place), seed)
 
 
 def whole_of(command: Command, place: Path) -> Whole:
@@ -162,15 +193,16 @@ def _without_clocks(said: Any) -> Any:
 
 def _forked(command: Command, out: Path, prepare: Callable[[], None], overwrite: bool = False) -> tuple[int, str]:
     """Run a command in a fork; its status, negative for a signal, and what it said on standard error."""
-    said = out.parent / "said"
     sys.stdout.flush()
     sys.stderr.flush()
+    reader, writer = os.pipe()
     process = os.fork()
     if process == 0:
         status = 99
         try:
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-            os.dup2(os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
+            os.dup2(writer, 2)
+            os.close(reader)
             sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")
             os.chdir(out.parent)
             arguments = [*command.arguments, "--out", str(out), *(["--overwrite"] if overwrite else [])]
@@ -180,8 +212,11 @@ def _forked(command: Command, out: Path, prepare: Callable[[], None], overwrite:
             sys.stderr.flush()
         finally:
             os._exit(status)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as stream:
+        said = stream.read().decode(errors="replace")
     _, ended = os.waitpid(process, 0)
-    return os.waitstatus_to_exitcode(ended), said.read_text(errors="replace")
+    return os.waitstatus_to_exitcode(ended), said
 
 
 def _count(place: Path, counter: Path) -> None:

@@ -72,7 +72,7 @@ def test_results_that_are_replaced_are_none_while_others_are_written(tmp_path):
 def test_a_full_disk_is_what_is_said_of_a_full_disk(tmp_path, monkeypatch):
     """Not that the log of it could not be written."""
 
-    def full(*_values):
+    def full(*_values, **_named):
         raise OSError(28, "No space left on device", "log")
 
     (tmp_path / "result.vtu").write_text("x")
