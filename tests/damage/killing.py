@@ -2,7 +2,7 @@
 
 A command is run in a fork of this process, where its kernels are loaded, and ended by one of
 
-- `moment`: SIGKILL after a random time;
+- `moment`: killed by the system after a random time of computing;
 - `event`: SIGKILL before a random one of its operations on the folder: open, rename, mkdir, remove;
 - `write`: killed by the system in the middle of a write, with so many bytes of a file on the disk;
 - `full`: the same write fails, as on a full disk, and the command has to say so.
@@ -21,7 +21,6 @@ import shutil
 import signal
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
@@ -93,11 +92,11 @@ def _in_a_room_of_its_own(command: Command, whole: Whole, earlier: Path | None, 
 def whole_of(command: Command, place: Path) -> Whole:
     """Let a command end."""
     out, counter = place / "out", place / "count"
-    began = time.monotonic()
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     status, said = _forked(command, out, lambda: _count(place, counter))
     if status != 0:
         raise AssertionError(f"{command.name}: status {status}: {said}")
-    seconds = time.monotonic() - began
+    seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
     longest = max(path.stat().st_size for path in out.rglob("*") if path.is_file())
     return Whole(contents(out), len(counter.read_bytes()), seconds, longest)
 
@@ -227,9 +226,10 @@ def _count(place: Path, counter: Path) -> None:
 def _end(way: str, fraction: float, whole: Whole, place: Path) -> None:
     """Have this process end somewhere."""
     if way == "moment":
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        # SIGALRM ends a process as SIGKILL does: the system does it, and no code of ours runs
-        signal.setitimer(signal.ITIMER_REAL, max(1e-4, fraction * whole.seconds))
+        # ends a process as SIGKILL does: the system does it, and no code of ours runs
+        signal.signal(signal.SIGVTALRM, signal.SIG_DFL)
+        # of what it computes, so that a busy machine does not change the moment
+        signal.setitimer(signal.ITIMER_VIRTUAL, max(1e-4, fraction * whole.seconds))
     elif way == "event":
         left = [int(fraction * whole.events)]
 
