@@ -7,8 +7,8 @@ A command is run in a fork of this process, where its kernels are loaded, and en
 - `write`: killed by the system in the middle of a write, with so many bytes of a file on the disk;
 - `full`: the same write fails, as on a full disk, and the command has to say so.
 
-Then: each file that has its final name is whole and as it was before or as it is to be; a folder with the file that says
-what its results are holds all of one command; and the same command again ends as if nothing had been.
+Then: each file that has its final name is whole and as it was before or as it is to be; a folder with the file that
+says what its results are holds all of one command; and the same command again ends as if nothing had been.
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ from warpbrain.terminal.result_folder import MARKS
 
 WAYS = ("moment", "event", "write", "full")
 _EVENTS = {"open", "os.rename", "os.mkdir", "os.rmdir", "os.remove", "os.chmod", "os.truncate"}
+#: What grows while a command computes, so that it need not be as it is to be.
+_GROWING = ("samples/", "sweep.csv")
 #: Keys of JSON whose values are not the same twice.
 _CLOCKS = ("second", "time_ms", "timing", "began", "phases", "versions")
 
@@ -138,7 +140,7 @@ def _look(out: Path, before: dict[str, Any], to_be: dict[str, Any], command: Com
     now = {name: content for name, content in contents(out).items() if ".unfinished-" not in name}
     defect = ""
     for name, content in now.items():
-        if name.startswith("samples/") and content is not None:
+        if name.startswith(_GROWING) and content is not None:
             continue
         if content is None or content not in (before.get(name), to_be.get(name)):
             defect += f"{name} is neither old nor new; "
@@ -169,6 +171,8 @@ def _content(path: Path) -> Any:
             return _without_clocks(json.loads(content))
         except ValueError:
             return None
+    if path.name == "sweep.csv":
+        return _numbers(content.decode())
     ends = {".html": b"</html>", ".png": b"IEND\xaeB`\x82"}
     if path.suffix in ends:
         # its clocks are in the middle of it
@@ -179,11 +183,15 @@ def _content(path: Path) -> Any:
     return content
 
 
+def _numbers(table: str) -> list[list[str]]:
+    """A sweep to five digits: each state is looked for from the one before it, where there is one since the start."""
+    rows = [row.split(",")[:-1] for row in table.splitlines()]
+    return rows[:1] + [[f"{float(cell):.5g}" if cell else "" for cell in row] for row in rows[1:]]
+
+
 def _without_clocks(said: Any) -> Any:
     if isinstance(said, dict):
-        return {
-            key: _without_clocks(value) for key, value in said.items() if not any(word in key for word in _CLOCKS)
-        }
+        return {key: _without_clocks(value) for key, value in said.items() if not any(word in key for word in _CLOCKS)}
     return [_without_clocks(value) for value in said] if isinstance(said, list) else said
 
 

@@ -30,8 +30,8 @@ def main() -> int:
             print(difference, flush=True)
     for change, differences in sorted(found.items()):
         sizes = [difference.size for difference in differences]
-        wrong = sum(difference.wrong for difference in differences)
-        print(f"{change:<25}{len(sizes):5d} tries, {wrong} differ: median {np.median(sizes):.1e}, at most {max(sizes):.1e}")
+        count = f"{len(sizes):5d} tries, {sum(difference.wrong for difference in differences)} differ"
+        print(f"{change:<25}{count}: median {np.median(sizes):.1e}, at most {max(sizes):.1e}")
     return int(any(difference.wrong for differences in found.values() for difference in differences))
 
 

@@ -1,7 +1,8 @@
-"""Small bodies drawn at random: a distorted block of one or two tissues, what acts on it, and points that were tracked."""
+"""Small bodies drawn at random: a distorted block of one or two tissues, what acts on it, and tracked points."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -55,8 +56,6 @@ def drawn_case(seed: int, points: int = 40, cells: tuple[int, int] = (2, 3)) -> 
 
 
 def _with(case: Case, recording: PointsRecording) -> Case:
-    from dataclasses import replace
-
     return replace(case, recordings=(recording,))
 
 

@@ -1,8 +1,10 @@
-"""The same body gives the same results, wherever it lies and however it is written; `python -m metamorphic` does more."""
+"""The same body gives the same results, wherever it lies and however it is written (`python -m metamorphic`)."""
+
+from dataclasses import replace
 
 import pytest
 
-from metamorphic.changes import CHANGES
+from metamorphic.changes import CHANGES, Changed
 from metamorphic.drawn import displacement, drawn_case
 from metamorphic.tries import BOUNDS, one_try
 
@@ -31,10 +33,6 @@ def test_a_diagnosis_is_the_same(change):
 
 def test_another_body_is_seen(monkeypatch):
     """The tool itself: a change that does change something."""
-    from dataclasses import replace
-
-    from metamorphic.changes import Changed
-
     monkeypatch.setitem(CHANGES, "stiffer", lambda case, _rng: Changed(replace(case, poisson=0.4501)))
     assert one_try(0, "run", "stiffer").wrong
 

@@ -83,7 +83,7 @@ def _largest(difference: np.ndarray, scale: np.ndarray) -> float:
 
 
 def _estimated(case: Case) -> tuple[np.ndarray, np.ndarray]:
-    posterior = estimate(case, options=EstimationOptions(samples=25, discretisation=False), device="cpu")
+    posterior = estimate(case, options=EstimationOptions(samples=25, discretisation=None), device="cpu")
     return posterior.theta, np.array([marginal.interval for marginal in posterior.marginals])
 
 

@@ -43,7 +43,9 @@ def test_two_processes(tmp_path, monkeypatch):
     """The second is refused, or takes the next name; a process that is killed has nothing any more."""
     monkeypatch.chdir(tmp_path)
     with another_process_has(tmp_path / "out"):
-        with pytest.raises(TakenError, match="out: another process is writing its results there: choose another folder"):
+        with pytest.raises(
+            TakenError, match="out: another process is writing its results there: choose another folder"
+        ):
             choose_folder(tmp_path / "out", "", overwrite=True)
         assert choose_folder(None, "out", overwrite=False).name == "out-2"
     end = time.monotonic() + 10.0

@@ -25,7 +25,8 @@ class ArraysError(Exception):
 def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write arrays as `.npz` with their checksum."""
     with path.open("wb") as stream:
-        np.savez(stream, **{**arrays, _NAME: np.array(_digest(arrays))})
+        members: dict[str, Any] = {**arrays, _NAME: np.array(_digest(arrays))}
+        np.savez(stream, **members)
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:

@@ -1,6 +1,6 @@
 """A sweep over curves of the generative model: its table, from which an interrupted one goes on, and its text.
 
-Each line ends with a checksum of itself and of what the sweep is of: a point of a line that is damaged is computed again.
+Each line ends with a checksum of itself and of what the sweep is of: a point whose line is damaged is computed again.
 """
 
 from __future__ import annotations

@@ -9,14 +9,16 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 from pathlib import Path
+from types import ModuleType
 
 from warpbrain.atomic import output_folder, remove_leftovers
 from warpbrain.errors import InputError
 
+fcntl: ModuleType | None
 try:
     import fcntl
 except ImportError:  # no POSIX
-    fcntl = None  # type: ignore[assignment]
+    fcntl = None
 
 #: Descriptors of the folders that this process has, and the folders that it made for each, the innermost first.
 _claims: dict[Path, tuple[int | None, list[Path]]] = {}
