@@ -56,7 +56,8 @@ def in_frame(case: Case, R: Floats, shift: Floats) -> Changed:
 
     def mechanism(one: Mechanism) -> Mechanism:
         assert isinstance(one, Gravity) and one.csf_level is None
-        return replace(one, direction=turn(one.direction))
+        imaged = None if one.imaged_direction is None else turn(one.imaged_direction)
+        return replace(one, direction=turn(one.direction), imaged_direction=imaged)
 
     changed = replace(
         case,
