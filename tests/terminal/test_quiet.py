@@ -13,7 +13,7 @@ def test_a_home_that_cannot_be_written_to(tmp_path, monkeypatch):
     ran = warpbrain("run", "--case", write_folder(tmp_path / "case"), "--out", tmp_path / "out")
     assert ran.status == 1
     assert ran.err == (
-        "warpbrain: /home/me/.cache/warp: kernels cannot be kept there (Read-only file system): set WARP_CACHE_PATH to a "
-        "folder that can be written to\n"
+        "warpbrain: /home/me/.cache/warp: kernels cannot be kept there (Read-only file system): "
+        "set WARP_CACHE_PATH to a folder that can be written to\n"
     )
     assert not (tmp_path / "out").exists()
