@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import shutil
@@ -14,6 +15,15 @@ from warpbrain.errors import InputError
 
 #: Temporary files and folders that are being written.
 _unfinished: set[Path] = set()
+#: How their names begin: what a process that was killed leaves is known by it.
+UNFINISHED = ".unfinished-"
+#: The disk, or what one may have of it, is full.
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+def is_full(error: OSError) -> bool:
+    """Whether there is no place left to write to: no fault of the input."""
+    return error.errno in _FULL
 
 
 @contextmanager
@@ -29,8 +39,10 @@ def whole_file(path: Path) -> Iterator[Path]:
     """
     check_writable(path)
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f"{UNFINISHED}{path.stem}-", suffix=path.suffix)
     except OSError as error:
+        if is_full(error):
+            raise
         raise InputError(f"{path.parent}: cannot be written to: {error.strerror}") from None
     os.close(handle)
     temporary = Path(name)
@@ -60,8 +72,10 @@ def whole_folder(path: Path) -> Iterator[Path]:
     # what is really written, where `path` ends in a dot or is a link
     target = path.resolve()
     try:
-        temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}-"))
+        temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix=f"{UNFINISHED}{target.name}-"))
     except OSError as error:
+        if is_full(error):
+            raise
         raise InputError(f"{target.parent}: cannot be written to: {error.strerror}") from None
     _unfinished.add(temporary)
     try:
@@ -117,11 +131,24 @@ def remove_unfinished() -> None:
             temporary.unlink(missing_ok=True)
 
 
+def remove_leftovers(folder: Path) -> None:
+    """Remove what a process that was killed left half-written in a folder, which no other process may be writing to."""
+    for left in folder.glob(f"{UNFINISHED}*"):
+        if left in _unfinished:
+            continue
+        if left.is_dir() and not left.is_symlink():
+            shutil.rmtree(left, ignore_errors=True)
+        else:
+            left.unlink(missing_ok=True)
+
+
 def output_folder(path: Path) -> Path:
     """Make a folder for output if it is not there; `InputError` if it cannot be one."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
+        if is_full(error):
+            raise
         raise InputError(f"{path}: cannot be made a folder for output: {error.strerror}") from None
     # known now, not only when there is something to write
     if not os.access(path, os.W_OK | os.X_OK):

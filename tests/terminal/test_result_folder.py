@@ -5,8 +5,15 @@ import warnings
 import pytest
 
 from warpbrain.errors import InputError
+from warpbrain.terminal.claim import release
 from warpbrain.terminal.record import LOG, Record, files_of
 from warpbrain.terminal.result_folder import MARKS, choose_folder, results_in
+
+
+@pytest.fixture(autouse=True)
+def released():
+    yield
+    release()
 
 
 def write_results(folder, name="summary.json", record=None, replace=False):
@@ -43,12 +50,35 @@ def test_what_is_no_result_is_in_nobodys_way(tmp_path):
     assert (tmp_path / "notes.txt").read_text() == "mine"
 
 
-def test_nothing_is_made_before_there_is_something_to_write(tmp_path):
+def test_a_folder_that_was_made_for_nothing_goes_again(tmp_path):
     folder = choose_folder(tmp_path / "a" / "b", "", overwrite=False)
-    assert list(tmp_path.iterdir()) == []
     with pytest.raises(RuntimeError), results_in(folder, Record(quiet=True), replace=False):
         raise RuntimeError
-    assert not folder.exists()
+    release()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_results_that_are_replaced_are_none_while_others_are_written(tmp_path):
+    """Killed in the middle, a folder must not look like results, old or new, and its log says what happened."""
+    write_results(tmp_path, record=Record(("run",), quiet=True))
+    with results_in(tmp_path, Record(("run", "--overwrite"), quiet=True), replace=True):
+        assert not any((tmp_path / mark).exists() for mark in MARKS)
+        assert "ended     not yet: its results are being written" in (tmp_path / LOG).read_text()
+        # what the log names is still known to whoever replaces them next
+        assert files_of(tmp_path) == ["summary.json"]
+    assert "not yet" not in (tmp_path / LOG).read_text()
+
+
+def test_a_full_disk_is_what_is_said_of_a_full_disk(tmp_path, monkeypatch):
+    """Not that the log of it could not be written."""
+
+    def full(*_values, **_named):
+        raise OSError(28, "No space left on device", "log")
+
+    (tmp_path / "result.vtu").write_text("x")
+    monkeypatch.setattr(Record, "write", full)
+    with pytest.raises(OSError, match="result"), results_in(tmp_path, Record(quiet=True), replace=False):
+        raise OSError(28, "No space left on device", "result.vtu")
 
 
 def test_a_failure_after_some_files_is_in_the_log(tmp_path):

@@ -21,8 +21,10 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
 
 
 def _build(options: argparse.Namespace) -> None:
-    from warpbrain.atomic import output_folder
-    from warpbrain.cases.building import build
+    from warpbrain.cases.building import NAMES, build
+    from warpbrain.terminal.claim import claim
 
-    folder = build(options.name, output_folder(options.out), progress=print)
+    if options.name in NAMES:
+        claim(options.out / options.name)
+    folder = build(options.name, options.out, progress=print)
     print(f"written to {folder}")

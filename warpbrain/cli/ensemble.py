@@ -130,6 +130,8 @@ def _ensemble(options: argparse.Namespace) -> None:
         about = {"case": case.name, "samples": len(samples), "chosen": chosen, "course": course}
         output.note_case(record, case, workers.name)
         store = Store(out, job, workers.kind, about)
+        for name in store.damaged:
+            say(f"  damaged   {name}: nothing of it is used")
         seconds, computed = _compute(job, store, workers, say, Progress("samples", options.quiet))
 
     progress = Progress("summing up", options.quiet)

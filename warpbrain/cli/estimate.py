@@ -264,9 +264,11 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
     path = out / TABLE
     if options.overwrite:
         path.unlink(missing_ok=True)
-    known = read_sweep(path, header, len(parameters.tissues))
+    known, damaged = read_sweep(path, header, len(parameters.tissues))
     total = len(VALUES) ** len(parameters.tissues)
     say(f"sweep of {total} equilibria" + (f", {len(known)} of which are there already" if known else ""))
+    if damaged:
+        say(f"  damaged   {damaged} of the lines of {path.name}: nothing of them is used")
     progress = Progress("sweep", options.quiet)
     points = dict(known)
 

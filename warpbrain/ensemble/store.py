@@ -1,13 +1,14 @@
 """Outcomes in a folder, each written whole as soon as it is known: what a killed run has computed is never lost.
 
-The folder holds `ensemble.json`, which says whose outcomes these are, and `samples/part-NNNN.npz`.
+The folder holds `ensemble.json`, which says whose outcomes these are, and `samples/part-NNNNNN.npz`. Every file holds a
+checksum of all that it says. A part that is damaged is taken away, so that its samples are computed again; a damaged
+`ensemble.json` is written anew where no sound part is of another ensemble.
 """
 
 from __future__ import annotations
 
 import json
 import shutil
-import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.atomic import output_folder, whole_file
+from warpbrain.atomic import output_folder, remove_leftovers, whole_file
+from warpbrain.ensemble.checksums import ArraysError, checksum_of, read_arrays, write_arrays
 from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.sample import Outcome
 from warpbrain.errors import InputError
@@ -45,6 +47,11 @@ class Store:
     about : mapping
         What a reader of `ensemble.json` should know of it; plain values.
 
+    Attributes
+    ----------
+    damaged : list of str
+        Names of the files that were damaged, and of which nothing is used.
+
     Raises
     ------
     InputError
@@ -55,44 +62,79 @@ class Store:
         self.folder = folder
         # reactions are kept at nodes with constrained components only
         self._held = np.any(job.model.constrained, axis=1)
-        fingerprint = job.fingerprint(kind)
+        self._fingerprint = job.fingerprint(kind)
         manifest = output_folder(folder) / MANIFEST
         self._parts = folder / PARTS
-        if manifest.exists():
-            _require_same(manifest, fingerprint)
-        else:
-            if self._parts.exists():
-                raise InputError(f"{self._parts}: samples of an ensemble whose ensemble.json is missing: remove one")
+        known = {"fingerprint": self._fingerprint, **about, "devices": kind, "versions": job.versions}
+        damaged = manifest.exists() and self._is_damaged(manifest)
+        self._numbers: set[int] = set()
+        unsound = [file for file in self._files() if not self._is_sound(file)]
+        if damaged or not manifest.exists():
+            # only now is it known that no part is of another ensemble
             with whole_file(manifest) as scratch:
-                known = {"fingerprint": fingerprint, **about, "devices": kind, "versions": job.versions}
-                scratch.write_text(json.dumps(known, indent=2) + "\n", encoding="utf-8")
-        output_folder(self._parts)
+                text = json.dumps({**known, "sha256": checksum_of(known)}, indent=2)
+                scratch.write_text(text + "\n", encoding="utf-8")
+        for file in unsound:
+            file.unlink(missing_ok=True)
+        remove_leftovers(output_folder(self._parts))
+        self.damaged = ([MANIFEST] if damaged else []) + [f"{PARTS}/{file.name}" for file in unsound]
         last = self._files()[-1:]
         self._next = int(last[0].stem.removeprefix("part-")) + 1 if last else 0
 
     def _files(self) -> list[Path]:
         return sorted(self._parts.glob("part-*.npz"))
 
+    def _is_damaged(self, manifest: Path) -> bool:
+        """Whether its checksum is another one; `InputError` if it is of another ensemble."""
+        try:
+            found = json.loads(manifest.read_text(encoding="utf-8"))
+            checksum, known = found.pop("sha256", None), found["fingerprint"]
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            return True
+        # one without a checksum is as old as that and may be of another ensemble, too
+        if checksum not in (checksum_of(found), None):
+            return True
+        if known != self._fingerprint:
+            about = ", ".join(
+                f"{key}: {value}"
+                for key, value in found.items()
+                if isinstance(value, str | int) and key != "fingerprint"
+            )
+            raise InputError(
+                f"{self.folder}: holds another ensemble ({about}): choose another folder, or --overwrite it"
+            )
+        return checksum is None
+
+    def _is_sound(self, part: Path) -> bool:
+        """Whether a part is what was written; `InputError` if it is of another ensemble."""
+        try:
+            arrays = read_arrays(part)
+        except ArraysError:
+            return False
+        if str(arrays["fingerprint"]) != self._fingerprint:
+            raise InputError(f"{part}: samples of another ensemble: choose another folder, or --overwrite it")
+        self._numbers |= set(arrays["number"].tolist())
+        return True
+
     def numbers(self) -> set[int]:
         """Samples whose outcome is here."""
-        found: set[int] = set()
-        for file in self._files():
-            found |= set(_read(file)["number"].tolist())
-        return found
+        return set(self._numbers)
 
     def write(self, outcomes: Sequence[Outcome]) -> None:
         """Write outcomes, all or none of them."""
         good = [outcome for outcome in outcomes if not outcome.failed]
         n, held = len(self._held), np.count_nonzero(self._held)
         arrays: dict[str, Any] = {
+            "fingerprint": np.array(self._fingerprint),
             **{name: np.array([getattr(o, name) for o in outcomes]) for name in _NUMBERS},
             "reason": np.array([outcome.reason for outcome in outcomes], dtype=np.str_),
             "u": np.array([outcome.u for outcome in good]).reshape(-1, n, 3),
             "reactions": np.array([outcome.reactions[self._held] for outcome in good]).reshape(-1, held, 3),
         }
-        with whole_file(self._parts / f"part-{self._next:06d}.npz") as scratch, scratch.open("wb") as stream:
-            np.savez(stream, **arrays)
+        with whole_file(self._parts / f"part-{self._next:06d}.npz") as scratch:
+            write_arrays(scratch, arrays)
         self._next += 1
+        self._numbers |= {outcome.number for outcome in outcomes}
 
     def outcomes(self) -> Iterator[Outcome]:
         """All outcomes, in the order in which they were written."""
@@ -116,23 +158,7 @@ _NUMBERS = ("number", "steps", "cg_iterations", "time", "residual", "min_J")
 
 def _read(file: Path) -> dict[str, NDArray[Any]]:
     try:
-        with np.load(file, allow_pickle=False) as arrays:
-            return dict(arrays)
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise InputError(
-            f"{file}: not a file of samples: {error}; remove it, and its samples are computed again"
-        ) from None
-
-
-def _require_same(manifest: Path, fingerprint: str) -> None:
-    try:
-        found = json.loads(manifest.read_text(encoding="utf-8"))
-        known = found["fingerprint"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{manifest}: not the manifest of an ensemble: {error}") from None
-    if known != fingerprint:
-        about = ", ".join(f"{key}: {value}" for key, value in found.items() if isinstance(value, str | int))
-        about = about.removeprefix(f"fingerprint: {known}, ")
-        raise InputError(
-            f"{manifest.parent}: holds another ensemble ({about}): choose another folder, or --overwrite it"
-        )
+        return read_arrays(file)
+    except ArraysError as error:
+        # since the folder was opened
+        raise InputError(f"{file}: {error}; the same command computes its samples again") from None

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import os
 import re
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import is_full, whole_file
 from warpbrain.frame import METRES
 from warpbrain.mesh.abaqus import read_abaqus
 from warpbrain.mesh.patience import patience
@@ -114,6 +115,9 @@ def read_raw(path: Path) -> Any:
     except SystemExit as error:  # meshio leaves the program on some unreadable files
         raise MeshError(f"{path}: not a mesh that meshio can read") from error
     except Exception as error:  # its readers raise whatever their parsers do
+        if isinstance(error, OSError) and is_full(error):
+            # some formats are read from a copy
+            raise OSError(error.errno, error.strerror, tempfile.gettempdir()) from error
         detail = " ".join(str(error).split())[:200] or type(error).__name__
         raise MeshError(f"{path}: not a mesh that meshio can read ({detail})") from error
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from warpbrain.errors import InputError, SolveError
+from warpbrain.terminal.claim import release
 from warpbrain.terminal.crash import SOFTWARE, where, write_report
 from warpbrain.terminal.interrupt import clear_up, stop_promptly
 from warpbrain.terminal.record import Record
@@ -49,6 +50,8 @@ def exit_status(program: str, call: Callable[[], None], record: Record | None = 
                 if debug:
                     traceback.print_exc()
                 raise
+            finally:
+                release()
             sys.stdout.flush()
     except InputError as error:
         print(f"{program}: error: {error}", file=sys.stderr)

@@ -19,14 +19,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from warpbrain.atomic import remove_unfinished
+from warpbrain.terminal.claim import release
 
 #: Seconds that Python is given to stop by itself.
 _GRACE = 0.6
 
 
 def clear_up() -> None:
-    """Remove what an interrupted process leaves half-written: our own files, and folders of half-built kernels."""
+    """Remove what an interrupted process leaves: half-written files, empty folders, folders of half-built kernels."""
     remove_unfinished()
+    release()
     warp = sys.modules.get("warp")
     cache = warp.config.kernel_cache_dir if warp else None
     if cache:

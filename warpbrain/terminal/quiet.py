@@ -22,6 +22,10 @@ def start_warp_quietly() -> Any:
     try:
         os.dup2(nowhere, 2)
         wp.init()
+    except OSError as error:
+        # a home that cannot be written to: kernels are compiled into a folder in it
+        why = f"kernels cannot be kept there ({error.strerror}): set WARP_CACHE_PATH to a folder that can be written to"
+        raise OSError(error.errno, why, error.filename) from None
     finally:
         os.dup2(saved, 2)
         os.close(saved)

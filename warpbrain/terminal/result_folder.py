@@ -1,28 +1,31 @@
-"""The folder that a command writes its results to: never one that has results already, and none that is left empty."""
+"""The folder that a command writes its results to: never one that has results already or that another process writes
+to, and none that is left empty."""
 
 from __future__ import annotations
 
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from warpbrain.atomic import check_output_folder, output_folder
 from warpbrain.errors import InputError
-from warpbrain.terminal.record import Record, files_of
+from warpbrain.terminal.claim import TakenError, claim
+from warpbrain.terminal.record import LOG, Record, files_of
 
 #: What tells a folder of results: the file that each command writes last, or first if it goes on with what is there.
 MARKS = ("summary.json", "estimate.json", "diagnosis.json", "ensemble.json", "sweep.csv")
 
 
 def choose_folder(asked: Path | None, usual: str, overwrite: bool, beside: Iterable[str] = ()) -> Path:
-    """Where results are to be written, known before anything is computed; nothing is made yet.
+    """Where results are to be written, known before anything is computed; this process alone has it until it ends.
+
+    A folder that was made for nothing goes again when the command ends (`warpbrain.terminal.claim.release`).
 
     Parameters
     ----------
     asked : Path or None
-        What ``--out`` says. None: a folder of the usual name in the working folder; where it has results, the next
-        free one of ``NAME-2``, ``NAME-3``, ...
+        What ``--out`` says. None: a folder of the usual name in the working folder; where it has results, or another
+        process writes to it, the next free one of ``NAME-2``, ``NAME-3``, ...
     usual : str
     overwrite : bool
         Whether results that are there may be replaced.
@@ -32,23 +35,29 @@ def choose_folder(asked: Path | None, usual: str, overwrite: bool, beside: Itera
     Raises
     ------
     InputError
-        If the folder that was asked for has results and may not be overwritten, cannot be one or be written to.
+        If the folder that was asked for has results and may not be overwritten, belongs to another process, cannot be
+        one or be written to.
     """
-    folder = _chosen(asked, usual, overwrite, beside)
-    check_output_folder(folder)
+    if asked is None and not overwrite:
+        return _next_free(usual, tuple(beside))
+    folder = asked or Path(usual)
+    claim(folder)
+    if not overwrite and (marks := _has_results(folder, beside)):
+        raise InputError(f"{folder}: has results already ({', '.join(marks)}): --overwrite replaces them")
     return folder
 
 
-def _chosen(asked: Path | None, usual: str, overwrite: bool, beside: Iterable[str]) -> Path:
-    if asked is None:
-        folder, number = Path(usual), 1
-        while not overwrite and _has_results(folder, beside):
-            number += 1
-            folder = Path(f"{usual}-{number}")
-        return folder
-    if not overwrite and (marks := _has_results(asked, beside)):
-        raise InputError(f"{asked}: has results already ({', '.join(marks)}): --overwrite replaces them")
-    return asked
+def _next_free(usual: str, beside: Iterable[str]) -> Path:
+    folder, number = Path(usual), 1
+    while True:
+        if not _has_results(folder, beside):
+            with suppress(TakenError):
+                claim(folder)
+                # known for sure only now that nobody else can write some
+                if not _has_results(folder, beside):
+                    return folder
+        number += 1
+        folder = Path(f"{usual}-{number}")
 
 
 def _has_results(folder: Path, beside: Iterable[str]) -> list[str]:
@@ -58,7 +67,7 @@ def _has_results(folder: Path, beside: Iterable[str]) -> list[str]:
 
 @contextmanager
 def results_in(path: Path, record: Record, replace: bool) -> Iterator[None]:
-    """Make the folder that results are written to in the block, and write the log when it ends.
+    """The folder that results are written to in the block, for this process alone; writes the log when it ends.
 
     A folder that was made for nothing goes again.
 
@@ -69,28 +78,35 @@ def results_in(path: Path, record: Record, replace: bool) -> Iterator[None]:
         Its `files` say what was written.
     replace : bool
         Whether the results take the place of earlier ones: what these left there by their log and the block did not
-        write is taken away at the end, for nobody should take it for new.
+        write is taken away at the end, for nobody should take it for new. The file that says what they are goes
+        first: a process that is killed in the block leaves nothing that could be taken for results, old or new.
 
     Raises
     ------
     InputError
-        If it cannot be a folder, or be written to.
+        If it cannot be a folder, be written to, or another process writes to it.
     """
     made = not path.exists()
-    folder = output_folder(path)
-    earlier = files_of(folder)
+    claim(path)
+    earlier = files_of(path)
+    if replace and (path / LOG).exists():
+        record.write(path, "not yet: its results are being written, or were when it was killed", replace=False)
+        for name in set(MARKS) & set(earlier):
+            _remove(path, name)
     try:
         yield
     except BaseException as error:
-        if any(folder.iterdir()):
-            record.write(folder, f"{type(error).__name__}: {error}", replace=False)
-        elif made:
-            folder.rmdir()
+        # a full disk has no place for a log of it
+        with suppress(OSError, InputError):
+            if any(path.iterdir()):
+                record.write(path, f"{type(error).__name__}: {error}", replace=False)
+            elif made:
+                path.rmdir()
         raise
     if replace:
         for name in set(earlier) - set(record.files):
-            _remove(folder, name)
-    record.write(folder, "done", replace)
+            _remove(path, name)
+    record.write(path, "done", replace)
 
 
 def _remove(folder: Path, name: str) -> None:

@@ -58,6 +58,8 @@ def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], 
     recipe = RECIPES[name]
     folder = Path(out_dir) / name
     folder.mkdir(parents=True, exist_ok=True)
+    # a record of earlier meshes must not lie beside new ones if this is killed
+    (folder / "meshes.json").unlink(missing_ok=True)
     progress("reading template maps, smoothing")
     anatomy = template_anatomy()
     record: dict[str, Any] = {"versions": versions(), "meshes": {}}

@@ -1,0 +1,45 @@
+"""The same body gives the same results, wherever it lies and however it is written (`python -m metamorphic`)."""
+
+from dataclasses import replace
+
+import pytest
+
+from metamorphic.changes import CHANGES, Changed
+from metamorphic.drawn import displacement, drawn_case
+from metamorphic.tries import BOUNDS, one_try
+
+
+@pytest.mark.parametrize("change", list(CHANGES))
+def test_a_run_is_the_same(change, verify):
+    worst = max(one_try(seed, "run", change).size for seed in range(2))
+    verify(f"displacement of a body that is {change}", "the body before", worst, BOUNDS["run"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", list(CHANGES))
+def test_an_estimate_is_the_same(change, verify):
+    worst = max(one_try(seed, "estimate", change).size for seed in range(2))
+    verify(
+        f"interval of 95 % of tissue of a body that is {change}, of its width", "the body before", worst,
+        BOUNDS["estimate"],
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", ["rotated", "split over files", "written in m and LPS"])
+def test_a_diagnosis_is_the_same(change):
+    assert not one_try(3, "diagnose", change).wrong
+
+
+def test_another_body_is_seen(monkeypatch):
+    """The tool itself: a change that does change something."""
+    monkeypatch.setitem(CHANGES, "stiffer", lambda case, _rng: Changed(replace(case, poisson=0.4501)))
+    assert one_try(0, "run", "stiffer").wrong
+
+
+def test_bodies_are_drawn_of_all_kinds():
+    cases = [drawn_case(seed) for seed in range(12)]
+    kinds = {(*(one.kind for one in case.boundaries[1:]), *(one.kind for one in case.mechanisms)) for case in cases}
+    assert kinds == {("force",), ("displacement",), ("pressure",), ("gravity",)}
+    assert {len(case.tissues) for case in cases} == {1, 2}
+    assert all(abs(displacement(case)).max() > 1e-5 for case in cases[:3])
