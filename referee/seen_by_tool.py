@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from referee.detectability import conditional
-from warpbrain.errors import InputError
+from referee.errors import InputError
 
 Floats = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ import json
 import numpy as np
 import pytest
 
+from referee.errors import InputError
 from referee.seen_by_tool import read_seen, stands_out, write_seen
-from warpbrain.errors import InputError
 
 #: Two points, a place on the wall and a force.
 LABEL = {
