@@ -22,7 +22,7 @@ def relevance_vector(problem: Whitened) -> Answer:
     from sklearn.linear_model import ARDRegression
 
     columns = problem.columns / np.linalg.norm(problem.columns, axis=0)
-    model = ARDRegression(fit_intercept=False, max_iter=60, threshold_lambda=1e3).fit(columns, problem.y)
+    model = ARDRegression(fit_intercept=False, max_iter=30, threshold_lambda=1e3).fit(columns, problem.y)
     kept = np.flatnonzero(model.lambda_ < model.threshold_lambda)
     if not len(kept):
         return Answer(problem.name, "nothing missing")
