@@ -9,7 +9,7 @@ import numpy as np
 from referee.baselines.shares import named, weights
 from referee.baselines.whitened import Whitened
 from referee.challenge.answers import Answer
-from referee.challenge.neutral import Floats
+from referee.challenge.neutral import Floats, Ints
 
 #: Halves of the rows that say how stable the names are (Meinshausen and Buehlmann 2010).
 _HALVES = 20
@@ -25,7 +25,7 @@ def lasso(problem: Whitened) -> Answer:
     return Answer(problem.name, "named" if names else "nothing missing", names, float(same))
 
 
-def _named(problem: Whitened, columns: Floats, rows: np.ndarray) -> tuple[str, ...]:
+def _named(problem: Whitened, columns: Floats, rows: Ints) -> tuple[str, ...]:
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.linear_model import LassoLarsIC
 

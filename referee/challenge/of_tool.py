@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from referee.challenge.answers import Answer
@@ -22,7 +22,7 @@ def answer_of(case: str, said: Diagnosis) -> Answer:
         return Answer(case, said.verdict, said.names, said.probability)
     if said.verdict == "group":
         return Answer(case, "group", said.group, _sum(said, lambda tried: bool(tried.causes & set(said.group))))
-    right = {
+    right: Callable[[Tried], bool] | None = {
         "nothing missing": lambda tried: not tried.causes,
         "not physics": lambda tried: NOT_PHYSICS in tried.causes and not tried.physics and UNKNOWN not in tried.causes,
         "unknown": lambda tried: UNKNOWN in tried.causes and not tried.physics,
@@ -30,8 +30,7 @@ def answer_of(case: str, said: Diagnosis) -> Answer:
     return Answer(case, said.verdict, (), None if right is None else _sum(said, right))
 
 
-def _sum(said: Diagnosis, right: object) -> float | None:
+def _sum(said: Diagnosis, right: Callable[[Tried], bool]) -> float | None:
     if not said.hypotheses:
         return None
-    chosen: list[Tried] = [tried for tried in said.hypotheses if right(tried)]  # type: ignore[operator]
-    return min(sum(tried.probability for tried in chosen), 1.0)
+    return min(sum(tried.probability for tried in said.hypotheses if right(tried)), 1.0)

@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from referee.compliance.observed import Observed
 from referee.compliance.response import DeclaredResponse
 from referee.faces import Floats
-from referee.law import respond
+from referee.law import Law, respond
 from referee.setting import BOTH_LAWS, EACH, NOISE, OVERALL, POISSON, SHARED, SHARED_LENGTH, SHIFT, TURN, mean_square
 from referee.unknowns import stiffness_modes
 
@@ -109,9 +109,9 @@ def _unresolved(response: DeclaredResponse) -> list[Floats]:
     return found
 
 
-def _law(response: DeclaredResponse, law: object) -> Floats:
+def _law(response: DeclaredResponse, law: Law) -> Floats:
     """Stress (m, 3, 3) of the referee's law with the declared moduli."""
     body = response.body
     bulk = body.lam + 2.0 / 3.0 * body.mu
     F, none = response.F[:, None], np.zeros((len(body.mu), 1))
-    return respond(law, F, body.mu[:, None], bulk[:, None], none).stress()[:, 0]  # type: ignore[arg-type]
+    return respond(law, F, body.mu[:, None], bulk[:, None], none).stress()[:, 0]

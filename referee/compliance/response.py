@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from referee.compliance.neo_hookean import NeoHookeanBody
 from referee.compliance.observed import observed
@@ -59,9 +61,8 @@ class DeclaredResponse:
         return (self._distinct @ moves - self._fields.T @ pulled)[self._again]
 
 
-def _distinct(reading: object) -> tuple[np.ndarray, np.ndarray]:
+def _distinct(matrix: csr_matrix) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """First rows of a sparse matrix among equal ones, and for each row which of these it is."""
-    matrix = reading.tocsr()  # type: ignore[attr-defined]
     seen: dict[tuple[bytes, bytes], int] = {}
     first, again = [], []
     for k in range(matrix.shape[0]):
