@@ -1,4 +1,4 @@
-"""The referee: ``python -m referee make|run|see|analyse|score|calibrate|mesh``. See docs/referee.md."""
+"""The referee: ``python -m referee make|run|see|analyse|score|calibrate|challenge|mesh``. See docs/referee.md."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import os
 import sys
 from pathlib import Path
 
-from warpbrain.errors import InputError
+from referee.challenge.commands import add_challenge, challenge
+from referee.errors import InputError
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -61,6 +62,7 @@ def _parser() -> argparse.ArgumentParser:
         )
     for parser_of in (see, score, calibrate):
         parser_of.add_argument("--diagnoses", type=Path, required=True, help="where run wrote")
+    add_challenge(commands)
     commands.add_parser("mesh", help="make the meshes of truths anew, with MMG")
     return parser
 
@@ -70,9 +72,18 @@ def main(arguments: list[str] | None = None) -> int:
     given = _parser().parse_args(arguments)
     try:
         return _COMMANDS[given.command](given)
-    except InputError as error:
+    except _wrong_input() as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+
+
+def _wrong_input() -> tuple[type[Exception], ...]:
+    """What is raised of wrong input; who takes part in the challenge needs no `warpbrain`."""
+    try:
+        import warpbrain.errors
+    except ImportError:
+        return (InputError,)
+    return InputError, warpbrain.errors.InputError
 
 
 def _make(given: argparse.Namespace) -> int:
@@ -106,8 +117,8 @@ def _run(given: argparse.Namespace) -> int:
 def _left_out(given: argparse.Namespace) -> dict[str, str]:
     """By case the mechanism that its dictionary is without."""
     from referee.draw import MECHANISMS
-    from referee.labels import open_labels
     from referee.run import case_folders
+    from referee.sealed import open_labels
 
     if given.leave_out not in (*MECHANISMS, "each"):
         raise InputError(f"--leave-out {given.leave_out}: expected each or one of {', '.join(MECHANISMS)}")
@@ -122,14 +133,14 @@ def _left_out(given: argparse.Namespace) -> dict[str, str]:
 
 def _analyse(given: argparse.Namespace) -> int:
     from referee.analyst import analyse
-    from referee.labels import open_labels
+    from referee.sealed import open_labels
 
     analyse(open_labels(given.labels, _commitments(given)), given.out, given.workers)
     return 0
 
 
 def _see(given: argparse.Namespace) -> int:
-    from referee.labels import open_labels
+    from referee.sealed import open_labels
     from referee.seen_by_tool import write_seen
 
     found = write_seen(open_labels(given.labels, _commitments(given)), given.diagnoses)
@@ -187,6 +198,7 @@ _COMMANDS = {
     "analyse": _analyse,
     "score": _score,
     "calibrate": _calibrate,
+    "challenge": challenge,
     "mesh": _mesh,
 }
 

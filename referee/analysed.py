@@ -13,8 +13,8 @@ import numpy as np
 from referee.calibrate import FILE, known_of, true_of
 from referee.decision import Posterior, decide
 from referee.diagnoses import NOT_PHYSICS, UNKNOWN, Diagnosis, Ranked, Tried
+from referee.errors import InputError
 from referee.outcomes import Outcome
-from warpbrain.errors import InputError
 
 #: Shares that the analyst is not asked for: it estimates no places and no amounts.
 NOT_ASKED = ("centre", "amount", "best candidate right, the best fit's", "mechanism left out")

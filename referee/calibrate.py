@@ -14,12 +14,12 @@ import numpy as np
 import warpbrain
 from referee.decision import decide
 from referee.diagnoses import NOT_PHYSICS, UNKNOWN, Tried
+from referee.errors import InputError
 from referee.intervals import Share, share
-from referee.labels import open_labels
 from referee.outcomes import Outcome, read_outcomes
 from referee.reliability import reliability
+from referee.sealed import open_labels
 from referee.temperature import TRAITS, Ballot, Floats, Scale, fit, held_out, interval, log_loss
-from warpbrain.errors import InputError
 
 #: Where the tool reads it.
 FILE = Path(warpbrain.__file__).parent / "inference" / "calibration.json"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from warpbrain.errors import InputError
+from referee.errors import InputError
 
 #: Every verdict there is.
 VERDICTS = ("nothing missing", "named", "group", "named + rest", "unknown", "not physics", "cannot say")

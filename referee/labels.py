@@ -8,15 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from concealed.sealing import fingerprint, open_sealed, read_sealed, sealed, write_sealed
+from concealed.sealing import fingerprint, sealed, write_sealed
 from referee.observe import seen
 from referee.plan import Planned
 from referee.sizing import Sized
 from referee.truth import Truth
-from warpbrain.errors import InputError
-
-#: What a folder of labels has: sealed truths, and the list of their hashes, which is published.
-COMMITMENTS = "commitments.txt"
 
 
 def label_of(name: str, plan: Planned, truth: Truth, attempts: list[str]) -> dict[str, Any]:
@@ -94,49 +90,3 @@ def seal(folder: Path, label: dict[str, Any]) -> str:
     data = sealed(label)
     write_sealed(folder / f"{label['case']}.json.gz", data)
     return fingerprint(data)
-
-
-def write_commitments(folder: Path) -> None:
-    """List the hashes of all labels of a folder."""
-    lines = [f"{fingerprint(read_sealed(file))}  {file.name[: -len('.json.gz')]}\n" for file in _files(folder)]
-    (folder / COMMITMENTS).write_text("".join(lines), encoding="ascii")
-
-
-def open_labels(folder: Path, commitments: Path) -> dict[str, dict[str, Any]]:
-    """Labels by name of case, each of which has the hash that was published.
-
-    Parameters
-    ----------
-    folder : Path
-        Of sealed labels.
-    commitments : Path
-        The list of hashes that was published.
-
-    Raises
-    ------
-    InputError
-        If a label is missing, was not committed to, or is not the one whose hash was published.
-    """
-    published = {}
-    for line in commitments.read_text(encoding="ascii").splitlines():
-        digest, name = line.split()
-        published[name] = digest
-    labels = {}
-    for file in _files(folder):
-        name = file.name[: -len(".json.gz")]
-        data = read_sealed(file)
-        if name not in published:
-            raise InputError(f"{file}: {commitments} has no hash of '{name}'")
-        if fingerprint(data) != published[name]:
-            raise InputError(f"{file}: its hash is {fingerprint(data)}, {commitments} says {published[name]}")
-        labels[name] = open_sealed(data)
-        if labels[name]["case"] != name:
-            raise InputError(f"{file}: is the label of '{labels[name]['case']}'")
-    missing = sorted(set(published) - set(labels))
-    if missing:
-        raise InputError(f"{folder}: no label of {', '.join(missing)}, whose hashes are in {commitments}")
-    return labels
-
-
-def _files(folder: Path) -> list[Path]:
-    return sorted(folder.glob("*.json.gz"))

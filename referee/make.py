@@ -16,8 +16,9 @@ import numpy as np
 from referee.draw import WANTED, draw_effect, trapped, wanted
 from referee.equilibrium import NoTruth
 from referee.folder import write_folder
-from referee.labels import label_of, seal, write_commitments
+from referee.labels import label_of, seal
 from referee.plan import BOTH, Planned, planned
+from referee.sealed import write_commitments
 from referee.setting import draw_setting
 from referee.sizing import Wish
 from referee.threads import single

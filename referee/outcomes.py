@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from referee.diagnoses import UNKNOWN, Diagnosis, Ranked, read_diagnosis
-from referee.run import DIAGNOSIS, read_runs
-from referee.seen_by_tool import read_seen
+from referee.runs import DIAGNOSIS, read_runs, read_seen
 
 
 @dataclass(frozen=True)

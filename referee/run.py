@@ -13,16 +13,12 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 import warpbrain
-from warpbrain.errors import InputError
+from referee.errors import InputError
+from referee.runs import COLUMNS, RUNS, read_runs
 from warpbrain.physics.mechanisms import mechanisms
 
-#: The list of runs, in the folder of results.
-RUNS = "runs.csv"
-COLUMNS = ("case", "status", "seconds", "version", "commit", "arguments", "left_out")
 #: Status of a run that took too long.
 NO_DIAGNOSIS = "no diagnosis"
-#: What the tool writes into the folder of a case.
-DIAGNOSIS = "diagnosis.json"
 
 
 def run_all(
@@ -92,15 +88,6 @@ def _without(mechanism: str) -> list[str]:
     if not mechanism:
         return []
     return ["--candidates", ",".join(name for name in mechanisms() if name != mechanism)]
-
-
-def read_runs(out: Path) -> list[dict[str, str]]:
-    """Rows of the list of runs; none if there is no list."""
-    file = out / RUNS
-    if not file.exists():
-        return []
-    with file.open(newline="", encoding="utf-8") as lines:
-        return list(csv.DictReader(lines))
 
 
 def _run(folder: Path, out: Path, arguments: Sequence[str], limit: float | None) -> tuple[str, float]:

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from referee.analysed import NOT_ASKED, analysts, read_analyses, rightness, with_conditionals
+from referee.errors import InputError
 from referee.figures import draw_figures
 from referee.intervals import Share
-from referee.labels import open_labels
 from referee.outcomes import Outcome, read_outcomes
 from referee.scores import amounts, calibration, confusion, shares
+from referee.sealed import open_labels
 from referee.tables import score_text
-from warpbrain.errors import InputError
 
 
 def score_all(
@@ -63,7 +63,7 @@ def score_all(
     confused = confusion(outcomes)
     baselines = {}
     if compared:
-        from referee.baselines import compare
+        from referee.compared import compare
 
         baselines = compare(cases, outcomes)
     others = _beside(opened, outcomes, beside) if beside else {}

@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from referee.detectability import conditional
-from warpbrain.errors import InputError
+from referee.errors import InputError
+from referee.runs import SEEN, read_seen
 
 Floats = NDArray[np.float64]
 
-#: What the tool writes of a case, and where this is kept beside the list of runs.
-POINTS, COVARIANCE, SEEN = "points.csv", "covariance.npz", "detectability.json"
+#: What the tool writes of a case.
+POINTS, COVARIANCE = "points.csv", "covariance.npz"
 #: Of each recording the key of the label, how many numbers tell of a vector of it, and its factor to mm or N.
 _RECORDED = {
     "points": ("clean_effect_m", 3, 1000.0),
@@ -39,13 +40,6 @@ def write_seen(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> dict
     }
     (diagnoses / SEEN).write_text(json.dumps(found, indent=1) + "\n", encoding="ascii")
     return found
-
-
-def read_seen(diagnoses: Path) -> dict[str, list[float]]:
-    """What was written, also by runs that told `d` of all alone; nothing if nothing was."""
-    file = diagnoses / SEEN
-    found = json.loads(file.read_text(encoding="ascii")) if file.exists() else {}
-    return {name: value if isinstance(value, list) else [value] for name, value in found.items()}
 
 
 def stands_out(label: Mapping[str, Any], folder: Path) -> list[float]:

@@ -3,8 +3,9 @@
 import json
 
 from referee.diagnoses import read_diagnosis
-from referee.labels import seal, write_commitments
+from referee.labels import seal
 from referee.outcomes import Outcome
+from referee.sealed import write_commitments
 
 
 def label(case, kind="none", names=(), d=0.0, **effect):

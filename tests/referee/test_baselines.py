@@ -1,42 +1,42 @@
-"""Simpler methods on regressions whose answers are known, and on a case."""
+"""Baselines on cases in the neutral format whose answers are known."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from neutral_cases import neutral
 
-from referee import make
-from referee.baselines.choosing import bic, lasso, stepwise
-from referee.baselines.dictionary import Regression, regression_of
-from referee.plan import Planned
-from warpbrain.cases.reading import read_case
-
-
-@pytest.fixture
-def regression():
-    random = np.random.default_rng(2)
-    nuisances = random.normal(size=(200, 3))
-    candidates = [(name, random.normal(size=(200, 2))) for name in ("gravity", "pressure", "swelling")]
-    return Regression(random.normal(size=200), nuisances, candidates)
+from referee.baselines import METHODS
+from referee.baselines.forward_selection import bic
+from referee.baselines.whitened import whitened
 
 
-@pytest.mark.parametrize("choose", [stepwise, lasso])
-def test_an_effect_is_found_and_noise_is_not(regression, choose):
-    nuisance = regression.nuisances @ [9.0, -9.0, 9.0]
-    alone = Regression(regression.y + nuisance, regression.nuisances, regression.candidates)
-    assert choose(alone) == ""
-    effect = regression.candidates[1][1] @ [0.7, -0.7]
-    assert choose(Regression(alone.y + effect, regression.nuisances, regression.candidates)) == "pressure"
+@pytest.mark.parametrize("method", METHODS)
+def test_an_effect_is_named_and_noise_is_not(method):
+    nothing = neutral()
+    assert METHODS[method](whitened(nothing)).verdict == "nothing missing"
+    effect = 8.0 * nothing.cause_response[:, nothing.cause_name == "pressure"].sum(axis=1)
+    answer = METHODS[method](whitened(replace(nothing, recorded=nothing.recorded + effect)))
+    assert (answer.verdict, answer.names) == ("named", ("pressure",))
+    assert answer.probability is not None and 0.0 <= answer.probability <= 1.0
+
+
+def test_what_is_smooth_and_has_no_name_is_a_discrepancy():
+    case = neutral()
+    smooth = 2e-3 * np.exp(-0.5 * ((case.sensor_place - 0.05) ** 2).sum(axis=1) / 0.04**2)
+    case = replace(case, recorded=case.recorded + smooth * case.sensor_direction[:, 0])
+    assert METHODS["gp-discrepancy"](whitened(case)).verdict == "unknown"
+
+
+def test_a_gross_error_is_no_effect():
+    case = neutral()
+    wrong = case.recorded.copy()
+    wrong[case.sensor_point == 7] += 3e-3
+    problem = whitened(replace(case, recorded=wrong))
+    assert np.abs(problem.y).max() < 5.0
+    assert METHODS["gp-discrepancy"](problem).verdict == "nothing missing"
 
 
 def test_bic_by_hand():
     y, columns = np.array([1.0, 2.0, 3.0, 5.0]), np.ones((4, 1))
     assert bic(y, columns) == pytest.approx(4 * np.log(y.var()) + np.log(4))
-
-
-def test_a_case_becomes_a_regression(small, tmp_path):
-    make.make_case(tmp_path, "case-001", Planned("effect", ("pressure",), "phantom"), [7, 5])
-    found = regression_of(read_case(tmp_path / "cases" / "case-001"))
-    assert found.nuisances.shape == (len(found.y), 8)
-    assert {name for name, _ in found.candidates} >= {"gravity", "pressure", "traction", "swelling", "contact"}
-    assert all(np.isfinite(columns).all() for _, columns in found.candidates)
-    # the highest level of fluid may leave no element of so coarse a mesh dry
-    assert {name for name, columns in found.candidates if columns.any()} == {name for name, _ in found.candidates}

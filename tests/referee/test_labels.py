@@ -4,8 +4,8 @@ import pytest
 from said import label, sealed_labels
 
 from concealed.sealing import read_sealed, write_sealed
-from referee.labels import open_labels
-from warpbrain.errors import InputError
+from referee.errors import InputError
+from referee.sealed import open_labels
 
 
 @pytest.fixture

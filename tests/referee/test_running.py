@@ -7,7 +7,7 @@ from said import label, sealed_labels
 
 from referee import __main__ as command
 from referee import run
-from warpbrain.errors import InputError
+from referee.errors import InputError
 
 
 @pytest.fixture

@@ -11,10 +11,10 @@ from scipy.stats import binom, binomtest
 from referee.__main__ import main
 from referee.analysed import Analysis, with_conditionals
 from referee.diagnoses import read_diagnosis
+from referee.errors import InputError
 from referee.intervals import Share
 from referee.outcomes import read_outcomes
 from referee.scores import amounts, calibration, confusion, shares
-from warpbrain.errors import InputError
 from warpbrain.physics.mechanisms import mechanisms
 
 

@@ -4,8 +4,9 @@ import json
 import numpy as np
 import pytest
 
-from referee.seen_by_tool import read_seen, stands_out, write_seen
-from warpbrain.errors import InputError
+from referee.errors import InputError
+from referee.runs import read_seen
+from referee.seen_by_tool import stands_out, write_seen
 
 #: Two points, a place on the wall and a force.
 LABEL = {
