@@ -11,23 +11,38 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="forks and kills")
 def killing(tmp_path_factory):
     from damage.killing import killers
 
-    return killers(tmp_path_factory.mktemp("killed"), ("run", "ensemble", "cases build"))
+    return killers(tmp_path_factory.mktemp("killed"), ("run", "ensemble"))
 
 
-@pytest.mark.parametrize(("name", "seeds"), [("run", (1, 4)), ("ensemble", (1, 5)), ("cases build", range(6))])
+@pytest.fixture(scope="module")
+def killing_builds(tmp_path_factory):
+    for package in ("mmgpy", "nilearn", "nibabel"):
+        pytest.importorskip(package)
+    from damage.killing import killers
+
+    return killers(tmp_path_factory.mktemp("killed"), ("cases build",))["cases build"]
+
+
+@pytest.mark.parametrize(("name", "seeds"), [("run", (1, 4)), ("ensemble", (1, 5))])
 def test_killed_and_repeated(killing, name, seeds):
     assert [killed for killed in map(killing[name], seeds) if killed.defect] == []
+
+
+def test_builds_killed_and_repeated(killing_builds):
+    assert [killed for killed in map(killing_builds, range(6)) if killed.defect] == []
 
 
 @pytest.mark.slow
 def test_all_commands(tmp_path):
     from damage.killing import killers
 
+    for package in ("mmgpy", "nilearn", "nibabel"):
+        pytest.importorskip(package)
     for kill in killers(tmp_path).values():
         assert [killed for killed in map(kill, range(100, 106)) if killed.defect] == []
 
 
-def test_a_defect_is_seen(killing, monkeypatch):
+def test_a_defect_is_seen(killing_builds, monkeypatch):
     """The tool itself: files that are written in place are found half-written."""
     from contextlib import contextmanager
 
@@ -39,6 +54,6 @@ def test_a_defect_is_seen(killing, monkeypatch):
 
     monkeypatch.setattr("warpbrain.cases.building.pipeline.whole_file", in_place)
     monkeypatch.setattr("warpbrain.mesh.files.whole_file", in_place)
-    found = [killing["cases build"](seed) for seed in range(12)]
+    found = [killing_builds(seed) for seed in range(12)]
     assert any("is neither old nor new" in killed.defect for killed in found)
     assert {killed.way for killed in found} == set(WAYS)
