@@ -69,3 +69,16 @@ def test_standardised_at_several_scales_is_as_at_each() -> None:
     rows, scales = rng.normal(size=(9, 4)), [0.5, 1.0, 3.0]
     for scale, found in zip(scales, model.standardised_at(scales, rows), strict=True):
         assert np.allclose(found, GaussianModel(factor, model.columns, scale).standardised(rows), rtol=0.0, atol=1e-12)
+
+
+def test_a_column_of_any_length_leaves_the_others_their_digits() -> None:
+    """Where it is much longer than the noise ten times the length is ten times less density, and nothing else."""
+    columns, rows = RANDOM.normal(size=(N, Q)), RANDOM.normal(size=N)
+    noise = model().noise_factor
+    long, longer = (GaussianModel(noise, columns * np.r_[length, np.ones(Q - 1)]) for length in (1e4, 1e11))
+    assert float(long.log_density(rows) - longer.log_density(rows)) == pytest.approx(np.log(1e7), abs=1e-6)
+    (mean, covariance), (same_mean, same_covariance) = long.coefficients(rows), longer.coefficients(rows)
+    np.testing.assert_allclose(same_mean[1:], mean[1:], atol=1e-6)
+    np.testing.assert_allclose(same_covariance[1:, 1:], covariance[1:, 1:], atol=1e-6)
+    blocks = np.arange(N - 2).reshape(-1, 3)
+    np.testing.assert_allclose(longer.precision_blocks(blocks), long.precision_blocks(blocks), atol=1e-6)

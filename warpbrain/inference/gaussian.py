@@ -17,6 +17,10 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 
 
+#: Rounding errors of eigenvalues of `W^T W`, in variances of the noise, with which singular values of `W` are computed.
+_ROUNDED = 1e-3
+
+
 class _Noise:
     """Covariance of the noise and its inverse: shared by models with the same noise, made when they are first used."""
 
@@ -44,6 +48,10 @@ class _Spectrum:
         self._factor = factor
         values, vectors = np.linalg.eigh(whitened_columns.T @ whitened_columns)
         self.values, self.directions = np.maximum(values, 0.0), whitened_columns @ vectors
+        if np.finfo(np.float64).eps * values.max(initial=0.0) > _ROUNDED:
+            # a column ten million times as long as the noise: its square has no digits left for the others
+            left, lengths, _ = np.linalg.svd(whitened_columns, full_matrices=False)
+            self.values, self.directions = lengths**2, left * lengths
 
     @cached_property
     def dual(self) -> Floats:

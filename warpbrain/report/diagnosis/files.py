@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import UNFINISHED, whole_file
 from warpbrain.cases.case import Case
 from warpbrain.cases.writing import write_case
 from warpbrain.diagnosis.result import Diagnosis
@@ -47,7 +47,7 @@ def write_map(path: Path, found: Diagnosis) -> None:
 
 def write_explained(folder: Path, case: Case) -> None:
     """Write the case with what was named; one that is there of an earlier diagnosis is replaced."""
-    beside = folder.with_name(f".{folder.name}-unfinished")
+    beside = folder.with_name(f"{UNFINISHED}{folder.name}")
     shutil.rmtree(beside, ignore_errors=True)
     write_case(beside, case)
     shutil.rmtree(folder, ignore_errors=True)
