@@ -16,7 +16,6 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 
-
 #: Rounding errors of eigenvalues of `W^T W`, in variances of the noise, with which singular values of `W` are computed.
 _ROUNDED = 1e-3
 
