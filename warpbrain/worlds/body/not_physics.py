@@ -10,7 +10,6 @@ from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.nuisances import Nuisances
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
-from warpbrain.worlds.body.stiffness_field import stiffness_modes
 
 #: What each means, in a sentence.
 SENTENCES = {
@@ -25,17 +24,13 @@ SENTENCES = {
 
 def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]:
     """Effects by name."""
-    sensors, mesh = at.sensors, at.system.model.mesh
+    sensors = at.sensors
     by_name = {family.name: family.columns for family in nuisances.families}
     columns_by_name = {
         "registration": sensors.rigid
         * np.repeat([belief("registration.wrong_shift"), belief("registration.wrong_turn")], 3),
         "stiffness": belief("tissue.larger")
-        * at.summed(
-            lambda one: one.answers_of_elements(
-                one.element_forces, stiffness_modes(mesh, int(belief("tissue.wrong_modes")))
-            )
-        ),
+        * by_name["stiffness field"],
         "loads": belief("tissue.larger") * by_name["known loads"],
     }
     if "mesh" in by_name:

@@ -17,14 +17,21 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.worlds.body.sensors import spread_points
 
+#: Most places at which modes are computed.
+_SITES = 400
 
-def stiffness_modes(mesh: TetMesh, count: int | None = None) -> Floats:
-    """Modes (m, count) of `ln mu` of each element, each times its standard deviation."""
-    count = int(belief("tissue.field_modes")) if count is None else count
-    sites = mesh.centres[spread_points(mesh.centres, 0.5 * belief("tissue.field_reach"), 400)]
+
+def stiffness_modes(mesh: TetMesh) -> Floats:
+    """Modes (m, k) of `ln mu` of each element, each times its standard deviation.
+
+    As few as hold all of its variance but `tissue.field_cut`: what fewer modes leave out is largest at the surfaces,
+    and a cause that is soft or stiff would do its work.
+    """
+    sites = mesh.centres[spread_points(mesh.centres, 0.5 * belief("tissue.field_reach"), _SITES)]
     values, vectors = np.linalg.eigh(_covariance(sites, sites))
-    largest = np.argsort(values)[::-1][:count]
-    return np.asarray(_covariance(mesh.centres, sites) @ vectors[:, largest] / np.sqrt(values[largest]))
+    values, vectors = values[::-1], vectors[:, ::-1]
+    count = 1 + int(np.searchsorted(np.cumsum(values), (1.0 - belief("tissue.field_cut")) * values.sum()))
+    return np.asarray(_covariance(mesh.centres, sites) @ vectors[:, :count] / np.sqrt(values[:count]))
 
 
 def _covariance(a: Floats, b: Floats) -> Floats:
