@@ -84,7 +84,7 @@ def test_what_is_imported_is_declared():
     project = (Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8")
     extras = tomllib.loads(project)["project"]["optional-dependencies"]
     # imported where a user asks for what they do
-    for module, extra in (("distributed", "dask"), ("pyarrow", "parquet")):
+    for module, extra in (("distributed", "dask"), ("pyarrow", "parquet"), ("argcomplete", "completion")):
         assert [_plain(re.split(r"[^\w.-]", line)[0]) for line in extras[extra]] == [module]
         imported.remove(module)
     for cuda in ("12", "13"):

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 
 from metamorphic.changes import CHANGES
-from metamorphic.tries import BOUNDS, Difference, one_try
+from metamorphic.tries import BOUNDS, TOLERANCE, Difference, one_try
 from warpbrain.terminal.quiet import start_warp_quietly
 
 
@@ -20,11 +20,12 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the first try; each has the next")
     parser.add_argument("--kind", choices=list(BOUNDS), default="run")
     parser.add_argument("--change", choices=list(CHANGES), help="default: drawn, too")
+    parser.add_argument("--tolerance", type=float, default=TOLERANCE, help="of a run")
     options = parser.parse_args()
     start_warp_quietly()
     found: dict[str, list[Difference]] = collections.defaultdict(list)
     for seed in range(options.seed, options.seed + options.tries):
-        difference = one_try(seed, options.kind, options.change)
+        difference = one_try(seed, options.kind, options.change, options.tolerance)
         found[difference.change].append(difference)
         if difference.wrong:
             print(difference, flush=True)

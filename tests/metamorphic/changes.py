@@ -122,6 +122,17 @@ def split(case: Case, rng: np.random.Generator) -> Changed:
     return Changed(replace(case, recordings=tuple(parts)))
 
 
+def doubled(case: Case, rng: np.random.Generator) -> Changed:
+    """Each row twice, with half its weight."""
+
+    def twice(one: PointsRecording) -> PointsRecording:
+        order = rng.permutation(np.tile(np.arange(len(one.points)), 2))
+        weights = np.full(len(order), 0.5)
+        return replace(one, points=one.points[order], displacement=one.displacement[order], weights=weights)
+
+    return Changed(replace(case, recordings=tuple(map(twice, _points(case)))))
+
+
 def _written(unit: str, axes: str) -> Callable[[Case, np.random.Generator], Changed]:
     def change(case: Case, _rng: np.random.Generator) -> Changed:
         with tempfile.TemporaryDirectory() as place:
@@ -143,6 +154,7 @@ CHANGES: dict[str, Callable[[Case, np.random.Generator], Changed]] = {
     "renumbered": renumbered,
     "points in another order": points_in_another_order,
     "split over files": split,
+    "doubled at half weight": doubled,
     "written in mm and RAS": _written("mm", "RAS"),
     "written in m and LPS": _written("m", "LPS"),
 }

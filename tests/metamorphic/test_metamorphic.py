@@ -26,7 +26,7 @@ def test_an_estimate_is_the_same(change, verify):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("change", ["rotated", "split over files", "written in m and LPS"])
+@pytest.mark.parametrize("change", ["rotated", "split over files", "doubled at half weight", "written in m and LPS"])
 def test_a_diagnosis_is_the_same(change):
     assert not one_try(3, "diagnose", change).wrong
 

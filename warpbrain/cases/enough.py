@@ -6,7 +6,8 @@ import math
 
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
-from warpbrain.recordings.recording import ForceRecording, Recording
+from warpbrain.recordings.copies import distinct_rows
+from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording
 from warpbrain.recordings.times import compared_rows, components_of
 
 #: Noise can be estimated from no fewer numbers than this.
@@ -16,13 +17,16 @@ _TO_DIAGNOSE = 15
 
 
 def numbers_in(case: Case, recording: Recording) -> int:
-    """Numbers of a recording that tell of a body: every component of every row, at all times.
+    """Numbers of a recording that tell of a body: every component of every row, at all times; copies tell no more.
 
     The resultant of a boundary whose force the case gives tells nothing.
     """
     if isinstance(recording, ForceRecording) and isinstance(case.boundary(recording.boundary), Forced):
         return 0
-    return components_of(recording) * len(compared_rows(recording))
+    rows = compared_rows(recording)
+    if isinstance(recording, PointsRecording):
+        rows, _ = distinct_rows(recording, rows)
+    return components_of(recording) * len(rows)
 
 
 def numbers_to_fit(case: Case) -> int:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import difflib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from warpbrain.cases.case import Case
-from warpbrain.cases.reading import read_case
 from warpbrain.errors import InputError
 
+if TYPE_CHECKING:
+    from warpbrain.cases.case import Case
+
 _DATA = Path(__file__).parent / "data"
+
+#: Grey and white matter apart, or one tissue.
+TISSUES = ("multi", "single")
 
 #: Stand-ins for the paper's clinical cases.
 STAND_INS = ("0529", "0614", "0660", "0685", "0535", "0555", "0603", "0684")
@@ -65,6 +70,11 @@ def find_case(name: str, tissue: str = "multi") -> Case:
     InputError
         If there is no such case, or it is wrong.
     """
+    # names are asked for more often than cases, and a case needs Warp
+    from warpbrain.cases.reading import read_case
+
+    if tissue not in TISSUES:
+        raise InputError(f"tissue {tissue!r}: expected 'multi' or 'single'")
     name = ALIASES.get(name, name)
     if name in SHIPPED:
         return read_case(_DATA / SHIPPED[name][tissue])

@@ -22,7 +22,7 @@ from warpbrain.frame import Frame
 from warpbrain.mesh import write_mesh
 from warpbrain.mesh.vtu import write_vtu
 from warpbrain.physics.closed_surface import ClosedSurface
-from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanism import Facts, Mechanism, Removing
 from warpbrain.recordings.recording import (
     ForceRecording,
     PointsRecording,
@@ -75,7 +75,9 @@ def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
     if case.boundaries:
         tables["boundary"] = [_boundary(folder, boundary, frame) for boundary in case.boundaries]
     if case.mechanisms:
-        tables["mechanism"] = [_mechanism(folder, mechanism, frame) for mechanism in case.mechanisms]
+        removing = tuple(mechanism for mechanism in case.mechanisms if isinstance(mechanism, Removing))
+        facts = Facts(case.mesh, case.gravity_axis, case.density, removing)
+        tables["mechanism"] = [_mechanism(folder, mechanism, facts, frame) for mechanism in case.mechanisms]
     if case.recordings:
         tables["recording"] = [_recording(folder, recording, frame) for recording in case.recordings]
     import tomli_w
@@ -156,14 +158,13 @@ def _surface(folder: Path, surface: ClosedSurface, name: str, frame: Frame) -> s
     return file
 
 
-def _mechanism(folder: Path, mechanism: Mechanism, frame: Frame) -> dict[str, Any]:
+def _mechanism(folder: Path, mechanism: Mechanism, facts: Facts, frame: Frame) -> dict[str, Any]:
     values: dict[str, Any] = {}
-    for name, says in mechanism.parameters().items():
-        value = getattr(mechanism, name)
+    for name, value in mechanism.in_case(facts).items():
         if isinstance(value, ClosedSurface):
             values[name] = _surface(folder, value, Path(value.file).stem, frame)
-        elif value is not None:
-            values[name] = in_file(says, value, frame)
+        else:
+            values[name] = in_file(mechanism.parameters()[name], value, frame)
     return {"kind": mechanism.kind, **values, **_ramp(mechanism.ramp)}
 
 

@@ -7,28 +7,26 @@ import sys
 from collections.abc import Sequence
 
 from warpbrain import __version__
-from warpbrain.cli import cases, compare, diagnose, ensemble, estimate, gp, run, view, warp
+from warpbrain.cli import cases, compare, completion, diagnose, doctor, ensemble, estimate, gp, run, view, warp
+from warpbrain.cli.grouped import GroupedParser
 from warpbrain.terminal.command import OneLineParser, exit_status
+from warpbrain.terminal.completing import complete
 from warpbrain.terminal.record import Record
+
+#: Commands by what a user wants.
+_GROUPS = {
+    "simulate": {"run": run, "ensemble": ensemble},
+    "learn from recordings": {"estimate": estimate, "diagnose": diagnose},
+    "look at results, carry them over to images": {"view": view, "compare": compare, "warp": warp},
+    "what goes in": {"cases": cases, "gp": gp},
+    "this machine": {"doctor": doctor, "completion": completion},
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status, see `exit_status`."""
-    parser = OneLineParser(
-        prog="warpbrain", description="Simulates the deformation of the brain, and says what it left out."
-    )
-    parser.add_argument("--version", action="version", version=f"warpbrain {__version__}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    run.add_parser(commands)
-    estimate.add_parser(commands)
-    diagnose.add_parser(commands)
-    ensemble.add_parser(commands)
-    view.add_parser(commands)
-    warp.add_parser(commands)
-    compare.add_parser(commands)
-    cases.add_parser(commands)
-    gp.add_parser(commands)
-    parser.add_argument("--debug", action="store_true", help="show the traceback of an error, with any command")
+    parser = _parser()
+    complete(parser)
     given = sys.argv[1:] if arguments is None else list(arguments)
     # after the command, too, where people write it
     debug = "--debug" in given
@@ -36,6 +34,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(given)
     options.record = Record(given, getattr(options, "quiet", False))
     return exit_status(parser.prog, lambda: _call(options), options.record, debug)
+
+
+def _parser() -> GroupedParser:
+    parser = GroupedParser(
+        prog="warpbrain",
+        description="Simulates the deformation of the brain, and says what it left out.",
+        epilog="Begin with: warpbrain run --case 0529. More of a command: warpbrain COMMAND --help.",
+    )
+    parser.add_argument("--version", action="version", version=f"warpbrain {__version__}")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error, with any command")
+    parser.commands = parser.add_subparsers(
+        dest="command", required=True, metavar="COMMAND", parser_class=OneLineParser
+    )
+    parser.groups = {title: list(commands) for title, commands in _GROUPS.items()}
+    for commands in _GROUPS.values():
+        for command in commands.values():
+            command.add_parser(parser.commands)
+    return parser
 
 
 def _call(options: argparse.Namespace) -> None:

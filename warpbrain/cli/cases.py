@@ -52,13 +52,10 @@ def _add_check(actions: argparse._SubParsersAction[Any]) -> None:
 
 
 def _list(options: argparse.Namespace) -> None:
-    from warpbrain.cases.shipped import SHIPPED, find_case
-    from warpbrain.report.case_text import list_header, list_line
+    from warpbrain.cases.catalogue import catalogue
+    from warpbrain.report.case_list import list_lines
 
-    print(list_header())
-    for name, variants in SHIPPED.items():
-        for tissue in variants:
-            print(list_line(name, tissue, find_case(name, tissue)), flush=True)
+    print(*list_lines(catalogue()), sep="\n")
     print(
         "\nA stand-in is the MNI anatomy, deformed and scaled to a patient's published figures: not the "
         "patient's images.\nOf resect-01 to resect-15 the landmarks are patients', measured; the mesh is the template, "

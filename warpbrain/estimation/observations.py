@@ -27,6 +27,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.mesh.feature_normals import feature_normals
 from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.comparison import faces_of_set
+from warpbrain.recordings.copies import distinct_rows
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
 from warpbrain.recordings.times import compared_rows, rows_at, times_of
@@ -83,7 +84,7 @@ class Observation:
     ----------
     name, kind, unit : str
     rows : (n,) int array
-        Rows of the recording that count.
+        Rows of the recording that count; the first of those that are copies of each other.
     sigma : (n,) array or None
         Standard deviation of one component of each row; None: to be estimated.
     weights : (n,) array
@@ -287,7 +288,7 @@ def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Part:
     from scipy.sparse import csr_matrix
 
     mesh = case.remaining[0]
-    weights = np.ones(len(rows)) if recording.weights is None else recording.weights[rows]
+    rows, weights = distinct_rows(recording, rows)
     if not (np.isfinite(weights) & (weights >= 0.0)).all():
         raise InputError(f"recording '{recording.name}': a weight is negative or no number")
     rows, weights = rows[weights > 0.0], weights[weights > 0.0]

@@ -96,7 +96,7 @@ class Says:
     size : float
         By how much it must change to change much where it is zero and nothing is expected of it, in the user's unit.
     method : bool
-        It is a setting of the method, no property of a body: never differentiated or estimated.
+        It is a setting of the method, or weighed and known: never differentiated or estimated.
     adds_up : bool
         Of several numbers, whether their sum is a number of its own.
     """
@@ -277,6 +277,17 @@ class Mechanism(Ramped, abc.ABC):
         made = cls(**values)
         made.check_in(facts)
         return made
+
+    def in_case(self, facts: Facts) -> dict[str, Any]:
+        """Parameters by name, in SI units and RAS axes, of which `of_case` makes what does the same.
+
+        Parameters
+        ----------
+        facts : Facts
+            Of the case that is to say them.
+        """
+        values = {name: getattr(self, name) for name in self.parameters()}
+        return {name: value for name, value in values.items() if value is not None}
 
     def check_in(self, facts: Facts) -> None:
         """Raise `ParameterError` if a parameter makes no sense in what is left of the anatomy of a case."""

@@ -178,6 +178,14 @@ class TestRecording(Recording):
         return turn_of(self.axis, self.sheared)
 
 
+def count_of(recording: Recording) -> int:
+    """How many rows, points or instants a recording has."""
+    if isinstance(recording, PointsRecording | SurfaceRecording):
+        return len(recording.points)
+    assert isinstance(recording, ForceRecording | TestRecording)
+    return len(recording.response) if isinstance(recording, TestRecording) else len(recording.time)
+
+
 def turn_of(axis: tuple[float, float, float], sheared: tuple[float, float, float] | None) -> Floats:
     """Rotation `R` (3, 3) of a tissue in a machine: `R axis` is along z, and `R sheared` between x and z.
 

@@ -20,9 +20,8 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.mesh import TetMesh, boundary_faces, face_vectors
 from warpbrain.mesh.surface import paired_faces
-from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
+from warpbrain.recordings.recording import PointsRecording, SurfaceRecording, count_of
 from warpbrain.report import views
-from warpbrain.report.case_text import count_of
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.slices import Cut, cut, outline
 from warpbrain.report.summary import SET_TITLES

@@ -1,4 +1,4 @@
-"""A case in words: the list of cases, one case, and what checking it found."""
+"""A case in words: all that it says, and what checking it found."""
 
 from __future__ import annotations
 
@@ -8,35 +8,18 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.checking import Checked
 from warpbrain.mesh import Quality, measure
 from warpbrain.physics.words import length
-from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording, TestRecording
+from warpbrain.recordings.recording import (
+    ForceRecording,
+    PointsRecording,
+    Recording,
+    SurfaceRecording,
+    TestRecording,
+    count_of,
+)
 from warpbrain.report.summary import SET_TITLES
 
 #: Said wherever a stand-in is met.
 STAND_IN = "a stand-in: the MNI anatomy deformed and scaled to the paper's volume, not the patient's images"
-
-_LIST = "{:<14} {:<7} {:<10} {:>7} {:>9} {:>9}   {}"
-
-
-def list_header() -> str:
-    """Names of the columns of `list_line`."""
-    return _LIST.format("case", "tissue", "origin", "nodes", "elements", "cm3", "recordings")
-
-
-def list_line(name: str, tissue: str, case: Case) -> str:
-    """One line about a case."""
-    recordings = ", ".join(f"{r.name} ({count_of(r)})" for r in case.recordings) or "none"
-    mesh = case.mesh
-    return _LIST.format(
-        name, tissue, case.origin, len(mesh.points), len(mesh.tetrahedra), f"{1e6 * mesh.volume:.1f}", recordings
-    )
-
-
-def count_of(recording: Recording) -> int:
-    """How many rows, points or instants a recording has."""
-    if isinstance(recording, PointsRecording | SurfaceRecording):
-        return len(recording.points)
-    assert isinstance(recording, ForceRecording | TestRecording)
-    return len(recording.response) if isinstance(recording, TestRecording) else len(recording.time)
 
 
 def show_lines(case: Case) -> list[str]:

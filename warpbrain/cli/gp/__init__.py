@@ -12,7 +12,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     """Add the command to the parser."""
     gp = commands.add_parser(
         "gp",
-        help="the generative model: what 73 published strain energies make likely of tissue",
+        help="what 73 published strain energies make likely of tissue",
         description="The generative model of tissue, learnt from 73 published strain energies.",
     )
     actions = gp.add_subparsers(dest="action", required=True, metavar="ACTION")

@@ -89,7 +89,13 @@ class Gravity(BodyForce, Mechanism):
     imaged_direction: tuple[float, float, float] | None = parameter(
         "Where 'down' was while the anatomy was imaged.", kind="vector", default=None, absent="[case] gravity_axis"
     )
-    density: float
+    density: float = parameter(
+        "Density of what has its full weight, in air.",
+        unit="kg/m3",
+        above=0.0,
+        absent="[body] density",
+        method=True,
+    )
     tissue_density: float = parameter(
         "Density of the tissue that the fluid carries, for the load of a turned head.",
         default=BRAIN_DENSITY,
@@ -148,7 +154,19 @@ class Gravity(BodyForce, Mechanism):
         known: dict[str, Any] = {"direction": axis, "imaged_direction": axis, **values}
         # counted from the whole anatomy: a resection must not move the datum
         lowest = float((-facts.mesh.points @ unit_vector("direction", known["direction"])).min())
-        return cls(density=facts.density, lowest=lowest, **known)
+        return cls(**{"density": facts.density, "lowest": lowest, **known})
+
+    def in_case(self, facts: Facts) -> dict[str, Any]:
+        """See `warpbrain.physics.mechanism.Mechanism`; a file counts levels from the whole anatomy's lowest point."""
+        values = super().in_case(facts)
+        if self.imaged_direction is None:
+            values["imaged_direction"] = self.direction
+        if self.density == facts.density:
+            del values["density"]
+        if self.csf_level is not None:
+            lowest = self.datum(facts.left)
+            values["csf_level"] = self.csf_level + (lowest - float((facts.mesh.points @ self._up).min()))
+        return values
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:

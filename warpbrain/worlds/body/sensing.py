@@ -31,7 +31,7 @@ def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Float
     rows = Rows(
         sensors.positions,
         sensors.directions,
-        np.where(undeclared, 1.0, sensors.sigma),
+        np.where(undeclared, 1.0 / np.sqrt(sensors.weights), sensors.sigma),
         np.searchsorted(recordings, sensors.recordings),
         np.array([not undeclared[sensors.recordings == number].any() for number in recordings.tolist()]),
         tuple(rows for group in rows_of_points(sensors) for rows in group),

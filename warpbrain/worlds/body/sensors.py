@@ -53,6 +53,8 @@ class Sensors:
     share : (n,) array or float
         How many times what changes the last state alike at all times changes a row: 1, and less where a state is
         smaller.
+    weights : (n,) array or float
+        Of rows whose noise is to be estimated: its variance is the recording's over this.
     """
 
     residual: Floats
@@ -72,6 +74,7 @@ class Sensors:
     before: Ints
     references: Floats
     share: Floats | float = 1.0
+    weights: Floats | float = 1.0
 
     def __len__(self) -> int:
         return len(self.residual)
@@ -102,6 +105,7 @@ class Sensors:
             after=np.zeros(count, dtype=np.int64),
             before=np.full(count, -1),
             references=np.zeros(count),
+            weights=np.broadcast_to(self.weights, len(self))[rows],
         )
 
     @property
@@ -171,6 +175,7 @@ def sensors_at(observations: Observations, u: Floats, reactions: Floats, centre:
         each([part.after for part in parts]),
         each([part.before for part in parts]),
         each([o.references for o in recordings]),
+        weights=each([o.weights for o in recordings]),
     )
 
 

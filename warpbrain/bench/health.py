@@ -1,0 +1,115 @@
+"""What a report of a defect needs: versions, devices, memory, the folder of kernels, and whether devices are right."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import re
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+from typing import Any
+
+from warpbrain import __version__
+from warpbrain.bench.host import processor
+from warpbrain.bench.self_test import SelfTest, self_test
+from warpbrain.threads import processors, thread_count
+
+_GIB = 2.0**30
+
+
+def health(on_test: Callable[[str], None] = lambda device: None) -> dict[str, Any]:
+    """Look at the machine and run the self-test on each of its devices; Warp must have been started.
+
+    Parameters
+    ----------
+    on_test : callable
+        Called with the alias of each device before its test.
+
+    Returns
+    -------
+    dict
+        For JSON. Memory is in GiB, and None where the system does not tell.
+    """
+    import warp as wp
+
+    devices = [_device(device) for device in wp.get_devices()]
+    tests: list[SelfTest] = []
+    for device in devices:
+        on_test(device["alias"])
+        tests.append(self_test(device["alias"]))
+    return {
+        "warpbrain": {"version": __version__, "folder": str(Path(__file__).parents[1])},
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "processor": {"name": processor(), "usable": processors(), "threads": thread_count()},
+        "memory_GiB": _memory(),
+        "packages": _packages(),
+        "devices": devices,
+        "cuda": {"driver": _joined(wp.get_cuda_driver_version), "toolkit": _joined(wp.get_cuda_toolkit_version)},
+        "kernels": _kernels(Path(wp.config.kernel_cache_dir)),
+        "pictures": _pictures(),
+        "self_test": [asdict(test) for test in tests],
+    }
+
+
+def _device(device: Any) -> dict[str, Any]:
+    memory = {"total": device.total_memory / _GIB, "free": device.free_memory / _GIB} if device.is_cuda else {}
+    return {"alias": device.alias, "name": device.name, "arch": device.arch, "memory_GiB": memory}
+
+
+def _joined(ask: Callable[[], Any]) -> str | None:
+    """A version of CUDA as text; None where there is no driver."""
+    try:
+        found = ask()
+    except RuntimeError:
+        return None
+    return ".".join(map(str, found)) if found and any(found) else None
+
+
+def _memory() -> dict[str, float | None]:
+    names = os.sysconf_names if hasattr(os, "sysconf_names") else {}
+
+    def gib(name: str) -> float | None:
+        return os.sysconf(name) * os.sysconf("SC_PAGE_SIZE") / _GIB if name in names else None
+
+    return {"total": gib("SC_PHYS_PAGES"), "free": gib("SC_AVPHYS_PAGES")}
+
+
+def _packages() -> dict[str, str | None]:
+    """Versions of all that the package's own record requires, extras too; None of what is not installed."""
+    try:
+        declared = requires("warpbrain") or []
+    except PackageNotFoundError:  # run from its sources
+        declared = ["warp-lang", "numpy", "scipy", "meshio", "h5py", "matplotlib", "pyvista"]
+    found: dict[str, str | None] = {}
+    for line in declared:
+        if re.search(r"extra == .(test|docs).", line):
+            continue
+        match = re.match(r"[\w.-]+", line)
+        assert match is not None
+        try:
+            found[match[0]] = version(match[0])
+        except PackageNotFoundError:
+            found[match[0]] = None
+    return found
+
+
+def _kernels(folder: Path) -> dict[str, Any]:
+    size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file()) if folder.is_dir() else 0
+    return {"folder": str(folder), "size_GiB": size / _GIB, "writable": os.access(folder, os.W_OK)}
+
+
+def _pictures() -> str | None:
+    """Why bodies cannot be drawn; None if nothing is known to be in the way."""
+    if platform.system() != "Linux":
+        return None
+    for library in ("libEGL.so.1", "libOSMesa.so.8"):
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            continue
+        return None
+    return "there is no OpenGL library: on Debian and Ubuntu, apt-get install libegl1"

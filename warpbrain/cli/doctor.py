@@ -1,0 +1,42 @@
+"""`warpbrain doctor`: what a report of a defect needs, and whether this machine computes what it should."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import TYPE_CHECKING, Any
+
+from warpbrain.errors import SolveError
+from warpbrain.terminal.progress import Progress
+
+if TYPE_CHECKING:
+    from warpbrain.terminal.record import Record
+
+
+def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "doctor",
+        help="devices, versions, memory, and a self-test of a few seconds: for a report of a defect",
+        description="Prints versions, devices, driver, memory and the folder of compiled kernels, and lets each device "
+        "find a state that is known exactly. The first time kernels are compiled, which takes longer. Exit status 1 "
+        "if a device is wrong.",
+    )
+    parser.add_argument("--json", action="store_true", help="print it as JSON")
+    parser.set_defaults(call=_doctor)
+
+
+def _doctor(options: argparse.Namespace) -> None:
+    from warpbrain.bench.health import health
+    from warpbrain.report.health_text import health_lines
+    from warpbrain.terminal.quiet import start_warp_quietly
+
+    record: Record = options.record
+    start_warp_quietly()
+    progress = Progress("self-test", options.json)
+    found = health(lambda device: progress.show(0.0, device))
+    progress.clear()
+    record.say(*([json.dumps(found, indent=1)] if options.json else health_lines(found)), sep="\n")
+    failed = [test["device"] for test in found["self_test"] if test["problem"]]
+    if failed:
+        raise SolveError(f"doctor: the self-test failed on {', '.join(failed)}")
