@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -11,9 +13,16 @@ from slow_block import CAUSES, write_slow
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.reading import read_case
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.mechanisms.fibres import Fibres
 from warpbrain.physics.mechanisms.resection import Resection
-from warpbrain.worlds.body.dictionary import dictionary_of
+from warpbrain.physics.mechanisms.swelling import Swelling
+from warpbrain.physics.mechanisms.traction import Traction
+from warpbrain.physics.proposal import Follows, Proposal
+from warpbrain.worlds.body.dictionary import dictionary_of, is_linear
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.states import States
 
 
@@ -92,3 +101,18 @@ def test_states_have_a_set_for_every_place(block: Case) -> None:
     free = dictionary_of(block, ["pressure"]).situation.free
     assert {surface.name for surface in free} - block.mesh.node_sets.keys()
     assert {surface.name for surface in free} <= states.case.mesh.node_sets.keys()
+
+
+@pytest.mark.parametrize("mechanism", [Fibres(stiffness=1.0, direction=(1.0, 0.0, 0.0)), Swelling(amount=0.1)])
+@pytest.mark.parametrize("follows", ["proportional", "smooth"])
+def test_only_loads_may_move_a_body_by_more_than_its_size(follows: Follows, mechanism: Mechanism) -> None:
+    mesh = SimpleNamespace(points=np.eye(3))
+    sensors = SimpleNamespace(is_displacement=np.ones(3, dtype=bool))
+    at = cast(Linearisation, SimpleNamespace(system=SimpleNamespace(model=SimpleNamespace(mesh=mesh)), sensors=sensors))
+
+    def of(made: Mechanism, response: float) -> Effect:
+        return Effect(Proposal.of_one(lambda _: made, 0.0, 1.0, follows), np.zeros(3), np.full((3, 1), response))
+
+    assert is_linear(of(mechanism, 0.1), at)
+    assert not is_linear(of(mechanism, 1e200), at)
+    assert is_linear(of(Traction(centre=(0.0, 0.0, 0.0), value=(0.0, 0.0, 1.0), radius=0.1), 1e3), at)

@@ -13,6 +13,7 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh, face_vectors, nodes_of
 from warpbrain.physics.composition import CompositionError, require_composable
+from warpbrain.physics.load import Load
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.threads import in_threads
@@ -214,10 +215,10 @@ def candidates_at(
 def is_linear(effect: Effect, at: Linearisation) -> bool:
     """Whether an effect is finite and, if it is of no load, a standard deviation moves the body by less than its size.
 
-    A larger response is not linear: that of fibres that stiffen exponentially, in a strained state. Of a load, which is
-    in proportion, a small part may act.
+    A larger response is not linear: that of fibres that stiffen exponentially, in a strained state, is in proportion to
+    their stiffness and may still be 1e200 m. Of a load a small part may act.
     """
-    if effect.proposal is None or effect.proposal.follows == "proportional":
+    if effect.proposal is None or isinstance(effect.proposed.make(effect.proposed.mean), Load):
         return bool(np.isfinite(effect.columns).all())
     largest = float(np.linalg.norm(np.ptp(at.system.model.mesh.points, axis=0)))
     moved = effect.columns[at.sensors.is_displacement]

@@ -29,8 +29,7 @@ def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]
     columns_by_name = {
         "registration": sensors.rigid
         * np.repeat([belief("registration.wrong_shift"), belief("registration.wrong_turn")], 3),
-        "stiffness": belief("tissue.larger")
-        * by_name["stiffness field"],
+        "stiffness": belief("tissue.larger") * by_name["stiffness field"],
         "loads": belief("tissue.larger") * by_name["known loads"],
     }
     if "mesh" in by_name:
