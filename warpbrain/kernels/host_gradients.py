@@ -13,6 +13,7 @@ from warpbrain.kernels.linear import LinearResult
 Floats = NDArray[np.float64]
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def host_gradients(
     multiply: Callable[[Floats], Floats],
     precondition: Callable[[Floats], Floats],
@@ -23,7 +24,8 @@ def host_gradients(
 ) -> LinearResult:
     """Preconditioned conjugate gradients (Hestenes and Stiefel 1952) that watch the curvature.
 
-    They also end where the matrix or the preconditioner is not positive definite.
+    They also end where the matrix or the preconditioner is not positive definite, or what they make is not finite: so
+    does a search that went too far.
 
     Parameters
     ----------

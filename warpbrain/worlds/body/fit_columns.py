@@ -16,7 +16,7 @@ from warpbrain.worlds.body.effects import Effect, Effects, column_slices, column
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.mesh_share import MeshShare
-from warpbrain.worlds.body.nuisances import Nuisances, field_columns, mesh_by_tissue, tissue_columns
+from warpbrain.worlds.body.nuisances import LAW, Nuisances, field_columns, law_columns, mesh_by_tissue, tissue_columns
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState
 
@@ -27,8 +27,8 @@ class Layout:
 
     Attributes
     ----------
-    tissue, field, coefficients : slice
-        Tissue, stiffness field, and the coefficients of all effects.
+    tissue, field, law, coefficients : slice
+        Tissue, stiffness field, shape of its law, and the coefficients of all effects.
     effects : tuple of slice
         Coefficients of each effect.
     linear : (q + e,) bool array
@@ -39,6 +39,7 @@ class Layout:
 
     tissue: slice
     field: slice
+    law: slice
     coefficients: slice
     effects: tuple[slice, ...]
     linear: Bools
@@ -51,7 +52,8 @@ class Layout:
         linear = np.ones(count, dtype=bool)
         linear[tissue] = linear[field] = False
         nonlinear = np.concatenate([~linear, np.ones(width_of(effects), dtype=bool)])
-        return cls(tissue, field, slice(count, None), column_slices(effects, count), linear, nonlinear)
+        law = nuisances.part(LAW)
+        return cls(tissue, field, law, slice(count, None), column_slices(effects, count), linear, nonlinear)
 
 
 def columns_about(
@@ -64,7 +66,10 @@ def columns_about(
     mesh_errors: MeshErrors | None,
     mesh_share: MeshShare | None,
 ) -> tuple[Floats, Linearisation | None]:
-    """Columns of tissue, field and mechanisms about a state; the others as they are.
+    """Columns of tissue, field, law and mechanisms about a state; the others as they are.
+
+    What the shape of a law does is next to nothing where strains are small: about the base, which nothing but declared
+    loads deforms. It is not where a mechanism strains tissue by half, and would be taken for a cause.
 
     Parameters
     ----------
@@ -101,6 +106,8 @@ def columns_about(
     tissue = relaxed * tissue_columns(at, base.states, state.hypothesis.theta, base.prior)
     columns[:, layout.tissue] = tissue + mesh_by_tissue(state.sensors, mesh_errors)
     columns[:, layout.field] = relaxed * field_columns(at, base.states)
+    made = Effects(at, mesh_errors=mesh_errors)
+    columns[:, layout.law] = relaxed * law_columns(made, base.states)
     first = layout.coefficients.start
     for effect, part in zip(effects, layout.effects, strict=True):
         c = effect.coefficients(z[part])
@@ -109,7 +116,6 @@ def columns_about(
         elif effect.proposed.over_time is not None:
             columns[:, part] = columns_over_time(at, effect.proposed, c, mesh_errors)
         elif not effect.proposed.is_there_or_not:
-            made = Effects(at, mesh_errors=mesh_errors)
             about = made.of([_proposal_about(effect.proposed, c)], effect.proposed.make(c))[0]
             if not is_linear(about, at):
                 raise SolveError(f"{effect.proposed.region or 'it'}: its effect is not linear here")

@@ -332,7 +332,7 @@ class FitSearch:
         return state
 
     def _relinearise(self) -> None:
-        """Make the columns of tissue, field and mechanisms anew at the best point."""
+        """Make the columns of tissue, field, law and mechanisms anew at the best point."""
         self.columns, at = columns_about(
             self.state,
             self.z,
@@ -345,6 +345,12 @@ class FitSearch:
         )
         self._nearby = self._nearby if at is None else at
         self._linearised_at = self.z
+        # laws act linearly: of what they do, that about the new state
+        law = self._layout.law
+        before, self._U = self._U, self._U.copy()
+        self._U[:, law] = self.columns[:, law]
+        self._best = np.inf
+        self._accept_if_better(self.z, self.state, self.residual + (before - self._U)[:, law] @ self.z[law])
 
     def _difference_columns(self) -> Floats:
         """Columns with those of tissue and mechanisms as differences between states."""

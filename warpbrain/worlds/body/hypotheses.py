@@ -27,6 +27,7 @@ from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.fitting import Fitter
+from warpbrain.worlds.body.moving import moved_about_fit
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
@@ -206,7 +207,7 @@ class HypothesisSearch:
         inherited = candidate.inherited_gain or 0.0
         gain = inherited + _of_all_places(gain - inherited, candidate.log_share)
         log_evidence = candidate.hypothesis.log_evidence - inherited + gain
-        self._sets[names] = fitted.with_evidence(log_evidence)
+        self._sets[names] = moved_about_fit(self.base, self._fitter, fitted.with_evidence(log_evidence), self.spacing)
         self._pass_on(gain, names)
         self._refit_subsets(names)
 

@@ -31,6 +31,8 @@ from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
 from warpbrain.worlds.body.states import Hypothesis, States
 
+#: The family of what is not known of the shape of tissues' laws.
+LAW = "shape of the law"
 #: The family of what is not known of the mesh's error.
 UNKNOWN_MESH = "mesh, unknown"
 #: Step of a difference in `theta`.
@@ -154,8 +156,7 @@ def nuisances_at(
     families = [
         Family("tissue", tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors)),
         Family("stiffness field", field_columns(at, states)),
-        Family("Poisson ratio", _law_columns(effects, [other_volume(states)])),
-        Family("shape of the law", _law_columns(effects, _other_shape(states))),
+        Family(LAW, law_columns(effects, states)),
         Family("known loads", _known_loads(at)),
         Family("registration", sensors.rigid * registration_of(states.case).deviations),
     ]
@@ -197,7 +198,9 @@ def field_columns(at: Linearisation, states: States) -> Floats:
     return at.summed(lambda one: one.answers_of_elements(one.element_forces, states.modes))
 
 
-def _law_columns(effects: Effects, proposals: list[Proposal]) -> Floats:
+def law_columns(effects: Effects, states: States) -> Floats:
+    """What another Poisson ratio, exponent and share of the second invariant change of what is recorded: (n, 3)."""
+    proposals = [other_volume(states), *_other_shape(states)]
     return np.concatenate([effect.columns for effect in effects.of(proposals)], axis=1)
 
 

@@ -1,0 +1,92 @@
+"""A traction that moves a block's face by a third of its own radius: where it is, its fit tells, not the linear model."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shapes import box
+
+from warpbrain.cases.boundary import Fixed
+from warpbrain.cases.case import Case, Tissue
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.mechanisms.traction import Traction
+from warpbrain.recordings.location import locate
+from warpbrain.recordings.recording import PointsRecording
+from warpbrain.simulation.equilibrium import EquilibriumSolver
+from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.system import System
+from warpbrain.worlds.body.fitting import Fitter
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
+from warpbrain.worlds.body.moving import moved_about_fit
+from warpbrain.worlds.body.screened import screened
+from warpbrain.worlds.body.weighted_set import WeightedSet
+
+#: Edge, noise, and centre of the patch [m]; tracked points.
+SIDE, NOISE, CENTRE, POINTS = 0.06, 1e-4, np.array([0.02, 0.034, 0.06]), 60
+
+
+@pytest.fixture(scope="module")
+def search() -> HypothesisSearch:
+    points = box((6, 6, 6), (SIDE, SIDE, SIDE))
+    mesh = TetMesh(points.points, points.tetrahedra, node_sets={"bottom": points.points[:, 2] < 1e-9})
+    case = Case(
+        name="pulled",
+        title="A block that is pulled",
+        origin="synthetic",
+        path=Path("case.toml"),
+        mesh=mesh,
+        tissues={label: Tissue("gel", NeoHookean(1000.0)) for label in mesh.labels},
+        density=1000.0,
+        poisson=0.45,
+        boundaries=(Fixed(name="table", nodes="bottom"),),
+    )
+    x, y, z = CENTRE.tolist()
+    pull = Traction(centre=(x, y, z), value=(150.0, 0.0, 1200.0), radius=0.02)
+    model, _ = model_of(replace(case, mechanisms=(pull,)))
+    u = EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u
+    assert np.linalg.norm(u, axis=1).max() > 6e-3
+    rng = np.random.default_rng(0)
+    at = SIDE * rng.uniform(0.05, 1.0, (POINTS, 3))
+    moved = locate(mesh.points, mesh.tetrahedra, at).interpolate(u) + NOISE * rng.normal(size=at.shape)
+    beads = PointsRecording(name="beads", file="beads.csv", role="fit", points=at, displacement=moved, sigma=NOISE)
+    found = screened(replace(case, recordings=(beads,)), "cpu", mesh_error=False, mechanisms=["traction"])
+    found.fit(alone=True)
+    return found
+
+
+def fitted_at(search: HypothesisSearch, centre: np.ndarray) -> WeightedSet:
+    """The set with the traction, fitted with that somewhere."""
+    candidate = search.get(("traction",))
+    assert candidate is not None
+    elsewhere = candidate.effects[0].proposed.elsewhere
+    assert elsewhere is not None
+    effects = tuple(search.base.effects.of([elsewhere(centre, 0.02)]))
+    q = candidate.columns.shape[1] - effects[0].columns.shape[1]
+    columns = np.column_stack([candidate.columns[:, :q], effects[0].columns])
+    refit = Fitter(search.base).fit(effects, columns, [np.zeros(columns.shape[1])], candidate.marginal)
+    return replace(
+        candidate, effects=effects, residual=refit.linear, columns=refit.columns, marginal=refit.marginal, refit=refit
+    )
+
+
+def test_what_was_fitted_off_its_place_is_moved_nearer_to_it(search: HypothesisSearch) -> None:
+    off = fitted_at(search, CENTRE + np.array([0.006, 0.0, 0.0]))
+    assert off.refit is not None
+    moved = moved_about_fit(search.base, Fitter(search.base), off, search.spacing)
+    assert moved.refit is not None
+    gain = moved.refit.log_evidence - off.refit.log_evidence
+    assert gain > 5.0
+    assert moved.hypothesis.log_evidence - off.hypothesis.log_evidence == pytest.approx(gain, abs=0.1)
+    before, after = (np.linalg.norm(found.effects[0].proposed.centre - CENTRE) for found in (off, moved))
+    assert after < 0.8 * before
+
+
+def test_what_was_fitted_at_its_place_stays(search: HypothesisSearch) -> None:
+    there = fitted_at(search, CENTRE)
+    assert there.refit is not None
+    moved = moved_about_fit(search.base, Fitter(search.base), there, search.spacing)
+    assert moved.refit is not None
+    assert moved.refit.log_evidence - there.refit.log_evidence < 5.0
+    assert np.linalg.norm(moved.effects[0].proposed.centre - CENTRE) < 0.25 * search.spacing
