@@ -514,8 +514,8 @@ def _illustrate(
 
     moved = Moved.of(case.recordings, observed.comparisons)
     names = {label: tissue.name for label, tissue in case.tissues.items()}
-    left_out = textwrap.wrap(f"Left out {summary['case']['left_out'][0]}", _LINE)
-    lines = [_subtitle(case, summary["solution"]), *summary["recordings"]["in_words"], *left_out]
+    left_out = [line for text in summary["case"]["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
+    lines = [_subtitle(summary["case"], summary["solution"]), *summary["recordings"]["in_words"], *left_out]
     pictures = draw(out / "deformation.png", case.mesh, result.mesh, result.u, names, moved, case.title, lines)
     write_run_page(out / "report.html", summary, result, case.mesh, moved, pictures)
     if isinstance(pictures, str):
@@ -524,13 +524,12 @@ def _illustrate(
     return ["deformation.png", "report.html"]
 
 
-def _subtitle(case: Case, outcome: Mapping[str, Any]) -> str:
-    tissues = [(tissue.name, tissue.known_law) for _, tissue in sorted(case.tissues.items())]
-    laws = ", ".join(f"{name} {law.name} {law.shear_modulus:g} Pa" for name, law in tissues)
+def _subtitle(case: Mapping[str, Any], outcome: Mapping[str, Any]) -> str:
+    laws = ", ".join(f"{one['name']} {one['law']} {one['shear_modulus_Pa']:g} Pa" for one in case["tissues"].values())
     state = outcome["kind"]
     if state == "motion":
         state = f"after {1000 * outcome['time_s']:.0f} ms"
     elif state == "slow change":
         state = f"after {outcome['time_s']:g} s"
-    stand_in = "stand-in, not the patient's images; " if case.origin == "stand-in" else ""
+    stand_in = "stand-in, not the patient's images; " if case["origin"] == "stand-in" else ""
     return f"{stand_in}{laws}; {state}"

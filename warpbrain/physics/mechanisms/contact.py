@@ -100,6 +100,7 @@ class Contact(Mechanism):
     }
     sentence: ClassVar[str] = "The brain's surface is not stuck to the skull: it slides along it, or lifts off."
     example: ClassVar[str] = "contact:nodes=side,state=lifting"
+    absence: ClassVar[str] = "contact with the skull away from the nodes that are fixed"
     confused_with: ClassVar[tuple[str, ...]] = ("traction", "gravity")
     needs: ClassVar[tuple[str, ...]] = ("points near the surface",)
     switches: ClassVar[bool] = True
