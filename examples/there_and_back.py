@@ -46,7 +46,7 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     write_volumes(folder, *(maps_of_nilearn() if options.maps is None else maps_in(options.maps)))
 
-    case = folder / "case"
+    case = folder / "icbm152"
     warpbrain(
         *("cases", "new", case, "--labels", folder / "aseg.nii.gz"),
         *("--preset", "freesurfer", "--tissue", f"{TAKEN}=resection", "--size", options.size),
