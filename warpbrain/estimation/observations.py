@@ -387,12 +387,12 @@ def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Part:
 def _with_changes(each: Sequence[tuple[Recording, Observation]]) -> tuple[Observation, ...]:
     """The observations with what points changed over an element of the mesh.
 
-    Points of one time are neighbours in whatever file they are, if they were recorded alike.
+    Points of one time are neighbours in whatever file they are, if they were declared to be recorded alike.
     """
     alike: dict[tuple[Any, ...], list[int]] = {}
     for number, (recording, observation) in enumerate(each):
         if isinstance(recording, PointsRecording):
-            own = number if recording.sigmas is not None else None
+            own = number if recording.sigma is None or recording.sigmas is not None else None
             for time in np.unique(observation.times).tolist():
                 alike.setdefault((time, recording.reference, recording.sigma, own), []).append(number)
     changes = [observation.over_element.copy() for _, observation in each]
