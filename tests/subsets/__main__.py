@@ -1,5 +1,5 @@
-"""Every shipped case with every subset of its recordings and as one tissue or many is diagnosed: `PYTHONPATH=tests python
--m subsets`, the small subsets of all cases first; exit status 1 if one ends in neither a verdict nor a sentence."""
+"""Every shipped case with every subset of its recordings, as one tissue or many, is diagnosed, small subsets first:
+`PYTHONPATH=tests python -m subsets`; exit status 1 if one ends in neither a verdict nor a sentence."""
 
 from __future__ import annotations
 
