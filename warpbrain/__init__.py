@@ -18,8 +18,6 @@ dir(wb) names everything, help(wb.run) says more of one; `warpbrain --help` is t
 from importlib import import_module
 from typing import Any
 
-__version__ = "0.1.0"
-
 #: Where each public name is. They are imported when they are first used, so that `import warpbrain` loads nothing
 #: heavy; type checkers and editors read `__init__.pyi`. Without `__all__`, `help(warpbrain)` is the page above and not
 #: all that can be said of every class.
@@ -77,6 +75,8 @@ def __getattr__(name: str) -> Any:
         return import_module("warpbrain.physics.laws").LAWS
     if name == "mechanisms":
         return import_module("warpbrain.physics.mechanisms").mechanisms()
+    if name == "__version__":
+        return _version()
     if name.startswith("_"):
         raise AttributeError(name)
     from difflib import get_close_matches
@@ -84,6 +84,16 @@ def __getattr__(name: str) -> Any:
     near = get_close_matches(name, __dir__(), 1)
     cure = f"did you mean '{near[0]}'?" if near else "dir(warpbrain) lists what there is"
     raise AttributeError(f"module 'warpbrain' has no attribute '{name}': {cure}")
+
+
+def _version() -> str:
+    """Of what is installed: a tag, or the commit since; it takes longer to look up than all else here."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("warpbrain")
+    except PackageNotFoundError:  # its sources, not installed
+        return "0+unknown"
 
 
 def __dir__() -> list[str]:
