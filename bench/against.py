@@ -103,7 +103,7 @@ def work(row: str, device: str) -> None:
     wp = start_warp_quietly()
     now = time.process_time if device == "cpu" else time.perf_counter
     case = find_case(TABLE3[row].case, TABLE3[row].tissue)
-    simulator = Simulator(System(model_of(case)[0], device))
+    simulator = Simulator(System(model_of(case), device))
     simulator.capture()
     bodies = itertools.count(1)
     for _ in sys.stdin:
@@ -111,7 +111,7 @@ def work(row: str, device: str) -> None:
         for _ in range(5):
             arrays = fresh_arrays(case.mesh, next(bodies))
             start = now()
-            System(model_of(replace(case, mesh=TetMesh(*arrays)))[0], device)
+            System(model_of(replace(case, mesh=TetMesh(*arrays))), device)
             wp.synchronize_device(device)
             taken.setdefault("pre-processing", []).append(1000.0 * (now() - start))
         simulator.reset()

@@ -69,7 +69,7 @@ def main() -> None:
     print(f"{wp.get_device(DEVICE).name} ({DEVICE}); ms")
     for name, case, tissue in (("st/coarse", "phantom", "single"), ("mt/fine", "phantom-fine", "multi")):
         found = find_case(case, tissue)
-        model, _ = model_of(found)
+        model = model_of(found)
         system = System(model, DEVICE)
         simulator = Simulator(system)
         loops = step(simulator, captured=False)
@@ -82,7 +82,7 @@ def main() -> None:
         ours = milliseconds(lambda s=simulator, y=system: s._cg.multiply(s.v, y.increment))
         theirs = milliseconds(lambda s=simulator, y=system: warp.sparse.bsr_mv(y.matrix, s.v, y.increment))
         print(f"{name}: matrix-vector product {ours:.3f}; warp.sparse.bsr_mv {theirs:.3f}")
-        random, _ = model_of(replace(found, mesh=shuffled(found.mesh), boundaries=()))
+        random = model_of(replace(found, mesh=shuffled(found.mesh), boundaries=()))
         other = System(random, DEVICE)
         other.evaluate_tangents()
         in_order = milliseconds(lambda y=system: y.assemble(2e-6, 1.0))

@@ -131,7 +131,7 @@ def sag(n: int, poisson: float, elements: str, reference: float) -> dict[str, An
 def sink(elements: str, finer: bool) -> dict[str, Any]:
     """How far the wall of the ventricles of case 0529 moves."""
     case = find_case("0529")
-    model, _ = model_of(case)
+    model = model_of(case)
     wall = np.flatnonzero(model.mesh.node_sets["ventricle"])
     model = replace(FinerCase(case).model(model) if finer else model, elements=elements)
     # of the mesh's own nodes: those in between follow the elements

@@ -35,11 +35,7 @@ def main() -> None:
     for name, arguments in RUNS.items():
         with tempfile.TemporaryDirectory() as folder:
             _warpbrain("run", *arguments, "--out", folder)
-            with Image.open(Path(folder) / "deformation.png") as image:
-                size = (RENDERED, round(image.height * RENDERED / image.width))
-                small = image.convert("RGB").resize(size, Image.LANCZOS)
-            few = small.quantize(256, method=Image.Quantize.MAXCOVERAGE, kmeans=3, dither=Image.Dither.NONE)
-            few.save(FIGURES / name, optimize=True)
+            few_colours(Path(folder) / "deformation.png", FIGURES / name)
     for name, arguments in ENSEMBLES.items():
         with tempfile.TemporaryDirectory() as folder:
             _warpbrain("ensemble", *arguments, "--out", folder)
@@ -52,6 +48,15 @@ def main() -> None:
     for name, arguments in CASES.items():
         _warpbrain("cases", "show", *arguments, "--out", str(FIGURES / name))
     draw_generative_model()
+
+
+def few_colours(picture: Path, kept: Path) -> None:
+    """Keep a picture of a body in the width of a page and in 256 colours."""
+    with Image.open(picture) as image:
+        size = (RENDERED, round(image.height * RENDERED / image.width))
+        small = image.convert("RGB").resize(size, Image.LANCZOS)
+    few = small.quantize(256, method=Image.Quantize.MAXCOVERAGE, kmeans=3, dither=Image.Dither.NONE)
+    few.save(kept, optimize=True)
 
 
 def draw_generative_model() -> None:

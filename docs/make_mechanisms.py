@@ -81,7 +81,7 @@ def draw(case: Case, kind: str) -> Effect:
 
 def _deformed(case: Case, steps: int) -> tuple[TetMesh, NDArray[np.float64], NDArray[np.int32]]:
     """Mesh, displacement [m] in equilibrium or after some steps, and ids of its nodes in the case's mesh."""
-    model, nodes = model_of(case)
+    model, nodes = model_of(case), case.remaining[1]
     if not steps:
         return model.mesh, EquilibriumSolver(System(model, "cpu")).solve().u, nodes
     simulator = Simulator(System(model, "cpu"))

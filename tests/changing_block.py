@@ -61,7 +61,7 @@ def displacements(case: Case, times: Sequence[float]) -> dict[float, np.ndarray]
     """Of all nodes (N, 3) [m] at rest under what acts at each time: each solved by itself."""
     found = {}
     for time in times:
-        model, _ = model_of(case_at(case, time))
+        model = model_of(case_at(case, time))
         found[time] = EquilibriumSolver(System(model, "cpu")).solve().u
     return found
 

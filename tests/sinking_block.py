@@ -82,7 +82,7 @@ def write_sinking(folder: Path, also: tuple[Mechanism, ...] = ()) -> Case:
     (folder / "case.toml").write_text(_CASE, encoding="utf-8")
     # half of the block is out of the fluid
     sinks = Gravity(direction=(0.0, 0.0, -1.0), density=1000.0, csf_level=0.03)
-    model, _ = model_of(replace(find_case(str(folder)), mechanisms=(sinks, *also)))
+    model = model_of(replace(find_case(str(folder)), mechanisms=(sinks, *also)))
     u = EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u
     (folder / "recordings").mkdir()
     rng = np.random.default_rng(7)

@@ -80,7 +80,7 @@ def write_slow(folder: Path, cause: Mechanism) -> Case:
     folder.mkdir(parents=True, exist_ok=True)
     write_mesh(folder / "mesh.vtu", mesh, unit="mm")
     (folder / "case.toml").write_text(_CASE, encoding="utf-8")
-    model, _ = model_of(replace(find_case(str(folder)), mechanisms=(cause,)))
+    model = model_of(replace(find_case(str(folder)), mechanisms=(cause,)))
     steps = sorted({*TIMES, *np.geomspace(1e-3 * TIMES[0], TIMES[-1], 30).tolist()[:-1]})
     moments = follow_slowly(System(model, "cpu"), steps, EquilibriumOptions(tolerance=1e-6))
     found = {moment.time: moment.state.u for moment in moments}

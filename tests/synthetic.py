@@ -53,7 +53,7 @@ def block(laws: Mapping[str, Law], load: str, cells: int = 3, formulation: str =
 
 def truth(case: Case, elements: str = "tet4") -> Result:
     """The state of a case under its own laws."""
-    system = System(replace(model_of(case)[0], elements=elements), "cpu")
+    system = System(replace(model_of(case), elements=elements), "cpu")
     solve_equilibrium(system, EquilibriumOptions(tolerance=1e-12))
     return result_of(system)
 

@@ -37,6 +37,36 @@ def test_an_error_leaves_the_old_file(tmp_path, error):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.parametrize("folder", [False, True])
+def test_content_is_on_the_disk_before_its_name(tmp_path, monkeypatch, folder):
+    """After a power failure a file that was renamed sooner may be empty."""
+    path, events = tmp_path / "a", []
+
+    def fsync(descriptor):
+        events.append((os.fstat(descriptor).st_ino, path.exists()))
+
+    monkeypatch.setattr(atomic.os, "fsync", fsync)
+    with (whole_folder if folder else whole_file)(path) as temporary:
+        file = temporary / "inside" if folder else temporary
+        file.write_text("new")
+        inode = file.stat().st_ino
+    assert events[0] == (inode, False)
+    # and then the name is
+    assert events[-1] == (tmp_path.stat().st_ino, True)
+
+
+def test_content_that_the_disk_does_not_take_gets_no_name(tmp_path, monkeypatch):
+    """A full disk may be known only then."""
+
+    def fsync(_descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(atomic.os, "fsync", fsync)
+    with pytest.raises(OSError, match="No space left"), whole_file(tmp_path / "a") as temporary:
+        temporary.write_text("new")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("mask", [0o022, 0o077, 0o002])
 def test_permissions_are_those_of_any_new_file(tmp_path, mask):
     before = os.umask(mask)

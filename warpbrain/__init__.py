@@ -1,20 +1,26 @@
 """Simulates the deformation of the brain, on CPU and GPU from one source, and says what it left out.
 
-The public names are listed here once. They are imported when they are first used, so that `import warpbrain` itself
-loads nothing heavy.
+>>> import warpbrain as wb
+>>> done = wb.run("0529")                      # a shipped case, a folder, or a Case; done.errors, done.u [m]
+>>> posterior = wb.estimate("0529")            # tissue from what was recorded, with intervals
+>>> diagnosis = wb.diagnose("0529")            # what physics the case leaves out: diagnosis.sentence
+>>> spread = wb.ensemble("0529", samples=289)  # many laws at once
+>>> done.plot()                                # PyVista; or wb.plot(done, field="von_mises")
 
-Examples
---------
->>> import warpbrain
->>> model, _ = warpbrain.model_of(warpbrain.find_case("0529"))
->>> model.mesh.volume < 1.1654e-3  # the resected tissue is gone
-True
+cases                              shipped ones by name; read_case, write_case, check_case: your own
+laws, mechanisms                   what tissue may be and what may act on it, by name; assume(case, "gravity")
+model_of, System, solve_equilibrium, Simulator, relax_to_rest, result_of, observe    the steps of run
+draw_laws, Prior, find_model, with_prior_draw    what the literature makes likely of tissue
+InputError, SolveError             what went wrong: the argument and the cure, or where there is no answer
+dir(wb) names everything, help(wb.run) says more of one; `warpbrain --help` is the same in a shell.
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-__version__ = "0.1.0"
+#: Where each public name is. They are imported when they are first used, so that `import warpbrain` loads nothing
+#: heavy; type checkers and editors read `__init__.pyi`. Without `__all__`, `help(warpbrain)` is the page above and not
+#: all that can be said of every class.
 
 _HOMES = {
     "errors": ("InputError", "SolveError"),
@@ -26,6 +32,13 @@ _HOMES = {
     "physics.mechanisms.resection": ("Resection",),
     "simulation.model": ("Damping", "Material", "Model"),
     "simulation.of_case": ("model_of",),
+    "simulation.run": ("Run", "run"),
+    "simulation.specimen_run": ("SpecimenRun",),
+    "report.plot": ("grid", "plot"),
+    "report.in_notebook": ("html",),
+    "cases.assuming": ("assume",),
+    "estimation.posterior": ("Posterior",),
+    "ensemble.results": ("EnsembleResult",),
     "simulation.system": ("System",),
     "simulation.equilibrium": ("Equilibrium", "EquilibriumOptions", "EquilibriumSolver", "solve_equilibrium"),
     "simulation.dynamics": ("Simulator",),
@@ -49,97 +62,39 @@ _HOMES = {
     "diagnosis.result": ("Diagnosis",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
-
-__all__ = [
-    "Case",
-    "Damping",
-    "Diagnosis",
-    "DiagnosisOptions",
-    "Equilibrium",
-    "EquilibriumOptions",
-    "EquilibriumSolver",
-    "EstimationOptions",
-    "Gravity",
-    "InputError",
-    "Law",
-    "Material",
-    "MeshError",
-    "Model",
-    "MooneyRivlin",
-    "NeoHookean",
-    "NodalForce",
-    "Ogden",
-    "Prior",
-    "Resection",
-    "Result",
-    "Simulator",
-    "SolveError",
-    "System",
-    "TetMesh",
-    "check_case",
-    "diagnose",
-    "draw_laws",
-    "estimate",
-    "find_case",
-    "find_model",
-    "model_of",
-    "observe",
-    "read_case",
-    "read_mesh",
-    "read_studies",
-    "relax_to_rest",
-    "require_stable",
-    "result_of",
-    "solve_equilibrium",
-    "trained",
-    "with_prior_draw",
-    "write_case",
-    "write_mesh",
-]
-
-if TYPE_CHECKING:
-    from warpbrain.cases.case import Case
-    from warpbrain.cases.checking import check_case
-    from warpbrain.cases.drawn import with_prior_draw
-    from warpbrain.cases.reading import read_case
-    from warpbrain.cases.shipped import find_case
-    from warpbrain.cases.writing import write_case
-    from warpbrain.diagnosis.diagnose import diagnose
-    from warpbrain.diagnosis.options import DiagnosisOptions
-    from warpbrain.diagnosis.result import Diagnosis
-    from warpbrain.errors import InputError, SolveError
-    from warpbrain.estimation.estimate import estimate
-    from warpbrain.estimation.options import EstimationOptions
-    from warpbrain.gp.literature.studies import read_studies
-    from warpbrain.gp.prior import Prior
-    from warpbrain.gp.sampling import draw_laws
-    from warpbrain.gp.trained import find_model, trained
-    from warpbrain.mesh import MeshError, TetMesh, read_mesh, write_mesh
-    from warpbrain.physics.force import NodalForce
-    from warpbrain.physics.laws import Law, MooneyRivlin, NeoHookean, Ogden
-    from warpbrain.physics.laws.stability import require_stable
-    from warpbrain.physics.mechanisms.gravity import Gravity
-    from warpbrain.physics.mechanisms.resection import Resection
-    from warpbrain.simulation.dynamics import Simulator
-    from warpbrain.simulation.equilibrium import (
-        Equilibrium,
-        EquilibriumOptions,
-        EquilibriumSolver,
-        solve_equilibrium,
-    )
-    from warpbrain.simulation.model import Damping, Material, Model
-    from warpbrain.simulation.observation import observe
-    from warpbrain.simulation.of_case import model_of
-    from warpbrain.simulation.relaxation import relax_to_rest
-    from warpbrain.simulation.result import Result, result_of
-    from warpbrain.simulation.system import System
+#: Rooms of the house that are public names themselves: `cases` can be asked for a case, `ensemble` can be called.
+_ROOMS = ("cases", "ensemble")
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'warpbrain' has no attribute '{name}'")
-    return getattr(import_module(f"warpbrain.{_HOME[name]}"), name)
+    if name in _HOME:
+        return getattr(import_module(f"warpbrain.{_HOME[name]}"), name)
+    if name in _ROOMS:
+        return import_module(f"warpbrain.{name}")
+    if name == "laws":
+        return import_module("warpbrain.physics.laws").LAWS
+    if name == "mechanisms":
+        return import_module("warpbrain.physics.mechanisms").mechanisms()
+    if name == "__version__":
+        return _version()
+    if name.startswith("_"):
+        raise AttributeError(name)
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, __dir__(), 1)
+    cure = f"did you mean '{near[0]}'?" if near else "dir(warpbrain) lists what there is"
+    raise AttributeError(f"module 'warpbrain' has no attribute '{name}': {cure}")
+
+
+def _version() -> str:
+    """Of what is installed: a tag, or the commit since; it takes longer to look up than all else here."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("warpbrain")
+    except PackageNotFoundError:  # its sources, not installed
+        return "0+unknown"
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted([*_HOME, *_ROOMS, "laws", "mechanisms"])

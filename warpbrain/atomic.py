@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Files that are there whole or not at all, after a power failure too: what has its name is on the disk."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from warpbrain.errors import InputError
@@ -52,8 +52,10 @@ def whole_file(path: Path) -> Iterator[Path]:
         # mkstemp makes private files; a result should have the rights that any new file has
         mask = os.umask(0)
         os.umask(mask)
+        _to_disk(temporary)
         temporary.chmod(0o666 & ~mask)
         temporary.replace(path)
+        _entries_to_disk(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
         _unfinished.discard(temporary)
@@ -84,13 +86,37 @@ def whole_folder(path: Path) -> Iterator[Path]:
         mask = os.umask(0)
         os.umask(mask)
         temporary.chmod(0o777 & ~mask)
+        for folder, _, names in os.walk(temporary, topdown=False):
+            for name in names:
+                _to_disk(Path(folder, name))
+            _entries_to_disk(Path(folder))
         if target.is_dir():
             # an empty one; not every system renames onto it
             target.rmdir()
         temporary.rename(target)
+        _entries_to_disk(target.parent)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
         _unfinished.discard(temporary)
+
+
+def _to_disk(path: Path) -> None:
+    """Wait until what was written to a file is on the disk: a name may be there sooner than its content."""
+    descriptor = os.open(path, os.O_RDWR | getattr(os, "O_BINARY", 0))
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _entries_to_disk(folder: Path) -> None:
+    """The same of the names in a folder, where the system knows that."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def check_new_folder(path: Path) -> None:

@@ -91,8 +91,9 @@ def test_an_unknown_label_is_named(case):
 
 def test_build_constrains_what_is_fixed_and_moves_what_is_displaced(tmp_path):
     moved = 'kind = "displacement"\nvalue = [0.0, 0.5, -1.5]'
-    model, nodes = model_of(read_case(write_folder(tmp_path, (FORCE, moved))))
-    np.testing.assert_array_equal(nodes, np.arange(27))
+    case = read_case(write_folder(tmp_path, (FORCE, moved)))
+    model = model_of(case)
+    np.testing.assert_array_equal(case.remaining[1], np.arange(27))
     low, high = model.mesh.node_sets["bottom"], model.mesh.node_sets["top"]
     np.testing.assert_array_equal(model.constrained.all(axis=1), low | high)
     np.testing.assert_array_equal(model.constrained.any(axis=1), low | high)

@@ -400,3 +400,23 @@ def test_other_names_are_taken_as_they_are():
     assert parse_names(given)[2] == "gel"
     assert parse_names(given)[3] == "lesion 2"
     assert parse_names(given)[5] == "grey matter"
+
+
+def test_a_lattice_that_cannot_be_meshed_is_followed_by_another(tmp_path, monkeypatch):
+    """Of the template in voxels of 4 mm one of a hundred sizes could not be meshed at all."""
+    pytest.importorskip("mmgpy")
+    from warpbrain.cases.building import labels
+
+    whole, calls = labels.remesh, []
+
+    def fails_at_first(cells, edge):
+        calls.append(len(cells.tetrahedra))
+        return None if len(calls) == 1 else whole(cells, edge)
+
+    monkeypatch.setattr(labels, "remesh", fails_at_first)
+    path = write_ellipsoids(tmp_path / "a.nii.gz")
+    assert meshed(path, size=20.0).tissue.size > 100
+    assert calls[1] > calls[0]
+    monkeypatch.setattr(labels, "remesh", lambda cells, edge: None)
+    with pytest.raises(InputError, match=r"with elements of about 20 mm: try another --size"):
+        meshed(path, size=20.0)

@@ -91,7 +91,7 @@ def test_what_a_resection_leaves_keeps_its_directions(tmp_path):
     fibres = 'kind = "fibres"\nstiffness = 300.0\nfield = "v1.npy"\n[[mechanism]]\nkind = "resection"\n'
     folder = with_mechanism(tmp_path, fibres + 'elements = "corner"')
     write_field(folder / "v1.npy", FIELD)
-    left = model_of(read_case(folder))[0].mesh
+    left = model_of(read_case(folder)).mesh
     corner = block().element_sets["corner"]
     assert np.abs(left.element_vectors["v1.npy"] - FIELD[~corner]).max() < 1e-12
 
@@ -209,14 +209,14 @@ def test_the_wall_of_a_resection_can_be_pressed(tmp_path, text):
     margin = wall_nodes(block(), "corner")
     add_arrays(folder, margin=margin.astype(np.uint8))
     case = read_case(folder)
-    model, _ = model_of(case)
+    model = model_of(case)
     (pressure,) = model.mechanisms
     assert isinstance(pressure, Pressure)
     faces = pressure.faces(model.mesh)
     expected = 3.0 * (0.5 * SIDE) ** 2
     assert np.linalg.norm(face_vectors(model.mesh.points, faces), axis=1).sum() == pytest.approx(expected)
     # and on a mesh of half the size
-    finer, _ = model_of(FinerCase(case).case)
+    finer = model_of(FinerCase(case).case)
     finer_faces = pressure.faces(finer.mesh)
     assert np.linalg.norm(face_vectors(finer.mesh.points, finer_faces), axis=1).sum() == pytest.approx(expected)
 
@@ -225,12 +225,12 @@ def test_the_wall_of_a_resection_can_be_pressed_from_the_command_line(tmp_path):
     case = read_case(write_folder(tmp_path / "case"))
     without = assume(case, "resection:elements=stiff")
     pressed = assume(without, "pressure:nodes=stiff,value=30")
-    model, _ = model_of(pressed)
+    model = model_of(pressed)
     faces = pressed.mechanisms[-1].faces(model.mesh)
     assert np.linalg.norm(face_vectors(model.mesh.points, faces), axis=1).sum() == pytest.approx(SIDE**2)
     # it is written and read again
     write_case(tmp_path / "again", pressed)
-    again, _ = model_of(read_case(tmp_path / "again"))
+    again = model_of(read_case(tmp_path / "again"))
     assert len(again.mechanisms[-1].faces(again.mesh)) == len(faces)
 
 

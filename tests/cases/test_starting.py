@@ -94,7 +94,7 @@ def test_new_case_solves(started, tmp_path):
         (folder / name).write_bytes((started[0].folder / name).read_bytes())
     with (folder / "case.toml").open("a", encoding="utf-8") as file:
         file.write(PUSH)
-    model, _ = model_of(read_case(folder))
+    model = model_of(read_case(folder))
     state = solve_equilibrium(System(model, "cpu"))
     assert 0 < abs(state.u).max() < 0.005
 

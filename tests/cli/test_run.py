@@ -312,7 +312,8 @@ def test_a_motion_without_an_answer(tmp_path, arguments):
     crushed = write_folder(tmp_path / "case", ("-0.05]", "-500.0]"))
     ran = run(crushed, "--out", tmp_path / "out", *arguments)
     assert ran.status == 1
-    assert re.fullmatch(r"warpbrain: .+ [\d.e-]+ ms.*\n", ran.err), ran.err
+    # at which step it ends, or whether it does, is rounding's: an element turns inside out, or there is no rest
+    assert re.fullmatch(r"warpbrain: .+ [\d.e-]+ m?s\b.*\n", ran.err), ran.err
     assert not (tmp_path / "out").exists()
 
 

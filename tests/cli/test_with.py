@@ -40,6 +40,16 @@ def test_each_changes_what_happens(tmp_path, plain, said):
     assert abs(largest(tmp_path / "with") - plain) > 1e-4, kind
 
 
+def test_what_is_assumed_is_not_said_to_be_left_out(tmp_path):
+    case = write_folder(tmp_path / "case")
+    for number, said in enumerate(("swelling:amount=5", "contact:nodes=top")):
+        out = tmp_path / str(number)
+        assert run(case, "--with", said, "--out", out).status == 0
+        absent, *_ = json.loads((out / "summary.json").read_text())["case"]["left_out"]
+        assert absent.startswith("not assumed: ") and "viscosity" in absent
+        assert ("contact with the skull" in absent) == (said[:7] != "contact")
+
+
 @pytest.mark.parametrize(
     ("said", "expected"),
     [

@@ -82,7 +82,7 @@ def test_the_permeability_is_found_with_its_spread(diagnosed: tuple[str, Diagnos
 
 def _followed(states: States, hypothesis: Hypothesis) -> Floats:
     """What sensors record (n,) where every step in time has an equilibrium of its own."""
-    model, _ = model_of(states.case_of(hypothesis))
+    model = model_of(states.case_of(hypothesis))
     system, external = System(model, "cpu"), model.external_forces()
     moments = follow_slowly(system, steps_to(states.times), EquilibriumOptions(tolerance=TOLERANCE))
     by_time = {moment.time: moment.state for moment in moments}

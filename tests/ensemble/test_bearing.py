@@ -15,7 +15,7 @@ from warpbrain.simulation.of_case import model_of
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory):
-    return model_of(read_case(write_folder(tmp_path_factory.mktemp("block")) / "case.toml"))[0]
+    return model_of(read_case(write_folder(tmp_path_factory.mktemp("block")) / "case.toml"))
 
 
 def of(*moduli):

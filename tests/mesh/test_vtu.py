@@ -1,5 +1,9 @@
 """VTU files that say their axes as 3D Slicer reads them."""
 
+import re
+import subprocess
+from pathlib import Path
+
 import meshio
 import numpy as np
 import pytest
@@ -8,6 +12,9 @@ from shapes import box
 
 from warpbrain.mesh import read_mesh, write_mesh
 from warpbrain.mesh.vtu import axes_of_vtu, read_vtu, write_vtu
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("warpbrain", "concealed", "referee", "docs", "bench", "examples")
 
 
 @pytest.mark.parametrize("axes", ["RAS", "LPS"])
@@ -44,3 +51,26 @@ def test_vtk_reads_them(tmp_path):
     assert isinstance(array, vtk.vtkStringArray)
     assert array.GetValue(0) == "RAS"
     assert reader.GetOutput().GetNumberOfPoints() == 8
+
+
+def test_every_file_of_vtk_in_the_repository_says_its_axes():
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
+    found = [ROOT / name for name in listed if name.endswith(".vtu")] or list((ROOT / "warpbrain").rglob("*.vtu"))
+    assert len(found) > 20
+    for path in found:
+        assert axes_of_vtu(path) == "RAS", path
+
+
+def test_there_is_one_writer():
+    """Whatever else wrote a file of VTK would write one that does not say its axes."""
+    others = re.compile(
+        r"\bmeshio\.write\(|\bmeshio\.Mesh\([^)]*\)\.write\(|\bXML\w*Writer\b|\bvtk\w*Writer\b|\bsave_meshio\b"
+    )
+    places = [path for room in ROOMS for path in (ROOT / room).rglob("*.py")]
+    found = {path.relative_to(ROOT).as_posix() for path in places if others.search(path.read_text(encoding="utf-8"))}
+    assert found == {"warpbrain/mesh/vtu.py"}
+    # PyVista's meshes have a method of their own: nothing that is drawn is kept as a mesh
+    drawing = [path for path in places if "pyvista" in path.read_text(encoding="utf-8")]
+    assert drawing
+    for path in drawing:
+        assert not re.search(r"(?<!np)\.save\(", path.read_text(encoding="utf-8")), path

@@ -83,6 +83,6 @@ def _three(values: np.ndarray) -> tuple[float, float, float]:
 
 def displacement(case: Case, tolerance: float = 1e-10) -> np.ndarray:
     """Of all nodes (n, 3) [m] at rest, as `warpbrain run --tolerance` has it."""
-    model, _ = model_of(case)
+    model = model_of(case)
     options = EquilibriumOptions(tolerance=tolerance)
     return EquilibriumSolver(System(model, "cpu"), options).solve(model.external_forces()).u

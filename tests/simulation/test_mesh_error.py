@@ -131,7 +131,7 @@ def test_a_finer_case_has_the_same_resultants(tmp_path) -> None:
     case = warpbrain.read_case(write_folder(tmp_path))
     force = Forced(name="push", nodes="top", total=(0.01, 0.0, -0.03))
     case = replace(case, boundaries=(*case.boundaries[:1], force))
-    model, _ = warpbrain.model_of(case)
+    model = warpbrain.model_of(case)
     finer = FinerCase(case).model(model)
     assert len(finer.mesh.tetrahedra) == 8 * len(model.mesh.tetrahedra)
     np.testing.assert_allclose(finer.external_forces().sum(axis=0), model.external_forces().sum(axis=0), atol=1e-12)
@@ -145,7 +145,7 @@ def test_a_block_of_48_elements(tmp_path, poisson: float) -> None:
     Estimate over error, root mean squares: 1.13 and 1.07; beside truth from 3,072 and 24,576 elements 1.16 and 1.09.
     """
     case = replace(warpbrain.read_case(write_folder(tmp_path)), poisson=poisson)
-    model, _ = warpbrain.model_of(case)
+    model = warpbrain.model_of(case)
     system = System(model, "cpu")
     solve_equilibrium(system)
     result = result_of(system)
@@ -155,7 +155,7 @@ def test_a_block_of_48_elements(tmp_path, poisson: float) -> None:
         refined_case = FinerCase(finer)
         finer, forces = refined_case.case, refined_case.spread(forces)
         loads = [GivenForces(forces=forces)]
-        small = replace(warpbrain.model_of(finer)[0], loads=loads, elements="tet4-averaged")
+        small = replace(warpbrain.model_of(finer), loads=loads, elements="tet4-averaged")
         levels.append(solve_equilibrium(System(small, "cpu"), EquilibriumOptions(tolerance=1e-6)).u[: len(result.u)])
     error = levels[1] + (levels[1] - levels[0]) / 3.0 - result.u
     assert np.linalg.norm(error) > 0.8 * np.linalg.norm(result.u)
@@ -170,7 +170,7 @@ def test_of_a_case_it_is_the_difference_of_two_runs(tmp_path, steps: int | None)
     case = warpbrain.read_case(write_folder(tmp_path))
     states = {}
     for elements in ("tet4", "tet4-averaged"):
-        model = replace(warpbrain.model_of(case)[0], elements=elements)
+        model = replace(warpbrain.model_of(case), elements=elements)
         system = System(model, "cpu")
         if steps is None:
             solve_equilibrium(system)

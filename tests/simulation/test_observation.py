@@ -18,7 +18,7 @@ from warpbrain.simulation.system import System
 @pytest.fixture(scope="module", params=["tet4", "tet10"])
 def solved(request, tmp_path_factory):
     case = read_case(write_recorded(tmp_path_factory.mktemp("case")))
-    system = System(replace(model_of(case)[0], elements=request.param), "cpu")
+    system = System(replace(model_of(case), elements=request.param), "cpu")
     solve_equilibrium(system)
     return case, nodal_state_of(system)
 
@@ -74,7 +74,7 @@ def test_what_holds_a_body_carries_the_loads_on_held_nodes_too(tmp_path):
     gravity = '[[mechanism]]\nkind = "gravity"\ncsf_level = -50.0\n[body]'
     axis = 'axes = "RAS"\ngravity_axis = [0, 0, -1]'
     case = read_case(write_folder(tmp_path, ("[body]", gravity), ('axes = "RAS"', axis), ("-0.05]", "-1e-9]")))
-    system = System(model_of(case)[0], "cpu")
+    system = System(model_of(case), "cpu")
     solve_equilibrium(system)
     result = result_of(system)
     # all of it lies above the fluid: the buoyancy that it lost

@@ -69,7 +69,7 @@ def phantom_job(count: int, precision: str) -> Job:
     """Motions of the coarse phantom of one tissue, with the laws of the first draws of its prior."""
     case = find_case("phantom", "single")
     samples = drawn_samples(case, count, 0, trained())
-    return Job(model_of(case)[0], tuple(samples), steps=STEPS, precision=precision)
+    return Job(model_of(case), tuple(samples), steps=STEPS, precision=precision)
 
 
 def measure_batches(sizes: list[int], device: str, precision: str) -> Iterator[MeasuredBatch]:
@@ -139,7 +139,7 @@ def measure_sweep(tissue: str, device: str, precision: str) -> tuple[float, int,
     """The paper's sweep on the coarse phantom, to rest: seconds, samples, how many failed, and CG iterations."""
     case = find_case("phantom", tissue)
     job = Job(
-        model_of(case)[0], tuple(swept_samples(case, trained("coregionalised", "as_published"))), precision=precision
+        model_of(case), tuple(swept_samples(case, trained("coregionalised", "as_published"))), precision=precision
     )
     start = time.perf_counter()
     outcomes = [outcome for ended in Here(device, None).outcomes(job) for outcome in ended]

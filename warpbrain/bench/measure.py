@@ -130,7 +130,7 @@ def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, 
 
 def preprocess(case: Case, arrays: MeshArrays, device: str, precision: str, tolerance: float) -> Simulator:
     """Everything between a mesh in memory and a simulator that can take its first step."""
-    model, _ = model_of(case_of(case, arrays))
+    model = model_of(case_of(case, arrays))
     simulator = Simulator(System(model, device, precision), tolerance=tolerance)
     wp.synchronize_device(device)
     return simulator

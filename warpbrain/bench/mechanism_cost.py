@@ -70,7 +70,7 @@ def measure_cost(case: Case, kind: str, example: str, device: str, precision: st
         If a step or an equilibrium has no solution: there is no cost of that.
     """
     cases = (case, assume(case, example) if example else case)
-    systems = {side: System(model_of(one)[0], device, precision) for side, one in zip(SIDES, cases, strict=True)}
+    systems = {side: System(model_of(one), device, precision) for side, one in zip(SIDES, cases, strict=True)}
     step, cg = _steps(systems, steps)
     newton, iterations = _equilibria(systems, equilibria)
     return Cost(kind, example, step, newton, cg, iterations)

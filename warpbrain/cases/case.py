@@ -20,6 +20,7 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.recordings.recording import Recording
 from warpbrain.recordings.registration import Registration
+from warpbrain.shown import Shown
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class Tissue:
 
 
 @dataclass(frozen=True)
-class Case:
+class Case(Shown):
     """What a `case.toml` says, in SI units and RAS axes.
 
     Attributes

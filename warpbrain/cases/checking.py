@@ -11,6 +11,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.enough import too_few_for_noise, too_few_to_diagnose
 from warpbrain.cases.reading import examine_case
 from warpbrain.mesh import Quality, measure
+from warpbrain.mesh.extent import extent
 from warpbrain.problems import Problem, Problems
 from warpbrain.recordings.recording import PointsRecording
 
@@ -106,7 +107,7 @@ def _look_again(case: Case, quality: Quality) -> list[str]:
         if mu is not None and not SOFT[0] <= mu <= SOFT[1]:
             kilo = f"; {mu:g} kPa is {1000.0 * mu:g} Pa" if mu < SOFT[0] else ""
             found.append(f"[tissue.{label}] shear modulus {mu:g} Pa: not that of soft tissue{kilo}")
-    size = float(np.linalg.norm(np.ptp(case.mesh.points, axis=0)))
+    size = extent(case.mesh.points)
     for recording in case.recordings:
         if not isinstance(recording, PointsRecording):
             continue

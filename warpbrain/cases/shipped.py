@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -84,6 +85,26 @@ def find_case(name: str, tissue: str = "multi") -> Case:
             raise InputError(f"case '{name}': one tissue needs a case folder with a case-single.toml, this is a file")
         path = path / "case-single.toml"
     return read_case(path)
+
+
+def as_case(case: Case | str | os.PathLike[str], tissue: str = "multi") -> Case:
+    """A case that may be given itself, by name, or by its path.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, there is no such case, or it is wrong.
+    """
+    from warpbrain.cases.case import Case
+
+    if isinstance(case, Case):
+        return case
+    if isinstance(case, str | os.PathLike):
+        return find_case(os.fspath(case), tissue)
+    raise InputError(
+        f"case: expected a Case, the name of a shipped case or the path of a folder, found {type(case).__name__}: "
+        "list(warpbrain.cases) has the names"
+    )
 
 
 def _existing(name: str) -> Path:

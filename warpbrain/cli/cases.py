@@ -75,8 +75,8 @@ def _show(options: argparse.Namespace) -> None:
     path = options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}.png")
     check_writable(path.absolute())
     print(*show_lines(case), sep="\n")
-    write_case_picture(path.absolute(), case)
-    print(f"\nwritten: {path}")
+    missing = write_case_picture(path.absolute(), case)
+    print(f"\nwritten: {path}" + (f", without the body from outside: {missing}" if missing else ""))
 
 
 def _check(options: argparse.Namespace) -> None:

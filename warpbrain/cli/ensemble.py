@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpbrain.cli import output
+from warpbrain.ensemble import SAMPLES
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from warpbrain.simulation.model import Model
     from warpbrain.terminal.record import Record
 
-#: Samples where the arguments do not say how many: as many as the paper's sweep has.
-_SAMPLES = 289
 #: Samples that are named one by one where something is said of many.
 _NAMED = 12
 
@@ -50,7 +48,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     add("--model", metavar="LAW", help="neo-hookean, mooney-rivlin or ogden for every tissue (default: the case's own)")
     chosen = parser.add_mutually_exclusive_group()
     chosen.add_argument(
-        "--samples", type=int, metavar="N", help=f"draws 0 to N - 1 of the tissues' joint prior (default: {_SAMPLES})"
+        "--samples", type=int, metavar="N", help=f"draws 0 to N - 1 of the tissues' joint prior (default: {SAMPLES})"
     )
     chosen.add_argument(
         "--grid",
@@ -97,6 +95,7 @@ def _ensemble(options: argparse.Namespace) -> None:
 
     from warpbrain.atomic import safe_name
     from warpbrain.ensemble.results import results_of
+    from warpbrain.ensemble.run import chosen_workers
     from warpbrain.ensemble.store import Store, discard
     from warpbrain.report import summary as tables
     from warpbrain.report.ensemble_text import describe_ensemble, ensemble_lines
@@ -104,11 +103,12 @@ def _ensemble(options: argparse.Namespace) -> None:
     from warpbrain.simulation.of_case import model_of
     from warpbrain.terminal.quiet import start_warp_quietly
     from warpbrain.terminal.result_folder import choose_folder, results_in
+    from warpbrain.threads import processors
 
     start_warp_quietly()
     case = _case(options)
     samples, chosen = _samples(options, case)
-    model, _ = model_of(case)
+    model = model_of(case)
     job = _job(options, model, samples)
     described = tables.describe_case(case, model)
     course = "to rest" if options.steps is None else f"{options.steps} steps of 1 ms"
@@ -126,7 +126,8 @@ def _ensemble(options: argparse.Namespace) -> None:
     choose_folder(out, "", options.overwrite, beside)
     if options.overwrite:
         discard(out)
-    with _workers(options) as workers:
+    processes = options.processes or processors()
+    with chosen_workers(options.device, options.batch, processes, options.dask, start_warp_quietly) as workers:
         about = {"case": case.name, "samples": len(samples), "chosen": chosen, "course": course}
         output.note_case(record, case, workers.name)
         store = Store(out, job, workers.kind, about)
@@ -215,7 +216,7 @@ def _case(options: argparse.Namespace) -> Case:
 
 def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str]:
     """The samples, and in words how they were chosen."""
-    from warpbrain.ensemble.choosing import drawn_samples, swept_samples
+    from warpbrain.ensemble.run import chosen_samples
     from warpbrain.gp.trained import find_model
 
     if options.grid and options.gp is None:
@@ -224,10 +225,10 @@ def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str
         process = find_model(options.gp or "hierarchical")
     by = f"the generative model {process.name} ({process.variant})"
     if options.grid:
-        return swept_samples(case, process), f"the paper's sweep by {by}"
-    count, seed = options.samples or _SAMPLES, options.seed or 0
+        return chosen_samples(case, "grid", process=process), f"the paper's sweep by {by}"
+    count, seed = options.samples or SAMPLES, options.seed or 0
     progress = Progress("drawing", options.quiet)
-    samples = drawn_samples(case, count, seed, process, lambda n: progress.show(n / count))
+    samples = chosen_samples(case, count, seed, process, lambda n: progress.show(n / count))
     progress.clear()
     return samples, f"draws 0 to {count - 1} of seed {seed} by {by}"
 
@@ -252,47 +253,28 @@ def _job(options: argparse.Namespace, model: Any, samples: list[Sample]) -> Job:
     return Job(model, tuple(samples), steps=options.steps, tolerance=options.tolerance, precision=options.precision)
 
 
-@contextmanager
-def _workers(options: argparse.Namespace) -> Iterator[Workers]:
-    """Who computes, as the arguments say."""
-    from warpbrain.ensemble.workers import Here, Processes, kind_of
-    from warpbrain.terminal.quiet import start_warp_quietly
-    from warpbrain.threads import processors
-
-    if options.dask is not None:
-        from warpbrain.ensemble.cluster import Cluster
-
-        with Cluster(options.dask, processors(), options.device, options.batch, start_warp_quietly) as cluster:
-            yield cluster
-        return
-    count = options.processes or processors()
-    if kind_of(options.device) == "cpu" and count > 1:
-        yield Processes(count, options.batch, start_warp_quietly)
-        return
-    yield Here(options.device, options.batch)
-
-
 def _compute(
     job: Job, store: Store, workers: Workers, say: Callable[..., None], progress: Progress
 ) -> tuple[float, int]:
     """Compute what the store lacks; returns the seconds that it took and how many samples they were."""
-    total, there = len(job.samples), store.numbers()
-    missing = [sample.number for sample in job.samples if sample.number not in there]
+    from warpbrain.ensemble.run import compute_missing
+
+    total, there = len(job.samples), len(store.numbers())
     if there:
-        say(f"  resumed   {len(there)} of {total} samples are there, {len(missing)} are missing")
-    if not missing:
+        say(f"  resumed   {there} of {total} samples are there, {total - there} are missing")
+    if there == total:
         return 0.0, 0
     say(f"  workers   {workers.name}")
     start = time.perf_counter()
-    done = 0
+
+    def on_done(done: int) -> None:
+        rate = done / (time.perf_counter() - start)
+        left = (total - there - done) / rate
+        progress.show((there + done) / total, f"{rate:.3g} a second, {_duration(left)} left")
+
     try:
-        progress.show(len(there) / total, "loading kernels; the first run on a machine compiles them")
-        for ended in workers.outcomes(job.part(set(missing))):
-            store.write(ended)
-            done += len(ended)
-            rate = done / (time.perf_counter() - start)
-            left = (len(missing) - done) / rate
-            progress.show((len(there) + done) / total, f"{rate:.3g} a second, {_duration(left)} left")
+        progress.show(there / total, "loading kernels; the first run on a machine compiles them")
+        done = compute_missing(job, store, workers, on_done)
     finally:
         progress.clear()
     seconds = time.perf_counter() - start

@@ -11,7 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli import output, run_slowly, warp
+from warpbrain.cli import output, warp
+from warpbrain.cli.run_progress import ending_lines, watching
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -19,15 +20,12 @@ if TYPE_CHECKING:
     from warpbrain.cases.case import Case
     from warpbrain.cases.drawn import FromPrior
     from warpbrain.simulation.mesh_error import MeshError
-    from warpbrain.simulation.model import Model
     from warpbrain.simulation.observation import Observed
     from warpbrain.simulation.result import Result
     from warpbrain.simulation.system import System
     from warpbrain.terminal.record import Record
 
 
-#: Newton iterations that are printed one by one.
-_LONG_HISTORY = 16
 #: Letters of a line of a picture's title.
 _LINE = 150
 
@@ -129,8 +127,9 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.report.fingerprints import fingerprints
     from warpbrain.report.mesh_error import mesh_error_lines
     from warpbrain.report.prior_text import describe_prior, prior_lines
-    from warpbrain.simulation.of_case import model_of
-    from warpbrain.simulation.system import System, find_device
+    from warpbrain.simulation.courses import Course
+    from warpbrain.simulation.run import Running
+    from warpbrain.simulation.system import find_device
     from warpbrain.terminal.quiet import start_warp_quietly
     from warpbrain.terminal.result_folder import choose_folder, results_in
 
@@ -146,10 +145,20 @@ def _run(options: argparse.Namespace) -> None:
 
         run_specimen.run(options, case, out, prior)
         return
-    model, chosen = _with_elements(options, model_of(case)[0])
+    needed_by = () if options.mesh_error is None else ("--mesh-error",)
+    about_elements = options.elements is None and options.mesh_error == "elements"
+    running = Running(
+        case,
+        Course(options.steps, options.to_rest, options.until, options.tolerance),
+        "tet4" if about_elements else options.elements,
+        options.device,
+        options.precision,
+        needed_by,
+    )
+    model, system = running.model, running.system
+    chosen = "--mesh-error elements is about them" if about_elements else running.chosen
     described = tables.describe_case(case, model, chosen)
     say(*tables.case_lines(described), *prior_lines(prior), sep="\n")
-    system = System(model, options.device, options.precision)
     output.note_case(record, case, f"{system.device.name} ({system.device.alias}), {options.precision} precision")
     say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
 
@@ -157,21 +166,14 @@ def _run(options: argparse.Namespace) -> None:
     loading.show(0.0, "the first run on a machine compiles them")
     loaded = system.load_kernels()
     loading.clear()
-    outcome, seconds, counts = _simulate(options, case, system, say)
-    earlier = outcome.pop("states", None)
-    first_step = outcome.pop("first_step") - start
-    seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **seconds}
-
-    from warpbrain.simulation.observation import observe
-    from warpbrain.simulation.result import nodal_state_of, result_of
-
-    result = result_of(system, outcome.get("time_s", math.inf))
-    reached = nodal_state_of(system, outcome.get("time_s", math.inf))
-    if "time_s" not in outcome:
-        from warpbrain.simulation.at_rest import states_at_rest
-
-        earlier = states_at_rest(case, system, reached, options.tolerance)
-    observed = observe(case, reached, outcome.get("time_s"), earlier)
+    with watching(options, say) as watched:
+        done = running.run(watched)
+    for line in ending_lines(done.followed.solution):
+        say(line)
+    outcome, counts = done.followed.solution, done.followed.calls
+    first_step = done.followed.begun - start
+    seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **done.followed.seconds}
+    result, observed = done.result, done.observed
     said = tables.describe_result(result)
     compared = describe_comparisons(observed)
     say("", *tables.displacement_lines(said), sep="\n")
@@ -209,18 +211,6 @@ def _run(options: argparse.Namespace) -> None:
         say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
 
 
-def _with_elements(options: argparse.Namespace, model: Model) -> tuple[Model, str | None]:
-    """The model with the elements that were asked for, or with those that it needs, and why these."""
-    from warpbrain.simulation.locking import choose_elements
-
-    if options.elements is not None:
-        return replace(model, elements=options.elements), None
-    if options.mesh_error == "elements":
-        return model, "--mesh-error elements is about them"
-    choice = choose_elements(model, ("--mesh-error",) if options.mesh_error is not None else ())
-    return replace(model, elements=choice.elements), choice.reason
-
-
 def _check(options: argparse.Namespace) -> None:
     """Refuse bad numbers before anything heavy is imported; reads the moduli."""
     if options.steps is not None and options.steps < 1:
@@ -233,7 +223,7 @@ def _check(options: argparse.Namespace) -> None:
         raise InputError(f"--mesh-error: is not known of --elements {options.elements}: expected tet4 or tet4-averaged")
     if options.mesh_error == "elements" and options.elements == "tet4-averaged":
         raise InputError("--mesh-error elements: compares with tet4-averaged: --mesh-error size says what is left")
-    run_slowly.check(options)
+    _check_until(options)
     options.moduli = parse_moduli(options.mu)
     for name, value in (("--sample", options.sample), ("--seed", options.seed)):
         if value is not None and value < 0:
@@ -244,6 +234,18 @@ def _check(options: argparse.Namespace) -> None:
         )
     if options.sample is None and options.seed is not None:
         raise InputError(f"--seed {options.seed}: means nothing without --sample")
+
+
+def _check_until(options: argparse.Namespace) -> None:
+    """Refuse a time that is none, or that nothing can be followed to."""
+    if options.until is None:
+        return
+    if not (math.isfinite(options.until) and options.until > 0.0):
+        raise InputError(f"--until {options.until:g}: expected a positive number of seconds")
+    if options.to_rest:
+        raise InputError(f"--until {options.until:g}: means nothing with --to-rest")
+    if options.mesh_error is not None:
+        raise InputError(f"--until {options.until:g}: the error of the mesh is not estimated for slow change yet")
 
 
 def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
@@ -324,152 +326,6 @@ def parse_moduli(values: list[str]) -> tuple[float | None, dict[int, float]]:
     return every, by_label
 
 
-def _simulate(
-    options: argparse.Namespace, case: Case, system: System, say: Any
-) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
-    """Find the state that the arguments ask for; returns what to report of it, and times and counts by phase."""
-    if options.until is not None:
-        return run_slowly.follow(options, case, system, say)
-    if options.steps is not None:
-        return _follow(options, system, say, Progress("motion", options.quiet))
-    if options.to_rest:
-        return _relax(options, system, say, Progress("to rest", options.quiet))
-    return _balance(options, system, say, Progress("equilibrium", options.quiet))
-
-
-def _balance(
-    options: argparse.Namespace, system: System, say: Any, progress: Any
-) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
-    from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, NewtonStep
-
-    say("", "equilibrium   load   Newton   residual    CG   step   min J", sep="\n")
-
-    taken: list[NewtonStep] = []
-    first: list[float] = []
-
-    def on_step(step: NewtonStep) -> None:
-        taken.append(step)
-        first.append(time.perf_counter())
-        # a long way is told by its load steps, not by every iteration
-        if len(taken) <= _LONG_HISTORY or step.iteration == 1:
-            progress.clear()
-            say(
-                f"            {100 * step.load:>5.1f} % {step.iteration:>6}   {step.residual:>8.1e} "
-                f"{step.cg_iterations:>5}  {step.step:>5.3g}   {step.min_J:>5.3f}"
-                + ("   indefinite tangent" if step.indefinite else "")
-            )
-        if len(taken) == _LONG_HISTORY:
-            say("            (from here on, the first iteration of each load step)")
-        progress.show(step.load, f"Newton {step.iteration}")
-
-    solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=options.tolerance), on_step)
-    try:
-        state = solver.solve()
-    finally:
-        progress.clear()
-    if not first:
-        first.append(time.perf_counter())
-    say(
-        f"  converged: relative out-of-balance force {state.residual:.1e} (goal {solver.tolerance:.1e}), "
-        f"stored energy {1000 * state.energy:.4g} mJ"
-    )
-    if state.unstable_iterations:
-        say(
-            f"  note: the tangent was indefinite in {state.unstable_iterations} iterations; this may be another "
-            "equilibrium than the one that a slowly growing load reaches first"
-        )
-    outcome = {
-        "kind": "equilibrium",
-        "first_step": first[0],
-        "tolerance": solver.tolerance,
-        "relative_residual": state.residual,
-        "stored_energy_J": state.energy,
-        "iterations_with_indefinite_tangent": state.unstable_iterations,
-        "history": [vars(step) for step in state.history],
-    }
-    return outcome, solver.clock.seconds, solver.clock.counts
-
-
-def _relax(
-    options: argparse.Namespace, system: System, say: Any, progress: Any
-) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
-    from warpbrain.simulation.phase_clock import PhaseClock
-    from warpbrain.simulation.relaxation import RelaxationOptions, RelaxationStep, relax_to_rest
-
-    say("", "to rest        time [s]  step [s]   residual    CG   min J", sep="\n")
-    first: list[float] = []
-
-    def on_step(step: RelaxationStep) -> None:
-        first.append(time.perf_counter())
-        progress.clear()
-        say(
-            f"            {step.time:>11.3g} {step.time_step:>9.3g}   {step.residual:>8.1e} {step.cg_iterations:>5}"
-            f"   {step.min_J:>5.3f}"
-        )
-        decades = math.log10(max(step.residual, 1e-300)) / math.log10(options.tolerance)
-        progress.show(min(1.0, max(0.0, decades)), f"{step.time:.3g} s")
-
-    clock = PhaseClock(system.device)
-    try:
-        state = relax_to_rest(system, RelaxationOptions(tolerance=options.tolerance), on_step, clock)
-    finally:
-        progress.clear()
-    say(f"  at rest: relative out-of-balance force {state.residual:.1e} (goal {state.tolerance:.1e})")
-    outcome = {
-        "kind": "at rest",
-        "first_step": first[0],
-        "tolerance": state.tolerance,
-        "relative_residual": state.residual,
-        "history": [vars(step) for step in state.history],
-    }
-    return outcome, clock.seconds, clock.counts
-
-
-def _follow(
-    options: argparse.Namespace, system: System, say: Any, progress: Any
-) -> tuple[dict[str, Any], dict[str, float], dict[str, int]]:
-    from warpbrain.simulation.dynamics import Simulator
-    from warpbrain.simulation.phase_clock import PhaseClock
-
-    simulator = Simulator(system)
-    clock = PhaseClock(system.device)
-    say("", "motion        time [ms]     CG   min J   kinetic energy [mJ]", sep="\n")
-    every = max(1, options.steps // 10)
-    history = []
-    first: list[float] = []
-    try:
-        for step in range(1, options.steps + 1):
-            # a prescribed displacement without a history of its own is reached evenly over the run
-            due = simulator.time + simulator.time_step
-            simulator.prescribe(system.model.prescribed_at(due, step / options.steps))
-            simulator.timed_step(clock)
-            min_J = simulator.check()
-            first.append(time.perf_counter())
-            if step % every == 0 or step == options.steps:
-                kinetic, solve = simulator.kinetic_energy(), simulator.last_solve()
-                history.append(
-                    {"time_s": simulator.time, "cg_iterations": solve.iterations, "min_J": min_J, "kinetic_J": kinetic}
-                )
-                progress.clear()
-                say(
-                    f"            {1000 * simulator.time:>11.4g} {solve.iterations:>6}   {min_J:>5.3f}"
-                    f"   {1000 * kinetic:.4g}"
-                )
-            progress.show(step / options.steps, f"{1000 * simulator.time:.0f} ms")
-    finally:
-        progress.clear()
-    outcome = {
-        "kind": "motion",
-        "first_step": first[0],
-        "time_s": simulator.time,
-        "time_step_s": simulator.time / options.steps,
-        "damping": vars(system.model.damping),
-        "cg_tolerance": simulator.tolerance,
-        "history": history,
-    }
-    return outcome, clock.seconds, clock.counts
-
-
 def _mesh_error(
     options: argparse.Namespace,
     case: Case,
@@ -514,8 +370,8 @@ def _illustrate(
 
     moved = Moved.of(case.recordings, observed.comparisons)
     names = {label: tissue.name for label, tissue in case.tissues.items()}
-    left_out = textwrap.wrap(f"Left out {summary['case']['left_out'][0]}", _LINE)
-    lines = [_subtitle(case, summary["solution"]), *summary["recordings"]["in_words"], *left_out]
+    left_out = [line for text in summary["case"]["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
+    lines = [_subtitle(summary["case"], summary["solution"]), *summary["recordings"]["in_words"], *left_out]
     pictures = draw(out / "deformation.png", case.mesh, result.mesh, result.u, names, moved, case.title, lines)
     write_run_page(out / "report.html", summary, result, case.mesh, moved, pictures)
     if isinstance(pictures, str):
@@ -524,13 +380,12 @@ def _illustrate(
     return ["deformation.png", "report.html"]
 
 
-def _subtitle(case: Case, outcome: Mapping[str, Any]) -> str:
-    tissues = [(tissue.name, tissue.known_law) for _, tissue in sorted(case.tissues.items())]
-    laws = ", ".join(f"{name} {law.name} {law.shear_modulus:g} Pa" for name, law in tissues)
+def _subtitle(case: Mapping[str, Any], outcome: Mapping[str, Any]) -> str:
+    laws = ", ".join(f"{one['name']} {one['law']} {one['shear_modulus_Pa']:g} Pa" for one in case["tissues"].values())
     state = outcome["kind"]
     if state == "motion":
         state = f"after {1000 * outcome['time_s']:.0f} ms"
     elif state == "slow change":
         state = f"after {outcome['time_s']:g} s"
-    stand_in = "stand-in, not the patient's images; " if case.origin == "stand-in" else ""
+    stand_in = "stand-in, not the patient's images; " if case["origin"] == "stand-in" else ""
     return f"{stand_in}{laws}; {state}"

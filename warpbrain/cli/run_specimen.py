@@ -12,9 +12,6 @@ from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
-    from warpbrain.recordings.recording import TestRecording
-    from warpbrain.report.specimen_text import Tested
-    from warpbrain.simulation.specimen import Rig
     from warpbrain.terminal.record import Record
 
 
@@ -39,7 +36,7 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     SolveError
         If a state of a test is not found.
     """
-    tests = _tests(options, case)
+    _check(options, case)
 
     from warpbrain.report import specimen_text as text
     from warpbrain.report.comparison import describe_comparisons
@@ -49,26 +46,27 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     from warpbrain.report.specimen_page import write_specimen_page
     from warpbrain.report.specimen_picture import write_tests_picture
     from warpbrain.report.summary import machine, timing_lines
-    from warpbrain.simulation.equilibrium import EquilibriumOptions
     from warpbrain.simulation.observation import Observed
-    from warpbrain.simulation.specimen import Rig
+    from warpbrain.simulation.specimen_run import SpecimenRunning
     from warpbrain.terminal.result_folder import results_in
 
     record: Record = options.record
     say = record.say
-    solving = EquilibriumOptions(tolerance=options.tolerance)
-    rig = Rig(case, options.device, options.precision, solving, options.elements)
-    for recording in tests:
-        rig.check(recording)
+    running = SpecimenRunning(case, options.tolerance, options.elements, options.device, options.precision)
+    rig = running.rig
     system = rig.system
-    in_time = any(rig.follows_time(recording) for recording in tests)
+    in_time = any(rig.follows_time(recording) for recording in running.tests)
     described = text.describe_specimen(case, rig.specimen, system.model, in_time, rig.chosen)
     say(*text.specimen_lines(described), *prior_lines(prior), sep="\n")
     output.note_case(record, case, f"{system.device.name} ({system.device.alias}), {options.precision} precision")
     say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
 
     seconds = {"pre-processing": system.seconds, "loading kernels": system.load_kernels()}
-    done = [_simulate(rig, recording, options.quiet) for recording in tests]
+    progress = Progress("tests", options.quiet)
+    try:
+        done = running.run(progress.show).tests
+    finally:
+        progress.clear()
     seconds |= rig.solver.clock.seconds
     say("", *text.tested_lines(done), sep="\n")
     say("", *timing_lines(seconds, rig.solver.clock.counts), sep="\n")
@@ -99,10 +97,8 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
         say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
 
 
-def _tests(options: argparse.Namespace, case: Case) -> list[TestRecording]:
-    """What is to be simulated, if that is what the options ask for."""
-    from warpbrain.recordings.recording import TestRecording
-
+def _check(options: argparse.Namespace, case: Case) -> None:
+    """Refuse options that mean nothing for a specimen."""
     if options.mesh_error is not None:
         raise InputError(
             f"--mesh-error: {case.path} has a [specimen], which has no one state: compare --elements tet4-averaged"
@@ -117,19 +113,3 @@ def _tests(options: argparse.Namespace, case: Case) -> list[TestRecording]:
         raise InputError(
             f"--elements {options.elements}: {case.path} has a [specimen], whose tests have linear elements only"
         )
-    tests = [recording for recording in case.recordings if isinstance(recording, TestRecording)]
-    if not tests:
-        raise InputError(f"{case.path}: no [[recording]] of kind 'test': nothing is imposed on the [specimen]")
-    return tests
-
-
-def _simulate(rig: Rig, recording: TestRecording, quiet: bool) -> Tested:
-    from warpbrain.report.specimen_text import Tested
-    from warpbrain.simulation.specimen import compare_test
-
-    progress = Progress("tests", quiet)
-    try:
-        result = rig.run(recording, on_state=lambda share: progress.show(share, recording.name))
-    finally:
-        progress.clear()
-    return Tested(recording, result, compare_test(recording, result))

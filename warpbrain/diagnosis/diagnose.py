@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpbrain.cases.case import Case
+from warpbrain.cases.shipped import as_case
 from warpbrain.diagnosis.checking import check_errors
 from warpbrain.diagnosis.confirming import Confirming, HeldOutErrors
 from warpbrain.diagnosis.course import size_over_time
@@ -253,7 +254,7 @@ class Diagnosing:
 
 
 def diagnose(
-    case: Case,
+    case: Case | str,
     options: DiagnosisOptions | None = None,
     device: str | None = None,
     listener: Listener | None = None,
@@ -262,8 +263,8 @@ def diagnose(
 
     Parameters
     ----------
-    case : Case
-        A body, or a specimen with its tests.
+    case : Case or str
+        A body, or a specimen with its tests; also the name of a shipped case, or the path of a case folder.
     options : DiagnosisOptions, optional
     device : str, optional
         ``"cpu"``, ``"cuda:0"``, ...; the GPU if there is one.
@@ -282,6 +283,7 @@ def diagnose(
     SolveError
         If the case as declared has no equilibrium.
     """
+    case = as_case(case)
     if case.specimen is None:
         return Diagnosing(case, options, device, listener).run()
     specimen_options = (options or DiagnosisOptions()).of_specimen

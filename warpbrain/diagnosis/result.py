@@ -18,6 +18,7 @@ from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.decide import Decision
 from warpbrain.inference.predict import Prediction
 from warpbrain.physics.values import Measurement, Smallest, Value
+from warpbrain.shown import Shown
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.weighted_set import WeightedSet
@@ -134,7 +135,7 @@ class Fit:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagnosis:
+class Diagnosis(Shown):
     """A diagnosis of a body.
 
     Attributes

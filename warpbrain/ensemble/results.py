@@ -12,6 +12,7 @@ from warpbrain.cases.case import Case
 from warpbrain.ensemble.sample import Outcome, Sample
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.comparison import Comparison
+from warpbrain.shown import Shown
 from warpbrain.simulation.observation import observe
 from warpbrain.simulation.result import Statistics, displacement_statistics
 
@@ -84,7 +85,7 @@ class Fields:
 
 
 @dataclass(frozen=True)
-class EnsembleResult:
+class EnsembleResult(Shown):
     """Everything that an ensemble says.
 
     Attributes

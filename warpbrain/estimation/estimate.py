@@ -9,6 +9,7 @@ import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
+from warpbrain.cases.shipped import as_case
 from warpbrain.errors import SolveError
 from warpbrain.estimation.chain import Chain, run_chain
 from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, discretisation_error
@@ -63,7 +64,7 @@ class Listener:
 
 
 def estimate(
-    case: Case,
+    case: Case | str,
     prior: Prior | Process | None = None,
     options: EstimationOptions | None = None,
     device: str | None = None,
@@ -73,8 +74,9 @@ def estimate(
 
     Parameters
     ----------
-    case : Case
-        Its laws say what kind of law each tissue has; their parameters do not count.
+    case : Case or str
+        A case, the name of a shipped one, or the path of a case folder. Its laws say what kind of law each tissue has;
+        their parameters do not count.
     prior : Prior or Process, optional
         Of the tissues, or the generative model that gives it; the default one unless given.
     options : EstimationOptions, optional
@@ -95,7 +97,7 @@ def estimate(
     >>> posterior = estimate(find_case("0529", "single"))  # doctest: +SKIP
     >>> [marginal.interval for marginal in posterior.marginals]  # doctest: +SKIP
     """
-    return Estimation(case, prior, options, device, listener).run()
+    return Estimation(as_case(case), prior, options, device, listener).run()
 
 
 class Estimation:

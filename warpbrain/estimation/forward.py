@@ -150,7 +150,7 @@ class OneState:
 
     def __init__(self, case: Case, parameters: Parameters, theta: Floats, device: str | None, elements: str) -> None:
         self.case, self._parameters = case, parameters
-        plain, _ = plain_model_of(parameters.applied(case, theta))
+        plain = plain_model_of(parameters.applied(case, theta))
         self._plain = replace(plain, elements=elements)
         self.system = System(self._model(theta), device)
         self._last: Floats | None = None

@@ -8,8 +8,8 @@ with another: no function here looks at both.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -93,6 +93,8 @@ class Observation:
         Components of a row.
     positions : (k, 3) array
         What a wrong registration moves [m]; empty for forces.
+    edges : (n,) array
+        Mean length of the edges of the element in which each point is [m]; zero of all but points.
     over_element : (n, size, 3) array
         Of `change_over_element`; zero of all but points.
     times, references : (n,) array
@@ -110,6 +112,7 @@ class Observation:
     weights: Floats
     size: int
     positions: Floats
+    edges: Floats
     over_element: Floats
     times: Floats
     references: Floats
@@ -180,8 +183,8 @@ class Observations:
                     "by itself is looked at in the end alone"
                 )
                 continue
-            each.append(_observation(case, recording, moments))
-        return cls(tuple(each), tuple(remarks))
+            each.append((recording, _observation(case, recording, moments)))
+        return cls(_with_changes(each), tuple(remarks))
 
     @property
     def centre(self) -> Floats:
@@ -222,7 +225,7 @@ class _Part:
     weights: Floats
     size: int
     positions: Floats
-    over_element: Floats
+    edges: Floats
     at: _At
 
 
@@ -277,7 +280,8 @@ def _observation(case: Case, recording: Recording, moments: Moments) -> Observat
         weights,
         parts[0].size,
         np.concatenate([part.positions for part in parts]),
-        np.concatenate([part.over_element for part in parts]),
+        np.concatenate([part.edges for part in parts]),
+        np.zeros((len(rows), parts[0].size, 3)),
         times[rows],
         np.full(len(rows), recording.reference or 0.0),
         at,
@@ -303,8 +307,7 @@ def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Part:
         rigid = -moved_back_columns(positions, motion, centre)
         return displacement - matrix @ u, rigid, directions, by_displacement, nothing
 
-    over_element = change_over_element(recording.points[rows], recording.displacement[rows], edges)
-    return _Part(rows, weights, 3, positions, over_element, at)
+    return _Part(rows, weights, 3, positions, edges, at)
 
 
 @lru_cache(maxsize=_KEPT)
@@ -353,7 +356,7 @@ def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Part:
         values = (side * closest.distance)[:, None]
         return values, rigid, directions[:, None, :], by_displacement, csr_matrix(shape)
 
-    return _Part(rows, np.ones(len(rows)), 1, positions, np.zeros((len(rows), 1, 3)), at)
+    return _Part(rows, np.ones(len(rows)), 1, positions, np.zeros(len(rows)), at)
 
 
 def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Part:
@@ -378,7 +381,37 @@ def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Part:
         values = force - reactions[nodes].sum(axis=0)[recorded]
         return values, np.zeros((len(rows), size, 6)), np.zeros((len(rows), size, 3)), nothing, by_reactions
 
-    return _Part(rows, np.ones(len(rows)), size, np.empty((0, 3)), np.zeros((len(rows), size, 3)), at)
+    return _Part(rows, np.ones(len(rows)), size, np.empty((0, 3)), np.zeros(len(rows)), at)
+
+
+def _with_changes(each: Sequence[tuple[Recording, Observation]]) -> tuple[Observation, ...]:
+    """The observations with what points changed over an element of the mesh.
+
+    Points of one time are neighbours in whatever file they are, if they were declared to be recorded alike.
+    """
+    alike: dict[tuple[Any, ...], list[int]] = {}
+    for number, (recording, observation) in enumerate(each):
+        if isinstance(recording, PointsRecording):
+            own = number if recording.sigma is None or recording.sigmas is not None else None
+            for time in np.unique(observation.times).tolist():
+                alike.setdefault((time, recording.reference, recording.sigma, own), []).append(number)
+    changes = [observation.over_element.copy() for _, observation in each]
+    for (time, *_), numbers in alike.items():
+        rows = [np.flatnonzero(each[k][1].times == time) for k in numbers]
+        points, moved = (
+            np.concatenate(
+                [getattr(each[k][0], name)[each[k][1].rows[those]] for k, those in zip(numbers, rows, strict=True)]
+            )
+            for name in ("points", "displacement")
+        )
+        edges = np.concatenate([each[k][1].edges[those] for k, those in zip(numbers, rows, strict=True)])
+        found = change_over_element(points, moved, edges)
+        parts = np.split(found, np.cumsum([len(own) for own in rows])[:-1])
+        for k, those, part in zip(numbers, rows, parts, strict=True):
+            changes[k][those] = part
+    return tuple(
+        replace(observation, over_element=change) for (_, observation), change in zip(each, changes, strict=True)
+    )
 
 
 def _sigma(recording: Recording, rows: Ints, weights: Floats) -> Floats | None:

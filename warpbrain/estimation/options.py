@@ -37,7 +37,7 @@ class EstimationOptions:
     samples: int = 40
     chain: int = 300
     seed: int = 0
-    tolerance: float = 3e-3
+    tolerance: float = 1e-4
 
     def __post_init__(self) -> None:
         if not isinstance(self.registration, bool):

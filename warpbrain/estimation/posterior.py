@@ -20,6 +20,7 @@ from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.prediction import OverallErrors, Prediction, predictions
 from warpbrain.gp.prior import Prior
+from warpbrain.shown import Shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class Marginal:
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class Posterior(Shown):
     """The answer.
 
     Attributes

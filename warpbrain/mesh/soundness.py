@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpbrain.mesh.extent import extent
 from warpbrain.mesh.tet_mesh import Floats
 
 #: Nodes nearer to each other than this share of the body's size are at the same place.
@@ -16,8 +17,7 @@ def coincident_nodes(points: ArrayLike) -> NDArray[np.int64]:
     from scipy.spatial import cKDTree
 
     xyz: Floats = np.asarray(points, dtype=np.float64)
-    size = float(np.linalg.norm(np.ptp(xyz, axis=0)))
-    pairs = cKDTree(xyz).query_pairs(SAME_PLACE * size, output_type="ndarray")
+    pairs = cKDTree(xyz).query_pairs(SAME_PLACE * extent(xyz), output_type="ndarray")
     return np.asarray(pairs[np.lexsort(pairs.T[::-1])], dtype=np.int64)
 
 

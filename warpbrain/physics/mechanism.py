@@ -220,6 +220,8 @@ class Mechanism(Ramped, abc.ABC):
     of_specimens: ClassVar[bool] = False
     #: How its size can be read directly, if it can.
     reading: ClassVar[Reading | None] = None
+    #: What a model without it leaves out, as printed; empty: nothing that every brain has.
+    absence: ClassVar[str] = ""
     #: Key of the belief of how much of it every tissue has, whatever a case says (`about_law`); empty if of none.
     always: ClassVar[str] = ""
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.mesh.extent import extent
 from warpbrain.mesh.tet_mesh import TetMesh
 from warpbrain.problems import Problems
 from warpbrain.recordings.closest import closest_points
@@ -96,14 +97,14 @@ def check_points_inside(
 
 def _is_dot(points: Floats, mesh: TetMesh) -> bool:
     """Whether several points are so near each other that they can have been recorded in another unit only."""
-    return bool(np.ptp(points, axis=0).max() < _DOT * np.ptp(mesh.points, axis=0).max())
+    return extent(points) < _DOT * extent(mesh.points)
 
 
 def check_surface_near(recording: SurfaceRecording, mesh: TetMesh, path: Path, problems: Problems) -> None:
     """Note as a problem a recorded surface that is nowhere near the faces that it is compared with."""
     faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
     sample = recording.points[:: -(-len(recording.points) // _SAMPLE)]
-    limit = _FAR * float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    limit = _FAR * extent(mesh.points)
 
     def away(points: Floats) -> float:
         return float(np.median(closest_points(points, mesh.points, faces).distance))

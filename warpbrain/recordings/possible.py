@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.extent import extent
 from warpbrain.problems import Problems
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.recordings.text import collected
@@ -28,7 +29,7 @@ def check_possible(
         Of the recording, for messages.
     problems : Problems
     """
-    size = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    size = extent(mesh.points)
     with collected(path, problems) as found:
         if isinstance(recording, PointsRecording):
             moved = np.linalg.norm(recording.displacement, axis=1)

@@ -17,7 +17,7 @@ from warpbrain.report.page.document import Section, section, text
 from warpbrain.report.page.scene import Arrows, Field, View
 from warpbrain.report.page.viewer import viewer
 from warpbrain.report.picture import Moved, Pictures, annotations_of, arrow_colours, heading, round_factor
-from warpbrain.report.views import RESECTED, resected_elements, tissue_colours
+from warpbrain.report.views import RESECTED, tissue_colours
 
 #: A large displacement is shown this long in a view, as a part of the size of the body.
 _MOVED = 0.08
@@ -41,9 +41,10 @@ def before_and_after(pictures: Pictures | None, why_not: str) -> Section:
     )
     if len(scene.where):
         caption += f" {len(scene.where)} points were recorded: how far they moved, and how far they move here."
-    colours = {**tissue_colours(pictures.names, pictures.whole)}
-    names = {colour: pictures.names.get(label, str(label)) for label, colour in colours.items()}
-    if resected_elements(pictures.whole).any():
+    left = set(pictures.whole.tissue[~pictures.resected].tolist())
+    colours = tissue_colours(pictures.names, pictures.whole)
+    names = {colour: pictures.names.get(label, str(label)) for label, colour in colours.items() if label in left}
+    if pictures.resected.any():
         names[RESECTED] = "resected"
     names |= {colour: name for name, colour in arrow_colours(scene).items()}
     legend = "".join(

@@ -1,13 +1,11 @@
 """The picture of a case: its anatomy cut open, tissues, node sets and what was recorded, before any of it is computed.
 
-Three cuts as a radiologist holds them, and the body from outside with a quadrant taken away. The latter is projected
-and painted here, the nearest last: without a renderer it comes out the same everywhere.
+Three cuts as a radiologist holds them, and the body from outside with a corner cut out, as PyVista renders it.
 """
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,11 +17,12 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.mesh import TetMesh, boundary_faces, face_vectors
-from warpbrain.mesh.surface import paired_faces
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording, count_of
 from warpbrain.report import views
+from warpbrain.report.case_body import RenderedBody, render_body
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.slices import Cut, cut, outline
+from warpbrain.report.rendering.offscreen import RenderingError
+from warpbrain.report.slices import Cut, cut
 from warpbrain.report.summary import SET_TITLES
 from warpbrain.report.views import View
 
@@ -148,7 +147,7 @@ class _Scene:
         return float(next(s * decade for s in (1.0, 2.0, 5.0, 10.0, 20.0) if s * decade * longest >= wanted))
 
 
-def write_case_picture(path: Path, case: Case) -> None:
+def write_case_picture(path: Path, case: Case) -> str:
     """Draw a case.
 
     Parameters
@@ -156,6 +155,11 @@ def write_case_picture(path: Path, case: Case) -> None:
     path : Path
         PNG file.
     case : Case
+
+    Returns
+    -------
+    str
+        Why the body from outside is not in it; empty if it is.
     """
     from matplotlib.figure import Figure
 
@@ -164,11 +168,12 @@ def write_case_picture(path: Path, case: Case) -> None:
     panels = figure.subplots(2, 2).ravel()
     for axes, view, place, section in zip(panels[:3], scene.views, scene.places, scene.sections, strict=True):
         _draw_cut(axes, scene, view, place, section)
-    _draw_open(panels[3], scene)
+    missing = _draw_open(panels[3], scene)
     _draw_legend(figure, scene)
     # on the left, for the legend is in the other corner
     figure.suptitle(_headline(case), x=0.01, ha="left", fontsize=12, parse_math=False)
     views.save(figure, path)
+    return missing
 
 
 def _headline(case: Case) -> str:
@@ -255,184 +260,34 @@ def _cross_colour(number: int) -> str:
 # the body cut open -------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Camera:
-    """An orthographic look at the body, from above and from the sides (-1 or 1) of x and y that are given."""
-
-    sides: tuple[float, float]
-
-    @property
-    def towards(self) -> Floats:
-        """Unit vector from the body to the viewer."""
-        direction = np.array([0.5 * self.sides[0], 0.75 * self.sides[1], 0.6])
-        return direction / np.linalg.norm(direction)
-
-    @property
-    def axes(self) -> Floats:
-        """Unit vectors to the right and up in the picture, as columns."""
-        right = np.cross([0.0, 0.0, 1.0], self.towards)
-        right /= np.linalg.norm(right)
-        return np.stack([right, np.cross(self.towards, right)], axis=1)
-
-    def picture(self, vectors: Floats) -> Floats:
-        """Picture coordinates [mm] of positions or displacements [m]."""
-        return np.asarray(MILLIMETRES * vectors @ self.axes)
-
-    def brightness(self, normals: Floats) -> Floats:
-        """Brightness of surfaces under a lamp above the viewer's left shoulder."""
-        lamp = self.towards + self.axes @ (-0.4, 0.5)
-        lit = normals @ lamp / np.linalg.norm(lamp) / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
-        return np.asarray(0.45 + 0.5 * np.clip(lit, 0.0, 1.0))
-
-
-def _camera(scene: _Scene) -> _Camera:
-    """Look from the side where there is most to see: what was resected, else what was recorded."""
-    points = scene.mesh.points
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
-    if scene.resected.any():
-        seen = points[scene.mesh.tetrahedra[scene.resected].ravel()]
-    else:
-        recorded = [r.points for r in scene.tracked] + [r.points for r in scene.surfaces]
-        seen = np.concatenate([np.empty((0, 3)), *recorded])
-    aside = seen.mean(axis=0) - middle if len(seen) else np.zeros(3)
-    return _Camera((1.0 if aside[0] > 0.0 else -1.0, -1.0 if aside[1] < 0.0 else 1.0))
-
-
-def _draw_open(axes: Any, scene: _Scene) -> None:
-    """The body without the quadrant between the first two cuts and the viewer."""
-    from matplotlib.collections import LineCollection
-
-    camera = _camera(scene)
-    front = camera.sides[1]
-    z, y = scene.places[:2]
-    # two half spaces; what is in both is taken away
-    above, ahead = _Half(2, 1.0, z), _Half(1, front, y)
-    _paint_outside(axes, scene, camera, above, ahead)
-    # nothing that is left is between the cut faces and the viewer, who looks from within the quadrant
-    for section, view, place, other in zip(scene.sections, scene.views, (z, y), (ahead, above), strict=False):
-        pieces = [other.clip(_lifted(polygon, view, place)) for polygon in section.polygons]
-        # unshaded, as in the cuts, but for a difference between the two faces
-        _paint(axes, camera, pieces, scene.colours[section.elements], 1.0 if view.axis == 2 else 0.92)
-        edges = outline(scene.mesh.points, scene.boundary, view.axis, place)
-        lines = [camera.picture(piece) for piece in map(other.clip, (_lifted(e, view, place) for e in edges))]
-        axes.add_collection(LineCollection(lines, colors=views.TISSUE_EDGE, linewidths=0.9))
+def _draw_open(axes: Any, scene: _Scene) -> str:
+    """The body with a corner cut out and all that was recorded; why it is not rendered, or nothing."""
+    total = sum(map(count_of, scene.tracked))
+    arrows = f"; all {total} arrows, seen through the tissue" if total else ""
+    axes.set_title(f"a corner cut out{arrows}", fontsize=11)
+    try:
+        body = render_body(scene.case, scene.resected)
+    except RenderingError as error:
+        views.bare(axes)
+        axes.text(0.5, 0.5, textwrap.fill(str(error), 50), ha="center", va="center", transform=axes.transAxes)
+        return str(error)
+    body.show(axes)
     for number, surface in enumerate(scene.surfaces):
-        _crosses(axes, camera.picture(surface.points[_on_this_side(surface.points, scene, camera)]), number)
+        _crosses(axes, body.picture(surface.points[_on_this_side(surface.points, scene, body)]), number)
     for number, tracked in enumerate(scene.tracked):
-        _arrows(axes, camera.picture(tracked.points), camera.picture(scene.enlarged * tracked.displacement), number)
-    _frame_open(axes, scene, camera)
+        along = body.picture(tracked.points + scene.enlarged * tracked.displacement)
+        start = body.picture(tracked.points)
+        _arrows(axes, start, along - start, number)
+    return ""
 
 
-def _on_this_side(points: Floats, scene: _Scene, camera: _Camera) -> Bools:
+def _on_this_side(points: Floats, scene: _Scene, body: RenderedBody) -> Bools:
     """Which points of a surface are not on the far side of the body."""
     from scipy.spatial import KDTree
 
     corners = scene.mesh.points[scene.boundary]
     nearest = KDTree(corners.mean(axis=1)).query(points)[1]
-    return np.asarray((face_vectors(scene.mesh.points, scene.boundary) @ camera.towards)[nearest] > 0.0)
-
-
-def _paint_outside(axes: Any, scene: _Scene, camera: _Camera, above: _Half, ahead: _Half) -> None:
-    """Paint what is left of the boundary and faces the viewer, the farthest first."""
-    mesh = scene.mesh
-    corners = mesh.points[scene.boundary]
-    elements = paired_faces(mesh.tetrahedra)[1] // 4
-    normals = face_vectors(mesh.points, scene.boundary)
-    depth = corners.mean(axis=1) @ camera.towards
-    seen = np.flatnonzero(normals @ camera.towards > 0.0)
-    pieces, owners = [], []
-    for face in seen[np.argsort(depth[seen])]:
-        left = _without(corners[face], above, ahead)
-        pieces += left
-        owners += [face] * len(left)
-    _paint(axes, camera, pieces, scene.colours[elements[owners]], camera.brightness(normals[owners])[:, None])
-
-
-@dataclass(frozen=True)
-class _Half:
-    """The half space where ``side * (x[axis] - place) >= 0``."""
-
-    axis: int
-    side: float
-    place: float
-
-    def distance(self, points: Floats) -> Floats:
-        """How far inside points are; negative outside."""
-        return np.asarray(self.side * (points[:, self.axis] - self.place))
-
-    def complement(self) -> _Half:
-        """The other half."""
-        return _Half(self.axis, -self.side, self.place)
-
-    def clip(self, polygon: Floats) -> Floats:
-        """The part of a convex polygon (or of a segment) that is inside: (k, 3), empty if there is none."""
-        distance = self.distance(polygon)
-        if (distance >= 0.0).all():
-            return polygon
-        corners = []
-        for p, q, a, b in zip(polygon, np.roll(polygon, -1, 0), distance, np.roll(distance, -1), strict=True):
-            if a >= 0.0:
-                corners.append(p)
-            if (a >= 0.0) != (b >= 0.0):
-                corners.append(p + a / (a - b) * (q - p))
-        return np.array(corners).reshape(-1, 3)
-
-
-def _without(polygon: Floats, first: _Half, second: _Half) -> list[Floats]:
-    """A convex polygon less what is in both half spaces: at most two pieces."""
-    if (first.distance(polygon) <= 0.0).all() or (second.distance(polygon) <= 0.0).all():
-        return [polygon]
-    pieces = (first.complement().clip(polygon), second.complement().clip(first.clip(polygon)))
-    return [piece for piece in pieces if len(piece)]
-
-
-def _lifted(corners: Floats, view: View, place: float) -> Floats:
-    """Corners in a cut as points in space."""
-    return np.insert(corners, view.axis, place, axis=1)
-
-
-def _paint(
-    axes: Any, camera: _Camera, pieces: Sequence[Floats], colours: NDArray[np.str_], brightness: float | Floats
-) -> None:
-    from matplotlib.collections import PolyCollection
-    from matplotlib.colors import to_rgb
-
-    rgb = np.array([to_rgb(colour) for colour in colours]).reshape(-1, 3) * brightness
-    polygons = [camera.picture(piece) for piece in pieces]
-    axes.add_collection(PolyCollection(polygons, facecolors=rgb, edgecolors=rgb, linewidths=_SEAM))
-
-
-def _frame_open(axes: Any, scene: _Scene, camera: _Camera) -> None:
-    shown = camera.picture(scene.mesh.points)
-    low, high = shown.min(axis=0) - scene.margin, shown.max(axis=0) + scene.margin
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    views.bare(axes)
-    _draw_directions(axes, scene, camera)
-    total = sum(map(count_of, scene.tracked))
-    arrows = f"; all {total} arrows, seen through the tissue" if total else ""
-    axes.set_title(f"a quadrant taken away{arrows}", fontsize=11)
-
-
-def _draw_directions(axes: Any, scene: _Scene, camera: _Camera) -> None:
-    """Three letters on short lines, in the corner where there is no body."""
-    origin = np.array([0.08, 0.08])
-    names = ("LR", "PA", "IS") if scene.case.specimen is None else (("-x", "+x"), ("-y", "+y"), ("-z", "+z"))
-    for axis, side in enumerate((*camera.sides, 1.0)):
-        vector = np.zeros(3)
-        vector[axis] = side
-        tip = 0.05 * camera.axes.T @ vector
-        axes.annotate(
-            names[axis][int(side > 0.0)],
-            xy=origin,
-            xytext=origin + 1.5 * tip,
-            xycoords="axes fraction",
-            fontsize=11,
-            color="#7a7a7a",
-            ha="center",
-            va="center",
-            arrowprops={"arrowstyle": "-", "color": "#7a7a7a"},
-        )
+    return np.asarray((face_vectors(scene.mesh.points, scene.boundary) @ body.camera.towards)[nearest] > 0.0)
 
 
 # the legend --------------------------------------------------------------------------------------------------------

@@ -80,6 +80,12 @@ def write_fields(path: Path, fields: Fields) -> None:
     Point arrays: ``displacement_mean``, ``displacement_sd`` and ``displacement_pNN``, of each component; ``size_mean``
     and so on, of the displacement's size; and the node sets. Cell array: ``tissue``.
     """
+    with whole_file(path) as scratch:
+        write_vtu(scratch, file_of_fields(fields))
+
+
+def file_of_fields(fields: Fields) -> Any:
+    """What `write_fields` writes, as a `meshio.Mesh`."""
     import meshio
 
     mesh = fields.mesh
@@ -89,8 +95,6 @@ def write_fields(path: Path, fields: Fields) -> None:
         arrays[f"{name}_sd"] = MILLIMETRES * spread.sd
         for level, values in spread.percentiles.items():
             arrays[f"{name}_p{level:02d}"] = MILLIMETRES * values
-    file = meshio.Mesh(
+    return meshio.Mesh(
         MILLIMETRES * mesh.points, [("tetra", mesh.tetrahedra)], point_data=arrays, cell_data={"tissue": [mesh.tissue]}
     )
-    with whole_file(path) as scratch:
-        write_vtu(scratch, file)

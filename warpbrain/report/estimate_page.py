@@ -80,7 +80,7 @@ def write_estimate_page(
         _recordings(said, posterior),
         before_and_after(drawn, pictures if isinstance(pictures, str) else ""),
         in_three_dimensions(state.mesh, state.u, fields, moved_of(posterior), places),
-        section("What the model leaves out", listed(left_out(model_of(posterior.case)[0]))),
+        section("What the model leaves out", listed(left_out(model_of(posterior.case)))),
         _doubts(said),
         section("What was assumed", listed(case["assumptions"]), _prior(said)),
         _made(said),

@@ -27,10 +27,19 @@ def write_result(path: Path, result: Result, mesh_error: Floats | None = None) -
     ``principal_stretches`` (descending), ``von_mises`` and ``pressure`` [Pa] of the Cauchy stress and, of quadratic
     elements, ``displacement_of_edges`` [mm]: x, y, z in the middle of the edges 01, 02, 03, 12, 13 and 23 of each cell.
     """
+    file = file_of_result(result)
+    if mesh_error is not None:
+        file.point_data["mesh_error"] = mesh_error * MILLIMETRES
+    with whole_file(path) as temporary:
+        write_vtu(temporary, file)
+
+
+def file_of_result(result: Result) -> Any:
+    """What `write_result` writes, as a `meshio.Mesh`."""
     import meshio
 
     mesh = result.mesh
-    file = meshio.Mesh(
+    return meshio.Mesh(
         mesh.points * MILLIMETRES,
         [("tetra", mesh.tetrahedra)],
         point_data={
@@ -38,7 +47,6 @@ def write_result(path: Path, result: Result, mesh_error: Floats | None = None) -
             **{name: members.astype(np.uint8) for name, members in mesh.node_sets.items()},
             "displacement": result.u * MILLIMETRES,
             "reaction": result.reactions,
-            **({} if mesh_error is None else {"mesh_error": mesh_error * MILLIMETRES}),
             **result.nodal_pressures,
         },
         cell_data={
@@ -50,8 +58,6 @@ def write_result(path: Path, result: Result, mesh_error: Floats | None = None) -
             **({} if result.u_middles is None else {MIDDLES: [_in_rows(result.u_middles)]}),
         },
     )
-    with whole_file(path) as temporary:
-        write_vtu(temporary, file)
 
 
 def _in_rows(u_middles: Floats) -> Floats:

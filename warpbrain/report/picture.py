@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.comparison import Comparison
 from warpbrain.recordings.recording import PointsRecording, Recording
@@ -75,6 +75,8 @@ class Pictures:
     images : dict of str to (height, width, 3) uint8 array
     cameras : dict of str to Camera
     whole : TetMesh
+    resected : (m,) bool array
+        Elements of it that were taken out.
     names : dict of int to str
         Of the tissues.
     """
@@ -83,6 +85,7 @@ class Pictures:
     images: dict[str, Any]
     cameras: dict[str, Camera]
     whole: TetMesh
+    resected: Bools
     names: dict[int, str]
 
 
@@ -106,7 +109,17 @@ def pictures_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str],
     """
     scene = scene_of(whole, mesh, u, names, moved)
     cameras = cameras_of(scene)
-    return Pictures(scene, render(scene, cameras, _SIZE), cameras, whole, names)
+    return Pictures(scene, render(scene, cameras, _SIZE), cameras, whole, taken_out(whole, mesh), names)
+
+
+def taken_out(whole: TetMesh, mesh: TetMesh) -> Bools:
+    """Elements (m,) of the anatomy that are not in what is left of it."""
+    from scipy.spatial import cKDTree
+
+    if len(whole.tetrahedra) == len(mesh.tetrahedra):
+        return np.zeros(len(whole.tetrahedra), dtype=bool)
+    near = 1e-9 * float(np.ptp(whole.points, axis=0).max())
+    return np.asarray(cKDTree(mesh.centres).query(whole.centres)[0] > near)
 
 
 def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> Scene:
@@ -116,7 +129,7 @@ def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], mo
 
     sizes = MILLIMETRES * np.linalg.norm(u, axis=1)
     size = MILLIMETRES * float(np.ptp(whole.points, axis=0).max())
-    resected = views.resected_elements(whole)
+    resected = taken_out(whole, mesh)
     removed = whole.without(resected)[0] if resected.any() else None
     # nodes of what is left first, as in `mesh`; those that only what was removed has come after them
     points, tetrahedra = mesh.points, mesh.tetrahedra
@@ -168,22 +181,20 @@ def cameras_of(scene: Scene) -> dict[str, Camera]:
     """Where each picture is seen from: the body, before and after, fills it."""
     moved = scene.points + scene.exaggeration * scene.u
     everything = np.concatenate([scene.points, moved[np.unique(scene.tetrahedra[~scene.removed])]])
-    lateral = scene.side[0]
-    towards = np.array([lateral * 0.80, 0.85, 0.62])
-    towards /= np.linalg.norm(towards)
-    right = np.cross([0.0, 0.0, 1.0], towards)
-    right /= np.linalg.norm(right)
-    oblique = _fitted(everything, right, np.cross(towards, right))
+    oblique = _seen_from(scene.side * [0.80, 0.85, 0.62], everything)
     tips = np.concatenate([everything, scene.where + scene.arrows * scene.recorded])
-    side = np.array([lateral, 0.25, 0.12])
-    side /= np.linalg.norm(side)
-    across = np.cross([0.0, 0.0, 1.0], side)
-    across /= np.linalg.norm(across)
-    cameras = {BEFORE: oblique, AFTER: oblique, MOTION: _fitted(tips, across, np.cross(side, across))}
+    cameras = {BEFORE: oblique, AFTER: oblique, MOTION: _seen_from(scene.side * [1.0, 0.25, 0.12], tips)}
     x, y, z = np.eye(3)
     for name, (right, up) in {AXIAL: (-x, y), CORONAL: (-x, z), SAGITTAL: (-y, z)}.items():
         cameras[name] = _fitted(everything, right, up)
     return cameras
+
+
+def _seen_from(towards: Floats, points: Floats) -> Camera:
+    """A camera that points (n, 3) fill, with what is above in it above; `towards` is from them to the viewer."""
+    right = np.cross([0.0, 0.0, 1.0], towards)
+    right /= np.linalg.norm(right)
+    return _fitted(points, right, np.cross(towards / np.linalg.norm(towards), right))
 
 
 def _fitted(points: Floats, right: Floats, up: Floats) -> Camera:
@@ -244,7 +255,7 @@ def write_picture(path: Path, pictures: Pictures, title: str, subtitles: Sequenc
     figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - 0.24 * lines / high))
     axes = figure.subplots(2, 3).ravel()
     for panel, (name, image) in zip(axes, pictures.images.items(), strict=True):
-        _show(panel, image, annotations_of(pictures, name))
+        show(panel, image, annotations_of(pictures, name))
         panel.set_title(heading(pictures, name), fontsize=10)
     shades = ScalarMappable(cmap="viridis")
     shades.set_clim(0.0, scene.top)
@@ -259,8 +270,7 @@ def write_picture(path: Path, pictures: Pictures, title: str, subtitles: Sequenc
 def _entries(pictures: Pictures) -> list[tuple[Any, str]]:
     from matplotlib.lines import Line2D
 
-    resected = views.resected_elements(pictures.whole)
-    entries = views.tissue_entries(pictures.names, pictures.whole, resected)
+    entries = views.tissue_entries(pictures.names, pictures.whole, pictures.resected)
     return entries + [
         (Line2D([], [], color=colour, linewidth=2.5), name) for name, colour in arrow_colours(pictures.scene).items()
     ]
@@ -317,7 +327,13 @@ class Annotations:
 
 def annotations_of(pictures: Pictures, name: str) -> Annotations:
     """What is written on a picture."""
-    camera, shape = pictures.cameras[name], pictures.images[name].shape
+    return notes_on(pictures.cameras[name], pictures.images[name].shape, pictures.whole)
+
+
+def notes_on(
+    camera: Camera, shape: tuple[int, ...], whole: TetMesh, ends: Sequence[str] = ("R", "A", "S", "L", "P", "I")
+) -> Annotations:
+    """What is written on a picture (height, width, ...) of a body; `ends` are those of x, y and z, then the others."""
     high = camera.half_height
     across = high * shape[1] / shape[0]
     letters, lines = [], []
@@ -327,21 +343,22 @@ def annotations_of(pictures: Pictures, name: str) -> Annotations:
             *((0.0, -0.95 * high, -camera.up), (0.0, 0.95 * high, camera.up)),
         ):
             axis = int(np.argmax(np.abs(direction)))
-            letters.append((x, y, "RAS"[axis] if direction[axis] > 0.0 else "LPI"[axis]))
+            letters.append((x, y, ends[axis] if direction[axis] > 0.0 else ends[axis + 3]))
     else:
         x, y, length = 0.84 * across, -0.80 * high, 0.11 * high
-        for axis, letter in enumerate("RAS"):
+        for axis, letter in enumerate(ends[:3]):
             right, up = length * float(camera.right[axis]), length * float(camera.up[axis])
             # what points to the viewer has no direction here
             if math.hypot(right, up) > 0.35 * length:
                 lines.append((x, y, x + right, y + up))
                 letters.append((x + 1.4 * right, y + 1.4 * up, letter))
-    length = views.scale_length(pictures.whole)
+    length = views.scale_length(whole)
     bar = (-0.94 * across, -0.93 * high, length, f"{length:g} mm")
     return Annotations(across, high, tuple(letters), tuple(lines), bar)
 
 
-def _show(panel: Any, image: Any, notes: Annotations) -> None:
+def show(panel: Any, image: Any, notes: Annotations) -> None:
+    """Draw a picture and what is written on it into a panel of a figure, whose units are then mm from its middle."""
     panel.imshow(image, extent=(-notes.across, notes.across, -notes.high, notes.high))
     views.bare(panel)
     for x, y, letter in notes.letters:

@@ -13,7 +13,7 @@ from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.tables import table
 from warpbrain.report.run_page import recordings_table, remarks, tissue_table, versions
 from warpbrain.report.specimen_picture import tests_figure
-from warpbrain.report.specimen_text import Tested
+from warpbrain.simulation.specimen_run import Tested
 
 
 def write_specimen_page(path: Path, summary: Mapping[str, Any], tests: Sequence[Tested]) -> None:

@@ -14,13 +14,13 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.report import views
-from warpbrain.report.specimen_text import Tested
 from warpbrain.simulation.specimen import SHOWN, interpolated
+from warpbrain.simulation.specimen_run import Tested
 
 #: Colour and shape of recorded points by role; told apart by the colour-blind and without any colour.
 _STYLES = {"fit": ("#0072b2", "o"), "check": ("#d55e00", "x")}
 _SIMULATED = "#000000"
-_COLUMNS = 3
+COLUMNS = 3
 
 
 def write_tests_picture(path: Path, tests: Sequence[Tested], title: str, subtitle: str) -> None:
@@ -34,7 +34,7 @@ def write_tests_picture(path: Path, tests: Sequence[Tested], title: str, subtitl
         At least one.
     title, subtitle : str
     """
-    figure = tests_figure(tests, _COLUMNS)
+    figure = tests_figure(tests, COLUMNS)
     # the title is the user's free text, in which a dollar sign begins no formula
     figure.suptitle(f"{title}\n{subtitle}", fontsize=12, parse_math=False)
     views.save(figure, path)

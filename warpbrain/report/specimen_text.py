@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +12,13 @@ import numpy as np
 from warpbrain.atomic import whole_file
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
-from warpbrain.recordings.comparison import Comparison
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.summary import describe_case, elements_lines
 from warpbrain.simulation.locking import largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.specimen import SHOWN, TestResult
+from warpbrain.simulation.specimen_run import Tested
 
 #: How the grips hold a specimen, in words.
 _GRIPS = {
@@ -55,15 +54,6 @@ _COLUMNS = (
     *("recording", "mode", "role", "row", "t_s", "quantity", "imposed", "imposed_unit"),
     *("recorded", "computed", "difference", "unit"),
 )
-
-
-@dataclass(frozen=True)
-class Tested:
-    """A test, its simulation and how far they are apart."""
-
-    recording: TestRecording
-    result: TestResult
-    comparison: Comparison
 
 
 def describe_specimen(

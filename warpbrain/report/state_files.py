@@ -116,10 +116,14 @@ def write_estimated_state(path: Path, posterior: Posterior) -> None:
     Point arrays: ``displacement`` [mm] and ``displacement_sd`` of its components [mm]: what is not known of the tissue,
     to first order about that state.
     """
+    _write(path, file_of_estimate(posterior))
+
+
+def file_of_estimate(posterior: Posterior) -> Any:
+    """What `write_estimated_state` writes, as a `meshio.Mesh`."""
     du, covariance = posterior.best.linearised.du, posterior.covariance
     variance = np.einsum("pnk,pq,qnk->nk", du, covariance, du)
-    _write(
-        path,
+    return _file(
         posterior.case.remaining[0],
         {
             "displacement": MILLIMETRES * posterior.best.point.state.u,
@@ -139,22 +143,22 @@ def write_diagnosed_state(path: Path, diagnosis: Diagnosis) -> None:
     state = diagnosis.base.at if refit is None else refit.state
     mesh = state.system.model.mesh
     nearest = cKDTree(where.sites).query(mesh.points)[1]
-    _write(
-        path,
-        mesh,
-        {
-            "displacement": MILLIMETRES * state.u,
-            "significant": (where.scores[nearest] > where.threshold).astype(np.uint8),
-            "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
-        },
-    )
+    arrays = {
+        "displacement": MILLIMETRES * state.u,
+        "significant": (where.scores[nearest] > where.threshold).astype(np.uint8),
+        "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
+    }
+    _write(path, _file(mesh, arrays))
 
 
-def _write(path: Path, mesh: TetMesh, arrays: dict[str, Any]) -> None:
+def _file(mesh: TetMesh, arrays: dict[str, Any]) -> Any:
     import meshio
 
-    file = meshio.Mesh(
+    return meshio.Mesh(
         MILLIMETRES * mesh.points, [("tetra", mesh.tetrahedra)], point_data=arrays, cell_data={"tissue": [mesh.tissue]}
     )
+
+
+def _write(path: Path, file: Any) -> None:
     with whole_file(path) as scratch:
         write_vtu(scratch, file)

@@ -10,6 +10,7 @@ from typing import Any
 from warpbrain import __version__
 from warpbrain.cases.case import Case
 from warpbrain.cases.checking import NOTHING_ACTS
+from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model, unaware_of_midsides
 from warpbrain.simulation.result import Result
@@ -24,19 +25,16 @@ SET_TITLES = {
     "fixed": "skull base (fixed)",
 }
 
-#: What no model of this version holds, said with every run.
-_LEFT_OUT = (
-    "unless assumed: contact with the skull away from the nodes that are fixed; falx and tentorium; pressure of "
-    "fluid in ventricles and cavity; viscosity other than damping; direction of fibres; flow of fluid through tissue"
-)
-
 
 def left_out(model: Model, instead: str | None = None) -> list[str]:
     """What a model leaves out, a sentence each; `instead` as of `locking_sentences`."""
     unaware = unaware_of_midsides(model)
     if instead is None and unaware and largest_poisson(model) > NEARLY_INCOMPRESSIBLE:
         instead = f"{', '.join(unaware)} cannot act on tet10-mixed, which do not lock"
-    return [_LEFT_OUT, *locking_sentences(model.elements, largest_poisson(model), instead)]
+    assumed = {type(mechanism) for mechanism in (*model.mechanisms, *model.loads)}
+    absent = [each.absence for each in mechanisms().values() if each.absence and each not in assumed]
+    sentences = [f"not assumed: {'; '.join(absent)}"] if absent else []
+    return [*sentences, *locking_sentences(model.elements, largest_poisson(model), instead)]
 
 
 def machine() -> dict[str, str]:
@@ -76,6 +74,7 @@ def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[s
                 "shear_modulus_Pa": tissue.known_law.shear_modulus,
             }
             for label, tissue in sorted(case.tissues.items())
+            if (model.mesh.tissue == label).any()
         },
         "assumptions": list(case.assumptions),
         "left_out": left_out(model),

@@ -154,11 +154,13 @@ def bare(axes: Any) -> None:
 
 
 def tissue_entries(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> list[tuple[Any, str]]:
-    """Legend entries of the tissues and of what was resected."""
+    """Legend entries of the tissues that something is left of, and of what was resected."""
     from matplotlib.patches import Patch
 
-    entries = []
+    entries, left = [], set(np.unique(mesh.tissue[~resected]).tolist())
     for label, colour in sorted(tissue_colours(names, mesh).items()):
+        if label not in left:
+            continue
         entries.append((Patch(facecolor=colour, edgecolor=TISSUE_EDGE), names.get(label, str(label))))
     if resected.any():
         entries.append((Patch(facecolor=RESECTED), "resected"))

@@ -38,7 +38,7 @@ def states_at_rest(case: Case, system: System, end: NodalState, tolerance: float
         reached[0] = end
     for time, number in zip(moments.times, moments.numbers, strict=True):
         if number not in reached:
-            model = replace(model_of(moments.cases[number])[0], elements=system.model.elements)
+            model = replace(model_of(moments.cases[number]), elements=system.model.elements)
             other = System(model, str(system.device), system.precision.name)
             found = EquilibriumSolver(other, EquilibriumOptions(tolerance=tolerance)).solve(start=near)
             other.u.assign(found.u)

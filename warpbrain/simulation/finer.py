@@ -95,7 +95,7 @@ class FinerCase:
     @cached_property
     def _plain(self) -> Model:
         """Without mechanisms."""
-        return plain_model_of(self.case)[0]
+        return plain_model_of(self.case)
 
 
 def prolongation(ends: NDArray[np.integer], count: int) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpbrain.cases.boundary import Contact, Displaced, Fixed, Forced, Pressed, Sliding
 from warpbrain.cases.case import Case
@@ -17,21 +16,19 @@ from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.model import Material, Model, Motion
 
 
-def model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
+def model_of(case: Case) -> Model:
     """The model of a case, as by `plain_model_of`, with all that the case assumes."""
-    plain, nodes = plain_model_of(case)
-    return with_mechanisms(plain, case.mechanisms), nodes
+    return with_mechanisms(plain_model_of(case), case.mechanisms)
 
 
-def plain_model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
+def plain_model_of(case: Case) -> Model:
     """The model of a case without the mechanisms that it assumes; see `warpbrain.simulation.assumed`.
 
     Returns
     -------
-    model : Model
-        Of the tissue that is left: a resection is done here.
-    nodes : (n,) int array
-        For each node of the model its id in the case's whole mesh.
+    Model
+        Of the tissue that is left: a resection is done here. `Case.remaining` says which node of the whole mesh each of
+        its nodes is.
 
     Raises
     ------
@@ -77,4 +74,4 @@ def plain_model_of(case: Case) -> tuple[Model, NDArray[np.int32]]:
         }
     except InputError as error:
         raise InputError(f"{case.path}: [tissue] {error}") from None
-    return Model(mesh, materials, case.density, constrained, prescribed, loads, mechanisms, motions), nodes
+    return Model(mesh, materials, case.density, constrained, prescribed, loads, mechanisms, motions)

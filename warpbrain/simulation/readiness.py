@@ -14,7 +14,7 @@ def why_not(case: Case) -> str:
     """Why a sound case cannot be run as it stands; empty if it can."""
     try:
         if case.specimen is None:
-            require_held(model_of(case)[0])
+            require_held(model_of(case))
             return ""
         specimen_of(case)
         for tissue in case.tissues.values():

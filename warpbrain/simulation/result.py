@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.mesh import TetMesh
+from warpbrain.shown import Shown
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
@@ -44,7 +45,7 @@ class NodalState:
 
 
 @dataclass(frozen=True)
-class Result:
+class Result(Shown):
     """The state of a body.
 
     Attributes

@@ -41,7 +41,7 @@ def test_its_weight_is_found_where_the_mesh_is_taken_for_exact() -> None:
         gravity_axis=(0.0, 0.0, -1.0),
     )
     weight = Gravity(direction=(0.0, 0.0, -1.0), density=1000.0)
-    model, _ = model_of(replace(case, mechanisms=(weight,)))
+    model = model_of(replace(case, mechanisms=(weight,)))
     u = EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u
     assert -u[:, 2].min() > 0.5 * LENGTH
     rng = np.random.default_rng(0)

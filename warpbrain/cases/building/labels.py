@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.cases.building.cleaning import finished, first_pass, opened_out, small_pieces
+from warpbrain.cases.building.cleaning import finished, opened_out, small_pieces
 from warpbrain.cases.building.crumbs import crumbs_given_away
 from warpbrain.cases.building.cutting import compact, cut
 from warpbrain.cases.building.errors import BuildError
@@ -45,6 +45,8 @@ FEWEST_NODES = 60
 NEAR = 0.06
 TRIALS = 16
 STEP = 0.012
+# how many lattices are tried
+LATTICES = 6
 # where to look [element sizes] for what lies beyond an outer face
 BEYOND = 0.4
 # by how many degrees the bars for the angles may be missed if no trial clears them
@@ -124,8 +126,8 @@ def mesh_labels(
     progress(f"smoothing the labels for elements of {chosen:.3g} mm")
     fields = make_fields(regions, chosen)
     progress("cutting the lattice along the surfaces")
-    notes = list(regions.notes)
-    cells = first_pass(_discretised(fields, assignment, chosen, notes), FIRST_EDGE * chosen)
+    cells, found = _without_needles(fields, assignment, chosen)
+    notes = [*regions.notes, *found]
     progress("meshing")
     made = _made(cells, chosen, notes)
     numbers = np.array([0, *assignment.tissues])
@@ -160,9 +162,20 @@ def _check_size(volume: float, size: float) -> None:
         raise BuildError(f"--size {size:g}: too large for {volume / 1000:.3g} cm3 of tissue: at most {most:.2g} mm")
 
 
-def _discretised(fields: LabelFields, assignment: Assignment, size: float, notes: list[str]) -> Cells:
+def _without_needles(fields: LabelFields, assignment: Assignment, size: float) -> tuple[Cells, list[str]]:
+    """The cut lattice without the needles that cutting leaves, and what is to be noted of it."""
+    for trial in range(LATTICES):
+        notes: list[str] = []
+        cut_lattice = _discretised(fields, assignment, size, LATTICE * size * (1 - trial * STEP), notes)
+        # MMG gives up on some lattices and not on one that is a little finer
+        if (cells := remesh(cut_lattice, FIRST_EDGE * size)) is not None:
+            return cells, notes
+    raise BuildError(f"MMG could not mesh the labels with elements of about {size:.3g} mm: try another --size")
+
+
+def _discretised(fields: LabelFields, assignment: Assignment, size: float, spacing: float, notes: list[str]) -> Cells:
     """The lattice cut along every surface; labels are 1, 2, ... in the order of the assignment."""
-    crumb, spacing = CRUMB * size**3, LATTICE * size
+    crumb = CRUMB * size**3
     lower, upper = fields.box()
     points, tetrahedra = bcc_lattice(lower - 1.5 * spacing, upper + 1.5 * spacing, spacing)
     # its least value is that of the far outside

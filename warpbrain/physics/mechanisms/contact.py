@@ -34,6 +34,7 @@ from warpbrain.kernels.distance_field import smooth_distance
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
+from warpbrain.mesh.extent import extent
 from warpbrain.mesh.free_surfaces import FreeSurface
 from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.distance_field import DistanceField
@@ -100,6 +101,7 @@ class Contact(Mechanism):
     }
     sentence: ClassVar[str] = "The brain's surface is not stuck to the skull: it slides along it, or lifts off."
     example: ClassVar[str] = "contact:nodes=side,state=lifting"
+    absence: ClassVar[str] = "contact with the skull away from the nodes that are fixed"
     confused_with: ClassVar[tuple[str, ...]] = ("traction", "gravity")
     needs: ClassVar[tuple[str, ...]] = ("points near the surface",)
     switches: ClassVar[bool] = True
@@ -113,9 +115,7 @@ class Contact(Mechanism):
         members = mesh.node_sets[self.nodes]
         if not members[mesh.boundary].any():
             raise ParameterError("nodes", f"node set '{self.nodes}' holds no node of the surface")
-        size, held, body = (
-            np.linalg.norm(np.ptp(p, axis=0)) for p in (self.surface.points, mesh.points[members], mesh.points)
-        )
+        size, held, body = map(extent, (self.surface.points, mesh.points[members], mesh.points))
         if size < 0.5 * held or size > 100.0 * body:
             raise ParameterError(
                 "surface",

@@ -117,6 +117,7 @@ class Drainage(Mechanism):
     kind: ClassVar[str] = "drainage"
     changes_by_itself: ClassVar[bool] = True
     example: ClassVar[str] = "drainage:permeability=1e-9,exchange=1e-6,capillary_pressure=1000"
+    absence: ClassVar[str] = "flow of fluid through tissue"
     enters: ClassVar[Enters] = Enters("beside", "W_fluid")
     together: ClassVar[Mapping[str, str]] = {
         "asymmetry": "The law is that of the drained skeleton.",

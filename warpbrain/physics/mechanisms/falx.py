@@ -69,6 +69,7 @@ class Falx(Mechanism):
     }
     sentence: ClassVar[str] = "A stiff membrane, such as the falx, holds the tissue on both sides of it."
     example: ClassVar[str] = "falx:nodes=falx"
+    absence: ClassVar[str] = "falx and tentorium"
     confused_with: ClassVar[tuple[str, ...]] = ("inclusion", "contact")
     switches: ClassVar[bool] = True
     several: ClassVar[bool] = True

@@ -148,6 +148,7 @@ class Fibres(Mechanism):
     }
     sentence: ClassVar[str] = "Nerve fibres make the tissue stiffer along their direction."
     example: ClassVar[str] = "fibres:direction=1/0/0,stiffness=2000"
+    absence: ClassVar[str] = "direction of fibres"
     confused_with: ClassVar[tuple[str, ...]] = ("asymmetry", "inclusion")
     needs: ClassVar[tuple[str, ...]] = ("loads along and across the fibres",)
     several: ClassVar[bool] = True

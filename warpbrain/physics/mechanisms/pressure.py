@@ -83,6 +83,7 @@ class Pressure(Mechanism):
     }
     sentence: ClassVar[str] = "Fluid presses on part of the surface, more than on the rest of it."
     example: ClassVar[str] = "pressure:nodes=ventricle,value=300"
+    absence: ClassVar[str] = "pressure of fluid in ventricles and cavity"
     confused_with: ClassVar[tuple[str, ...]] = ("gravity", "swelling")
     several: ClassVar[bool] = True
     # 2 mm of water in a manometer

@@ -91,6 +91,7 @@ class Viscoelasticity(Mechanism):
     }
     sentence: ClassVar[str] = "Tissue resists fast deformation more than slow, and its stress relaxes."
     example: ClassVar[str] = "viscoelasticity:moduli=1,times=10"
+    absence: ClassVar[str] = "viscosity other than damping"
     confused_with: ClassVar[tuple[str, ...]] = ("drainage",)
     needs: ClassVar[tuple[str, ...]] = ("two times or more, or two rates",)
 

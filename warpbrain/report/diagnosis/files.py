@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,13 +23,19 @@ def write_map(path: Path, found: Diagnosis) -> None:
     threshold of all places), ``region`` (cannot be told from the best place), ``detectable_force`` [mN] and
     ``blind`` (no force of the size that is seen elsewhere would be), ``displacement`` of the base state [mm].
     """
+    with whole_file(path) as temporary:
+        write_vtu(temporary, file_of_map(found))
+
+
+def file_of_map(found: Diagnosis) -> Any:
+    """What `write_map` writes, as a `meshio.Mesh`."""
     import meshio
     from scipy.spatial import cKDTree
 
     mesh, where = found.base.at.system.model.mesh, found.map
     nearest = cKDTree(where.sites).query(mesh.points)[1]
     scores = where.scores[nearest]
-    file = meshio.Mesh(
+    return meshio.Mesh(
         mesh.points * MILLIMETRES,
         [("tetra", mesh.tetrahedra)],
         point_data={
@@ -41,8 +48,6 @@ def write_map(path: Path, found: Diagnosis) -> None:
         },
         cell_data={"tissue": [mesh.tissue]},
     )
-    with whole_file(path) as temporary:
-        write_vtu(temporary, file)
 
 
 def write_explained(folder: Path, case: Case) -> None:

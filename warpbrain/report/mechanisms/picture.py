@@ -95,7 +95,7 @@ def _draw_phantom(axes: Any, case: Case) -> None:
         [drawn] = axes.plot(x[:, 0], x[:, 2], mark, color=colour, markersize=4.5, markeredgecolor="white", mew=0.4)
         entries.append((drawn, label))
     names = {label: tissue.name for label, tissue in case.tissues.items()}
-    entries = [*views.tissue_entries(names, mesh, np.zeros(0, dtype=bool)), *entries]
+    entries = [*views.tissue_entries(names, mesh, np.zeros(len(mesh.tissue), dtype=bool)), *entries]
     axes.legend(*zip(*entries, strict=True), loc="lower center", ncols=4, fontsize=8, frameon=False)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pyvista
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats
 from warpbrain.report.rendering.scene import AFTER, BEFORE, COMPUTED, CUTS, MOTION, NAMES, RECORDED, Camera, Scene
 
 #: Colours of where surfaces were, and of arrows over colours.
@@ -21,11 +21,12 @@ _SIDES = 10
 
 
 def screenshot(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -> Any:
-    """All pictures side by side, (height, width * 6, 3) uint8; no display is needed."""
+    """The pictures that have cameras side by side, (height, width * k, 3) uint8; no display is needed."""
+    names = [name for name in NAMES if name in cameras]
     plotter = pyvista.Plotter(
-        off_screen=True, shape=(1, len(NAMES)), window_size=(size[0] * len(NAMES), size[1]), border=False
+        off_screen=True, shape=(1, len(names)), window_size=(size[0] * len(names), size[1]), border=False
     )
-    for column, name in enumerate(NAMES):
+    for column, name in enumerate(names):
         plotter.subplot(0, column)
         draw(plotter, scene, name, cameras[name])
         look(plotter, cameras[name])
@@ -48,7 +49,9 @@ def draw(plotter: Any, scene: Scene, name: str, camera: Camera) -> None:
     """Draw one of `NAMES` into the present picture of a plotter."""
     plotter.set_background("white")
     if name == BEFORE:
-        for part in cut_open(body_of(scene, before=True), scene):
+        # what was removed is there whole, even where the corner is cut out
+        gone = [_surface(body_of(scene, scene.removed))] if scene.removed.any() else []
+        for part in [*cut_open(body_of(scene, ~scene.removed), scene), *gone]:
             plotter.add_mesh(part, scalars=_TISSUE, rgb=True, preference="cell", **_matt(part))
     elif name == AFTER:
         draw_after(plotter, scene, scene.exaggeration)
@@ -60,7 +63,7 @@ def draw(plotter: Any, scene: Scene, name: str, camera: Camera) -> None:
 
 def draw_after(plotter: Any, scene: Scene, exaggeration: float) -> None:
     """The body after, a corner cut out, and, where it has gone away, a ghost of it before."""
-    body = body_of(scene, before=False)
+    body = body_of(scene, ~scene.removed)
     for part in cut_open(body, scene):
         _coloured(plotter, part.warp_by_vector(_U, factor=exaggeration), scene, **_matt(part))
     # the far side of its surface, which the body hides but where it has left
@@ -68,9 +71,8 @@ def draw_after(plotter: Any, scene: Scene, exaggeration: float) -> None:
     plotter.add_mesh(ghost, color=GHOST, opacity=0.35, culling="front", lighting=False)
 
 
-def body_of(scene: Scene, before: bool) -> Any:
-    """The tetrahedra with what they carry: all of them, or those that are left."""
-    kept = np.ones(len(scene.tetrahedra), dtype=bool) if before else ~scene.removed
+def body_of(scene: Scene, kept: Bools) -> Any:
+    """Some of the tetrahedra (m,), with what they carry."""
     cells = scene.tetrahedra[kept]
     grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: cells}, np.asarray(scene.points, dtype=np.float64))
     grid.point_data[_U] = scene.u
@@ -124,7 +126,7 @@ def _coloured(plotter: Any, part: Any, scene: Scene, **options: Any) -> None:
 def _draw_motion(plotter: Any, scene: Scene) -> None:
     """What was recorded beside what was computed; where nothing was, how the surface moves."""
     plotter.add_mesh(
-        _surface(body_of(scene, before=False)), color="#a89c92", opacity=0.22, smooth_shading=True, ambient=0.4
+        _surface(body_of(scene, ~scene.removed)), color="#a89c92", opacity=0.22, smooth_shading=True, ambient=0.4
     )
     size = float(np.ptp(scene.points, axis=0).max())
     if len(scene.where):
@@ -133,7 +135,7 @@ def _draw_motion(plotter: Any, scene: Scene) -> None:
         for vectors, colour in ((scene.recorded, RECORDED), (scene.computed, COMPUTED)):
             _arrows(plotter, scene.where, scene.arrows * vectors, colour, size)
         return
-    used = np.unique(_surface(body_of(scene, before=False)).point_data["vtkOriginalPointIds"])
+    used = np.unique(_surface(body_of(scene, ~scene.removed)).point_data["vtkOriginalPointIds"])
     chosen = used[_thinned(scene.points[used], _GRID * size)]
     _arrows(plotter, scene.points[chosen], scene.exaggeration * scene.u[chosen], COMPUTED, size)
 
@@ -142,7 +144,7 @@ def _draw_cut(plotter: Any, scene: Scene, axis: int, camera: Camera) -> None:
     """A plane of the body where it went, coloured by how far, over the outline of where it was."""
     origin = np.zeros(3)
     origin[axis] = scene.places[axis]
-    section = body_of(scene, before=False).slice(normal=np.eye(3)[axis], origin=origin)
+    section = body_of(scene, ~scene.removed).slice(normal=np.eye(3)[axis], origin=origin)
     if not section.n_points:
         return
     size = float(np.ptp(scene.points, axis=0).max())

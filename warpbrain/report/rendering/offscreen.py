@@ -22,7 +22,7 @@ class RenderingError(Exception):
 
 
 def render(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -> dict[str, Any]:
-    """The pictures of a scene by name, each (height, width, 3) uint8.
+    """The pictures of a scene that have cameras by name, each (height, width, 3) uint8.
 
     Raises
     ------
@@ -41,7 +41,8 @@ def render(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -
         if done.returncode or not written.is_file():
             raise RenderingError(_why(done.returncode, done.stderr))
         image = np.load(written)
-    return dict(zip(NAMES, np.split(image, len(NAMES), axis=1), strict=True))
+    names = [name for name in NAMES if name in cameras]
+    return dict(zip(names, np.split(image, len(names), axis=1), strict=True))
 
 
 def _why(status: int, said: str) -> str:

@@ -93,10 +93,15 @@ class Scene:
 
     @property
     def side(self) -> Floats:
-        """Signs of the corner that is cut out: right, front and above, or left, if something was removed there."""
-        taken = self.points[self.tetrahedra[self.removed]].reshape(-1, 3)[:, 0]
-        right = taken.size > 0 and taken.mean() > self.points[:, 0].mean()
-        return np.array([1.0 if right else -1.0, 1.0, 1.0])
+        """Signs of the corner that is cut out: where there is most to see, above.
+
+        That is what was removed, else what was recorded, else the left and the front.
+        """
+        seen = self.points[self.tetrahedra[self.removed]].reshape(-1, 3)
+        seen = self.where if not len(seen) else seen
+        middle = 0.5 * (self.points.min(axis=0) + self.points.max(axis=0))
+        aside = seen.mean(axis=0) - middle if len(seen) else np.zeros(3)
+        return np.array([1.0 if aside[0] > 0.0 else -1.0, -1.0 if aside[1] < 0.0 else 1.0, 1.0])
 
 
 def write_scene(folder: Path, scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -> None:

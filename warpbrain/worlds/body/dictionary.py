@@ -12,6 +12,7 @@ from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh, face_vectors, nodes_of
+from warpbrain.mesh.extent import extent
 from warpbrain.physics.composition import CompositionError, require_composable
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanisms import mechanisms
@@ -86,7 +87,7 @@ def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
     on_surface = nodes_of(mesh.boundary, len(mesh.points))
     held = mesh.node_sets[nodes] & on_surface
     where = mesh.points[held]
-    size = float(np.linalg.norm(np.ptp(where, axis=0))) / 2.0
+    size = extent(where) / 2.0
     parts = [Patch.disc(mesh, nodes, held, centre, r) for centre in where[spread_points(where, BETWEEN)] for r in RADII]
     return [Patch(nodes, nodes, held, held, where.mean(axis=0), size), *(part for part in parts if part is not None)]
 
@@ -220,7 +221,7 @@ def is_linear(effect: Effect, at: Linearisation) -> bool:
     """
     if effect.proposal is None or isinstance(effect.proposed.make(effect.proposed.mean), Load):
         return bool(np.isfinite(effect.columns).all())
-    largest = float(np.linalg.norm(np.ptp(at.system.model.mesh.points, axis=0)))
+    largest = extent(at.system.model.mesh.points)
     moved = effect.columns[at.sensors.is_displacement]
     return bool(np.isfinite(effect.columns).all() and np.abs(moved).max(initial=0.0) < largest)
 

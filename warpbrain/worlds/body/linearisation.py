@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.mesh import TetMesh, vertex_normals
+from warpbrain.mesh.extent import extent
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.chord import toward_equilibrium
 from warpbrain.simulation.system import System
@@ -227,7 +228,7 @@ class Linearisation:
                 held,
                 vertex_normals(mesh),
                 self.reactions,
-                float(np.linalg.norm(np.ptp(mesh.points, axis=0))),
+                extent(mesh.points),
             )
         if key not in self._surface_responses:
             sensors = self.sensors

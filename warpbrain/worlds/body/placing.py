@@ -16,6 +16,7 @@ from warpbrain.arrays import Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.gross_errors import with_gross_errors
 from warpbrain.inference.noise import outliers
+from warpbrain.mesh.extent import principal_axes
 from warpbrain.physics.proposal import Patch, Proposal
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
@@ -93,10 +94,11 @@ def _effects_of(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect]
 
 
 def _around(base: Base, effect: Effect, step: float) -> list[Proposal]:
-    """Proposals a step from an effect along each axis, and with other radii."""
+    """Proposals a step from an effect along each principal axis of the body, and with other radii."""
     proposed = effect.proposed
     assert proposed.elsewhere is not None and proposed.centre is not None and proposed.radius is not None
-    offsets = [np.zeros(3), *(sign * step * axis for axis in np.eye(3) for sign in (-1.0, 1.0))]
+    axes = principal_axes(base.at.system.model.mesh.points)
+    offsets = [np.zeros(3), *(sign * step * axis for axis in axes for sign in (-1.0, 1.0))]
     proposals = []
     for offset, radius in itertools.product(offsets, _RADII):
         centre = proposed.centre + offset

@@ -352,7 +352,7 @@ class States:
     def _system(self, hypothesis: Hypothesis, case: Case | None = None) -> System:
         """Of a hypothesis; `case`: at one time."""
         try:
-            model, _ = model_of(self.case_of(hypothesis) if case is None else case)
+            model = model_of(self.case_of(hypothesis) if case is None else case)
         except CompositionError as error:
             # treated like loads without an equilibrium
             raise SolveError(str(error)) from None

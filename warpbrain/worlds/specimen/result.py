@@ -11,6 +11,7 @@ from warpbrain.inference.causes import Kind
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.decide import Decision
 from warpbrain.physics.values import Measurement, Smallest, Value
+from warpbrain.shown import Shown
 from warpbrain.worlds.specimen.protocol import Protocol
 
 
@@ -78,7 +79,7 @@ class Score:
 
 
 @dataclass(frozen=True, eq=False)
-class SpecimenDiagnosis:
+class SpecimenDiagnosis(Shown):
     """All of it.
 
     Attributes

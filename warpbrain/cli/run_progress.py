@@ -1,0 +1,131 @@
+"""What `warpbrain run` prints of the way to a state: steps on standard output, and how far it has come beside it."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from warpbrain.terminal.progress import Progress
+
+if TYPE_CHECKING:
+    from warpbrain.simulation.courses import Watching
+    from warpbrain.simulation.equilibrium import NewtonStep
+    from warpbrain.simulation.relaxation import RelaxationStep
+
+#: Newton iterations that are printed one by one.
+_LONG_HISTORY = 16
+
+Say = Callable[..., None]
+
+
+@contextmanager
+def watching(options: argparse.Namespace, say: Say) -> Iterator[Watching]:
+    """Who is told of the steps, after the head of their table is printed."""
+    make: Callable[[argparse.Namespace, Say, Progress], Watching]
+    if options.until is not None:
+        name, head, make = "slow change", "slow change     time [s]   Newton    CG   min J   largest [mm]", _slow
+    elif options.steps is not None:
+        name, head, make = "motion", "motion        time [ms]     CG   min J   kinetic energy [mJ]", _motion
+    elif options.to_rest:
+        name, head, make = "to rest", "to rest        time [s]  step [s]   residual    CG   min J", _relaxation
+    else:
+        name, head, make = "equilibrium", "equilibrium   load   Newton   residual    CG   step   min J", _newton
+    say("", head, sep="\n")
+    progress = Progress(name, options.quiet)
+    try:
+        yield make(options, say, progress)
+    finally:
+        progress.clear()
+
+
+def ending_lines(solution: Mapping[str, Any]) -> list[str]:
+    """How closely the state was found."""
+    if solution["kind"] == "at rest":
+        residual, goal = solution["relative_residual"], solution["tolerance"]
+        return [f"  at rest: relative out-of-balance force {residual:.1e} (goal {goal:.1e})"]
+    if solution["kind"] != "equilibrium":
+        return []
+    lines = [
+        f"  converged: relative out-of-balance force {solution['relative_residual']:.1e} "
+        f"(goal {solution['tolerance']:.1e}), stored energy {1000 * solution['stored_energy_J']:.4g} mJ"
+    ]
+    if unstable := solution["iterations_with_indefinite_tangent"]:
+        lines.append(
+            f"  note: the tangent was indefinite in {unstable} iterations; this may be another "
+            "equilibrium than the one that a slowly growing load reaches first"
+        )
+    return lines
+
+
+def _newton(_options: argparse.Namespace, say: Say, progress: Progress) -> Watching:
+    from warpbrain.simulation.courses import Watching
+
+    count = 0
+
+    def on_step(step: NewtonStep) -> None:
+        nonlocal count
+        count += 1
+        # a long history is told by its load steps, not by every iteration
+        if count <= _LONG_HISTORY or step.iteration == 1:
+            progress.clear()
+            say(
+                f"            {100 * step.load:>5.1f} % {step.iteration:>6}   {step.residual:>8.1e} "
+                f"{step.cg_iterations:>5}  {step.step:>5.3g}   {step.min_J:>5.3f}"
+                + ("   indefinite tangent" if step.indefinite else "")
+            )
+        if count == _LONG_HISTORY:
+            say("            (from here on, the first iteration of each load step)")
+        progress.show(step.load, f"Newton {step.iteration}")
+
+    return Watching(newton=on_step)
+
+
+def _relaxation(options: argparse.Namespace, say: Say, progress: Progress) -> Watching:
+    from warpbrain.simulation.courses import Watching
+
+    def on_step(step: RelaxationStep) -> None:
+        progress.clear()
+        say(
+            f"            {step.time:>11.3g} {step.time_step:>9.3g}   {step.residual:>8.1e} {step.cg_iterations:>5}"
+            f"   {step.min_J:>5.3f}"
+        )
+        decades = math.log10(max(step.residual, 1e-300)) / math.log10(options.tolerance)
+        progress.show(min(1.0, max(0.0, decades)), f"{step.time:.3g} s")
+
+    return Watching(relaxation=on_step)
+
+
+def _motion(options: argparse.Namespace, say: Say, progress: Progress) -> Watching:
+    from warpbrain.simulation.courses import Watching
+
+    def on_step(number: int, time: float, noted: dict[str, Any] | None) -> None:
+        if noted is not None:
+            progress.clear()
+            say(
+                f"            {1000 * time:>11.4g} {noted['cg_iterations']:>6}   {noted['min_J']:>5.3f}"
+                f"   {1000 * noted['kinetic_J']:.4g}"
+            )
+        progress.show(number / options.steps, f"{1000 * time:.0f} ms")
+
+    return Watching(motion=on_step)
+
+
+def _slow(_options: argparse.Namespace, say: Say, progress: Progress) -> Watching:
+    from warpbrain.simulation.courses import Watching
+
+    def on_moment(number: int, count: int, noted: dict[str, Any]) -> None:
+        if number % max(1, count // 10) == 0 or number == count:
+            progress.clear()
+            say(
+                f"            {noted['time_s']:>12.4g} {noted['newton_iterations']:>8} {noted['cg_iterations']:>5}"
+                f"   {noted['min_J']:>5.3f}   {noted['largest_displacement_mm']:>9.3f}"
+            )
+        progress.show(number / count, f"{noted['time_s']:.3g} s")
+
+    def on_newton(part: float, step: NewtonStep) -> None:
+        progress.show(part, f"Newton {step.iteration}")
+
+    return Watching(slow=on_moment, slow_newton=on_newton)

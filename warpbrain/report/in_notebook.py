@@ -1,0 +1,134 @@
+"""Results and cases as a table of HTML: what a notebook shows of them."""
+
+from __future__ import annotations
+
+import math
+from functools import singledispatch
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from warpbrain.cases.case import Case
+from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.ensemble.results import EnsembleResult
+from warpbrain.errors import InputError
+from warpbrain.estimation.posterior import Marginal, Posterior
+from warpbrain.report.case_text import show_lines
+from warpbrain.report.comparison import SHOWN
+from warpbrain.report.ensemble_text import describe_ensemble, ensemble_lines
+from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.summary import SET_TITLES, left_out
+from warpbrain.simulation.result import Result
+from warpbrain.simulation.run import Run
+from warpbrain.simulation.specimen_run import SpecimenRun
+from warpbrain.worlds.specimen.result import SpecimenDiagnosis
+
+#: A row: what, and what of it.
+Rows = list[tuple[str, str]]
+
+
+def html(what: Any) -> str:
+    """A result or a case as HTML: a title and a table.
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+    """
+    title, rows = _told(what)
+    body = "".join(
+        f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(said)}</td></tr>'
+        for name, said in rows
+    )
+    return f"<div><strong>{escape(title)}</strong><table>{body}</table></div>"
+
+
+@singledispatch
+def _told(what: Any) -> tuple[str, Rows]:
+    raise InputError(f"what: expected a result or a case, found {type(what).__name__}")
+
+
+@_told.register
+def _(what: Case) -> tuple[str, Rows]:
+    title, *lines = show_lines(what)
+    return title, [(line.strip().split("  ")[0], " ".join(line.split()[1:])) for line in lines]
+
+
+@_told.register
+def _(what: Result) -> tuple[str, Rows]:
+    rows = [
+        (
+            SET_TITLES.get(name, name),
+            f"mean {MILLIMETRES * s.mean:.3g} mm, at most {MILLIMETRES * s.largest:.3g} mm, {s.nodes} nodes",
+        )
+        for name, s in what.displacement_statistics().items()
+    ]
+    rows += [
+        ("volume ratio J", f"{what.J.min():.3f} to {what.J.max():.3f}"),
+        ("von Mises stress", f"at most {what.von_mises.max():.3g} Pa"),
+    ]
+    return "Displacement", rows
+
+
+@_told.register
+def _(what: Run) -> tuple[str, Rows]:
+    largest = MILLIMETRES * float(np.linalg.norm(what.u, axis=1).max())
+    rows = [("state", what.followed.solution["kind"]), ("moves by at most", f"{largest:.3g} mm")]
+    rows += [(name, _before_after(*error)) for name, error in _errors(what.observed.comparisons)]
+    return what.case.title, rows + [("left out", sentence) for sentence in left_out(what.model)]
+
+
+@_told.register
+def _(what: SpecimenRun) -> tuple[str, Rows]:
+    tests = [(t.recording.name, t.comparison, t.result.r_squared) for t in what.tests]
+    fits = {name: "" if math.isnan(r2) else f"; R² {r2:.4f}" for name, _, r2 in tests}
+    errors = _errors([comparison for _, comparison, _ in tests])
+    return what.case.title, [(name, _before_after(*error) + fits[name]) for name, error in errors]
+
+
+@_told.register
+def _(what: Posterior) -> tuple[str, Rows]:
+    rows = [(m.parameter.tissue, _marginal(m)) for m in what.marginals]
+    rows += [("recordings", sentence) for sentence in what.identifiability.sentences]
+    return f"Tissue of: {what.case.title}", rows + [("doubt", doubt) for doubt in what.doubts]
+
+
+@_told.register
+def _(what: Diagnosis) -> tuple[str, Rows]:
+    rows = [("verdict", what.sentence)]
+    rows += [(one.kind, f"probability {one.probability:.3g}") for one in what.ranking]
+    return f"Diagnosis of: {what.case.title}", rows + [("doubt", doubt) for doubt in what.doubts]
+
+
+@_told.register
+def _(what: SpecimenDiagnosis) -> tuple[str, Rows]:
+    rows = [("verdict", what.verdict), *((one.name, one.sentence) for one in what.named)]
+    rows += [(one.name, f"probability {one.probability:.3g}") for one in what.ranking]
+    return f"Diagnosis of: {what.case.title}", rows + [("doubt", doubt) for doubt in what.doubts]
+
+
+@_told.register
+def _(what: EnsembleResult) -> tuple[str, Rows]:
+    first, *rest = ensemble_lines(describe_ensemble(what))
+    return first, [("", line) for line in rest if line]
+
+
+def _errors(comparisons: Any) -> list[tuple[str, tuple[float, float, str]]]:
+    rows = []
+    for one in comparisons:
+        factor, unit = SHOWN[one.unit]
+        before, after = factor * one.before.root_mean_square, factor * one.after.root_mean_square
+        rows.append((one.name, (before, after, unit)))
+    return rows
+
+
+def _before_after(before: float, after: float, unit: str) -> str:
+    return f"RMSE {before:.3g} before, {after:.3g} {unit} after".rstrip()
+
+
+def _marginal(marginal: Marginal) -> str:
+    low, high = marginal.interval
+    if marginal.parameter.is_modulus:
+        return f"shear modulus {math.exp(marginal.estimate):.4g} Pa, 95 %: {math.exp(low):.4g} to {math.exp(high):.4g}"
+    return f"{marginal.parameter.coordinate.name} {marginal.estimate:.4g}, 95 %: {low:.4g} to {high:.4g}"

@@ -1,0 +1,194 @@
+"""Results, cases and meshes drawn in three dimensions: `warpbrain.plot`, and `.plot()` of all of them."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpbrain.cases.case import Case
+from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.ensemble.results import EnsembleResult
+from warpbrain.errors import InputError
+from warpbrain.estimation.posterior import Posterior
+from warpbrain.mesh import TetMesh
+from warpbrain.report.diagnosis.files import file_of_map
+from warpbrain.report.ensemble_files import file_of_fields
+from warpbrain.report.files import MILLIMETRES, file_of_result
+from warpbrain.report.state_files import file_of_estimate
+from warpbrain.report.views import TISSUE_COLOURS
+from warpbrain.simulation.result import Result
+from warpbrain.simulation.run import Run
+from warpbrain.simulation.specimen_run import SpecimenRun
+
+#: What the fields are called that are shown unless another is asked for, and in which colours.
+_UNITS = {
+    "displacement": "displacement [mm]",
+    "displacement_mean": "mean displacement [mm]",
+    "displacement_sd": "standard deviation of the displacement [mm]",
+    "score": "score: chi-squared of 3 degrees of freedom",
+    "von_mises": "von Mises stress [Pa]",
+    "J": "volume ratio J",
+    "fluid_pressure": "fluid pressure [Pa]",
+}
+
+
+def plot(
+    what: Any,
+    *,
+    field: str | None = None,
+    exaggeration: float = 1.0,
+    cut: str | None = "x",
+    show: bool = True,
+    screenshot: str | Path | None = None,
+) -> Any:
+    """Draw a result, a case or a mesh.
+
+    Parameters
+    ----------
+    what : Run, Result, Posterior, Diagnosis, EnsembleResult, SpecimenRun, Case or TetMesh
+    field : str, optional
+        An array of the file that a command writes of it, such as ``"von_mises"`` (docs/results.md): by default the
+        displacement, of a diagnosis where the mismatch is, of a case or mesh the tissue. Of a posterior also
+        ``"moduli"``: the densities before and after.
+    exaggeration : float
+        How many times as far as it moves the body is drawn moved.
+    cut : {"x", "y", "z"} or None
+        Normal of a plane through the middle, one side of which is taken away: x is left and right, y back and front,
+        z down and up.
+    show : bool
+        Open a window, or draw into the notebook; otherwise only make the plotter.
+    screenshot : path, optional
+        PNG file to write, without a window.
+
+    Returns
+    -------
+    pyvista.Plotter or matplotlib.figure.Figure
+        The figure of curves, of a specimen's tests and of moduli.
+
+    Raises
+    ------
+    InputError
+        If it cannot be drawn, or has no such field: the message lists those it has.
+    """
+    figure = _figure(what, field)
+    if figure is not None:
+        if screenshot is not None:
+            figure.savefig(screenshot)
+        return figure
+    import pyvista
+
+    plotter = pyvista.Plotter(off_screen=True if screenshot is not None else None)
+    _add(plotter, what, field, exaggeration, cut)
+    if screenshot is not None:
+        plotter.show(screenshot=str(screenshot))
+    elif show:
+        plotter.show()
+    return plotter
+
+
+def grid(what: Any) -> Any:
+    """What `plot` draws as a `pyvista.UnstructuredGrid` in mm with all its arrays, for pictures of one's own."""
+    import pyvista
+
+    return pyvista.from_meshio(_file(what)[0])
+
+
+def _add(plotter: Any, what: Any, field: str | None, exaggeration: float, cut: str | None) -> None:
+    if cut not in (None, "x", "y", "z"):
+        raise InputError(f"cut = {cut!r}: expected 'x', 'y', 'z' or None")
+    import pyvista
+
+    file, usual = _file(what)
+    body = pyvista.from_meshio(file)
+    name = usual if field is None else field
+    known = [*body.point_data, *body.cell_data]
+    if name not in known:
+        raise InputError(f"field = {name!r}: there is none in a {type(what).__name__}; it has {', '.join(known)}")
+    moves = next((key for key in ("displacement", "displacement_mean") if key in body.point_data), None)
+    if moves is not None:
+        body.points = body.points + exaggeration * body.point_data[moves]
+    shown = body if cut is None else body.clip(normal=cut)
+    categories = name == "tissue"
+    plotter.add_mesh(
+        shown,
+        scalars=name,
+        cmap=list(TISSUE_COLOURS) if categories else "viridis",
+        smooth_shading=True,
+        split_sharp_edges=True,
+        categories=categories,
+        show_scalar_bar=not categories,
+        scalar_bar_args={"title": f"{_UNITS.get(name, name)}\n", "color": "#333333", "fmt": "%.3g"},
+    )
+    plotter.set_background("white")
+    plotter.add_axes(xlabel="R", ylabel="A", zlabel="S", color="#333333")
+    side = {"x": (1.0, 0.6, 0.4), "y": (0.6, 1.0, 0.4), "z": (0.6, 0.6, 1.2), None: (0.8, 0.85, 0.62)}[cut]
+    plotter.view_vector(side, viewup=(0.0, 0.0, 1.0))
+    plotter.camera.zoom(1.3)
+
+
+@singledispatch
+def _file(what: Any) -> tuple[Any, str]:
+    """A `meshio.Mesh` in mm, and the field of it that is shown unless another is asked for."""
+    raise InputError(
+        f"what: expected a result, a case or a mesh, found {type(what).__name__}: "
+        "what warpbrain.run, estimate, diagnose, ensemble and find_case return can be drawn"
+    )
+
+
+@_file.register
+def _(what: TetMesh) -> tuple[Any, str]:
+    import meshio
+
+    sets = {name: members.astype(np.uint8) for name, members in what.node_sets.items()}
+    cells = {name: [members.astype(np.uint8)] for name, members in what.element_sets.items()}
+    tetrahedra = [("tetra", what.tetrahedra)]
+    of_cells = {**cells, "tissue": [what.tissue]}
+    return meshio.Mesh(MILLIMETRES * what.points, tetrahedra, point_data=sets, cell_data=of_cells), "tissue"
+
+
+@_file.register
+def _(what: Case) -> tuple[Any, str]:
+    return _file(what.mesh)
+
+
+@_file.register
+def _(what: Result) -> tuple[Any, str]:
+    return file_of_result(what), "displacement"
+
+
+@_file.register
+def _(what: Run) -> tuple[Any, str]:
+    return _file(what.result)
+
+
+@_file.register
+def _(what: Posterior) -> tuple[Any, str]:
+    return file_of_estimate(what), "displacement"
+
+
+@_file.register
+def _(what: Diagnosis) -> tuple[Any, str]:
+    return file_of_map(what), "score"
+
+
+@_file.register
+def _(what: EnsembleResult) -> tuple[Any, str]:
+    if what.fields is None:
+        raise InputError("what: no sample of this ensemble has an answer; the reasons are in its rows")
+    return file_of_fields(what.fields), "displacement_sd"
+
+
+def _figure(what: Any, field: str | None) -> Any:
+    """The figure of what is drawn as curves; None of bodies."""
+    if isinstance(what, SpecimenRun):
+        from warpbrain.report.specimen_picture import COLUMNS, tests_figure
+
+        return tests_figure(what.tests, COLUMNS)
+    if isinstance(what, Posterior) and field == "moduli":
+        from warpbrain.report.estimate_picture import densities_figure
+
+        return densities_figure(what, narrow=False)
+    return None

@@ -1,0 +1,236 @@
+"""From rest to the state that is asked for: an equilibrium, a motion, a motion to rest, slow change."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from warpbrain.cases.case import Case
+from warpbrain.cases.moments import recorded_times
+from warpbrain.errors import InputError
+from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, NewtonStep
+from warpbrain.simulation.phase_clock import PhaseClock
+from warpbrain.simulation.quasi_static import follow_slowly, growing_times
+from warpbrain.simulation.relaxation import RelaxationOptions, RelaxationStep, relax_to_rest
+from warpbrain.simulation.result import NodalState, nodal_state_of
+from warpbrain.simulation.system import System
+
+#: Steps of slow change where nobody names a number.
+SLOW_STEPS = 20
+
+
+@dataclass(frozen=True)
+class Course:
+    """How far a case is followed, and how closely. Of the first three at most one, but `steps` may go with `until`.
+
+    Parameters
+    ----------
+    steps : int, optional
+        Follow the motion for so many time steps of 1 ms; of slow change into how many it is divided.
+    to_rest : bool
+        Follow the damped motion until it is at rest.
+    until : float, optional
+        Follow slow change without inertia until then [s].
+    tolerance : float
+        Out-of-balance force in the end, relative to all nodal forces; see `EquilibriumOptions`.
+
+    Raises
+    ------
+    InputError
+        If they mean nothing together, or a number makes no sense.
+    """
+
+    steps: int | None = None
+    to_rest: bool = False
+    until: float | None = None
+    tolerance: float = 1e-8
+
+    def __post_init__(self) -> None:
+        if self.steps is not None and (not isinstance(self.steps, int) or self.steps < 1):
+            raise InputError(f"steps = {self.steps!r}: expected a whole number of at least 1")
+        if self.until is not None and not (math.isfinite(self.until) and self.until > 0.0):
+            raise InputError(f"until = {self.until:g}: expected a positive number of seconds")
+        if not 0.0 < self.tolerance < 1.0:
+            raise InputError(f"tolerance = {self.tolerance:g}: expected a number between 0 and 1")
+        if self.to_rest and (self.steps is not None or self.until is not None):
+            other = "steps" if self.until is None else "until"
+            raise InputError(f"to_rest: means nothing with {other}: leave one of them out")
+
+
+@dataclass(frozen=True)
+class Watching:
+    """Who wants to know how a simulation gets on.
+
+    Attributes
+    ----------
+    newton : callable
+        Called with each Newton step to an equilibrium.
+    relaxation : callable
+        Called with each step of a motion to rest.
+    motion : callable
+        Called with the number of each step of a motion, and what is noted of it: nine of ten times nothing.
+    slow_newton : callable
+        Called with the part that is done of slow change, and each Newton step.
+    slow : callable
+        Called with the number of a moment of slow change, how many there will be, and what is noted of it.
+    """
+
+    newton: Callable[[NewtonStep], None] = lambda _step: None
+    relaxation: Callable[[RelaxationStep], None] = lambda _step: None
+    motion: Callable[[int, float, dict[str, Any] | None], None] = lambda _number, _time, _noted: None
+    slow_newton: Callable[[float, NewtonStep], None] = lambda _part, _step: None
+    slow: Callable[[int, int, dict[str, Any]], None] = lambda _number, _count, _noted: None
+
+
+@dataclass(frozen=True)
+class Followed:
+    """What a course came to; the system has its last state.
+
+    Attributes
+    ----------
+    solution : dict
+        For `summary.json`: what kind of state it is, how closely it was found, and the steps to it.
+    time : float or None
+        Of the state [s]; None of one at rest.
+    states : mapping of float to NodalState
+        Earlier ones at which something was recorded.
+    begun : float
+        When the first step was done, of `time.perf_counter`.
+    seconds, calls : mapping of str
+        By phase.
+    """
+
+    solution: dict[str, Any]
+    time: float | None
+    begun: float
+    seconds: Mapping[str, float]
+    calls: Mapping[str, int]
+    states: Mapping[float, NodalState] = field(default_factory=dict)
+
+
+def follow(case: Case, system: System, course: Course, watching: Watching) -> Followed:
+    """Simulate a system of a case.
+
+    Raises
+    ------
+    SolveError
+        If there is no such state, or none was found.
+    """
+    if course.until is not None:
+        return _slowly(case, system, course.until, course, watching)
+    if course.steps is not None:
+        return _motion(system, course.steps, watching)
+    return _to_rest(system, course, watching) if course.to_rest else _equilibrium(system, course, watching)
+
+
+def _equilibrium(system: System, course: Course, watching: Watching) -> Followed:
+    first: list[float] = []
+
+    def on_step(step: NewtonStep) -> None:
+        first.append(time.perf_counter())
+        watching.newton(step)
+
+    solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=course.tolerance), on_step)
+    state = solver.solve()
+    solution = {
+        "kind": "equilibrium",
+        "tolerance": solver.tolerance,
+        "relative_residual": state.residual,
+        "stored_energy_J": state.energy,
+        "iterations_with_indefinite_tangent": state.unstable_iterations,
+        "history": [vars(step) for step in state.history],
+    }
+    begun = first[0] if first else time.perf_counter()
+    return Followed(solution, None, begun, solver.clock.seconds, solver.clock.counts)
+
+
+def _to_rest(system: System, course: Course, watching: Watching) -> Followed:
+    first: list[float] = []
+
+    def on_step(step: RelaxationStep) -> None:
+        first.append(time.perf_counter())
+        watching.relaxation(step)
+
+    clock = PhaseClock(system.device)
+    state = relax_to_rest(system, RelaxationOptions(tolerance=course.tolerance), on_step, clock)
+    solution = {
+        "kind": "at rest",
+        "tolerance": state.tolerance,
+        "relative_residual": state.residual,
+        "history": [vars(step) for step in state.history],
+    }
+    return Followed(solution, None, first[0], clock.seconds, clock.counts)
+
+
+def _motion(system: System, steps: int, watching: Watching) -> Followed:
+    simulator = Simulator(system)
+    clock = PhaseClock(system.device)
+    every = max(1, steps // 10)
+    history: list[dict[str, Any]] = []
+    begun = 0.0
+    for step in range(1, steps + 1):
+        # a prescribed displacement without a history of its own is reached evenly over the run
+        due = simulator.time + simulator.time_step
+        simulator.prescribe(system.model.prescribed_at(due, step / steps))
+        simulator.timed_step(clock)
+        min_J = simulator.check()
+        begun = begun or time.perf_counter()
+        noted = None
+        if step % every == 0 or step == steps:
+            kinetic, solve = simulator.kinetic_energy(), simulator.last_solve()
+            noted = {
+                "time_s": simulator.time,
+                "cg_iterations": solve.iterations,
+                "min_J": min_J,
+                "kinetic_J": kinetic,
+            }
+            history.append(noted)
+        watching.motion(step, simulator.time, noted)
+    solution = {
+        "kind": "motion",
+        "time_s": simulator.time,
+        "time_step_s": simulator.time / steps,
+        "damping": vars(system.model.damping),
+        "cg_tolerance": simulator.tolerance,
+        "history": history,
+    }
+    return Followed(solution, simulator.time, begun, clock.seconds, clock.counts)
+
+
+def _slowly(case: Case, system: System, until: float, course: Course, watching: Watching) -> Followed:
+    recorded = {at for at in recorded_times(case, ("fit", "check")) if at <= until}
+    times = sorted({*growing_times(until, course.steps or SLOW_STEPS), *recorded})
+    states: dict[float, NodalState] = {}
+    clock = PhaseClock(system.device)
+    first: list[float] = []
+    taken: list[NewtonStep] = []
+    history: list[dict[str, Any]] = []
+
+    def on_step(step: NewtonStep) -> None:
+        first.append(time.perf_counter())
+        taken.append(step)
+        watching.slow_newton(len(history) / len(times), step)
+
+    options = EquilibriumOptions(tolerance=course.tolerance)
+    for number, moment in enumerate(follow_slowly(system, times, options, on_step, clock), 1):
+        if moment.time in recorded:
+            states[moment.time] = nodal_state_of(system, moment.time)
+        noted = {
+            "time_s": moment.time,
+            "steps": moment.steps,
+            "newton_iterations": len(taken),
+            "cg_iterations": sum(step.cg_iterations for step in taken),
+            "min_J": moment.min_J,
+            "largest_displacement_mm": 1000.0 * moment.largest,
+            "relative_residual": moment.state.residual,
+        }
+        history.append(noted)
+        taken.clear()
+        watching.slow(number, len(times), noted)
+    solution = {"kind": "slow change", "time_s": until, "history": history}
+    begun = first[0] if first else time.perf_counter()
+    return Followed(solution, until, begun, clock.seconds, clock.counts, states)
