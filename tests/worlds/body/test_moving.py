@@ -1,4 +1,4 @@
-"""A traction that moves a block's face by a third of its own radius: where it is, its fit tells, not the linear model."""
+"""A traction that moves a face by a third of its radius: its fit tells where it is, the model about rest does not."""
 
 from dataclasses import replace
 from pathlib import Path
