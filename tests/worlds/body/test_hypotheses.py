@@ -136,4 +136,6 @@ def test_causes_are_checked_beside_those_that_explain_more(pair):
     # the weight beside nothing, the swelling beside the weight
     evidence = [pair.get(names).hypothesis.log_evidence for names in ((), ("gravity",), ("gravity", "swelling"))]
     np.testing.assert_allclose([weight.log_evidence, swelling.log_evidence], np.diff(evidence))
-    assert weight.why_not(0.05) == "" and swelling.why_not(0.05) != ""
+    # beside the weight, which acts, a swelling is worth nothing; the weight beside nothing is
+    assert weight.why_not(0.05) == "" and swelling.log_evidence < 0.0
+    assert swelling.gain[1] < 0.0 < weight.gain[1]
