@@ -44,7 +44,7 @@ def search() -> HypothesisSearch:
     )
     x, y, z = CENTRE.tolist()
     pull = Traction(centre=(x, y, z), value=(150.0, 0.0, 1200.0), radius=0.02)
-    model, _ = model_of(replace(case, mechanisms=(pull,)))
+    model = model_of(replace(case, mechanisms=(pull,)))
     u = EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u
     assert np.linalg.norm(u, axis=1).max() > 6e-3
     rng = np.random.default_rng(0)

@@ -16,6 +16,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.inference import GaussianModel, Posterior, Search, posterior
+from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.hypothesis import Hypothesis
 from warpbrain.inference.noise import scales
@@ -207,9 +208,16 @@ class HypothesisSearch:
         inherited = candidate.inherited_gain or 0.0
         gain = inherited + _of_all_places(gain - inherited, candidate.log_share)
         log_evidence = candidate.hypothesis.log_evidence - inherited + gain
-        self._sets[names] = moved_about_fit(self.base, self._fitter, fitted.with_evidence(log_evidence), self.spacing)
+        fitted = fitted.with_evidence(log_evidence)
+        self._sets[names] = moved_about_fit(self.base, self._fitter, fitted, self.spacing, self._missing(fitted))
         self._pass_on(gain, names)
         self._refit_subsets(names)
+
+    def _missing(self, candidate: WeightedSet) -> float:
+        """Log evidence that a set would have to gain for the verdict to depend on it."""
+        best = max(other.hypothesis.log_evidence + other.hypothesis.log_prior for other in self._sets.values())
+        own = candidate.hypothesis.log_evidence + candidate.hypothesis.log_prior
+        return float(best - own - belief("fits.change"))
 
     def _refit_subsets(self, names: frozenset[str]) -> None:
         """Fit subsets with one mechanism less again, from the optimum of a set, if that is better than their own.

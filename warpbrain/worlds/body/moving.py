@@ -25,7 +25,9 @@ from warpbrain.worlds.body.weighted_set import WeightedSet
 _MOVES, _BETTER = 3, 1.0
 
 
-def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:
+def moved_about_fit(
+    base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float, least: float = _BETTER
+) -> WeightedSet:
     """A fitted set, fitted again where its mechanisms are better placed.
 
     Parameters
@@ -35,16 +37,20 @@ def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: fl
     fitted : WeightedSet
     spacing : float
         Between the places of a scan [m].
+    least : float
+        Log evidence [nats] that it has to gain to matter.
     """
+    start = fitted.hypothesis.log_evidence
     for _ in range(_MOVES):
-        moved = _moved_once(base, fitter, fitted, spacing)
+        gained = fitted.hypothesis.log_evidence - start
+        moved = _moved_once(base, fitter, fitted, spacing, max(least - gained, _BETTER))
         if moved is None:
             break
         fitted = moved
     return fitted
 
 
-def _moved_once(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet | None:
+def _moved_once(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float, least: float) -> WeightedSet | None:
     """The same at the best places in the cells about those of the fit; None if no others are better."""
     refit = fitted.refit
     assert refit is not None
@@ -54,7 +60,7 @@ def _moved_once(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float)
         source = Effects(refit.state.linearised(), mesh_errors=base.mesh_errors)
         begun = _about_fit(base, fitted, source)
         moved = with_refined_places(base, begun, spacing, source)
-        if moved.effects == begun.effects or moved.marginal.log_evidence < begun.marginal.log_evidence + _BETTER:
+        if moved.effects == begun.effects or moved.marginal.log_evidence < begun.marginal.log_evidence + least:
             return None
         again = fitter.fit(moved.effects, moved.columns, [moved.coordinates], moved.marginal, refit.state, refit)
     except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError):
