@@ -7,7 +7,7 @@ from warpbrain.inference.noise import outliers
 from warpbrain.worlds.body.causes import scaled
 from warpbrain.worlds.body.dictionary import BETWEEN, dictionary_of, switch_effects
 from warpbrain.worlds.body.effects import Effect
-from warpbrain.worlds.body.placing import best_in_cell
+from warpbrain.worlds.body.placing import _around, best_in_cell
 
 
 def test_a_cell_is_as_probable_as_the_mean_of_its_places_each_with_gross_errors_of_its_own(small_diagnosis):
@@ -16,7 +16,8 @@ def test_a_cell_is_as_probable_as_the_mean_of_its_places_each_with_gross_errors_
     numbers = search.candidates.of_kind["swelling"]
     effect = search.candidates.effects[numbers[len(numbers) // 2]]
     proposed = effect.proposed
-    [true] = base.effects.of([proposed.elsewhere(proposed.centre + 0.5 * spacing * np.eye(3)[0], proposed.radius)])
+    near = next(place for place in _around(base, effect, 0.5 * spacing) if place.radius == proposed.radius)
+    [true] = base.effects.of([near])
     rng = np.random.default_rng(0)
     # so large that in the wrong place some points are far off
     residual = 20.0 * true.columns[:, 0] + base.model.draws(1, rng)[:, 0]
