@@ -189,3 +189,10 @@ def test_node_sets_of_faces_and_of_values(tmp_path):
     assert set(sets) == {"marks-4", "marks-9", "flag", "region-7", "region-8"}
     np.testing.assert_array_equal(np.flatnonzero(sets["marks-4"]), TOP)
     np.testing.assert_array_equal(np.flatnonzero(sets["region-7"]), np.sort(LID[0]))
+
+
+def test_a_point_array_of_one_value_everywhere_is_no_node_set(tmp_path):
+    mesh = meshio.Mesh(MESH.points, [("tetra", MESH.tetrahedra)], cell_data={"medit:ref": [TISSUE]})
+    meshio.write(tmp_path / "a.mesh", mesh)
+    read = read_regions(tmp_path / "a.mesh", "m")
+    assert set(np.unique(read.mesh.tissue)) == {1, 2} and read.mesh.node_sets == {}

@@ -223,6 +223,9 @@ def _name_nodes(raw: Any, chosen: str | None, physical: Mapping[tuple[int, int],
         if len(marks) > MOST_VALUES or _BOOKKEEPING.fullmatch(name):
             notes.append(f"point array '{name}' has {len(marks)} values: no node sets are made of it")
             raw.point_data.pop(name)
+        elif len(marks) == 1 and whole.all():
+            # the same of every node, as Medit's numbers are that nobody has given
+            raw.point_data.pop(name)
         elif len(marks) > 1:
             raw.point_data.pop(name)
             for mark in marks:
