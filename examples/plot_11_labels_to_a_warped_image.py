@@ -2,9 +2,9 @@
 From labels to a warped image
 =============================
 
-Labels as FreeSurfer's of the ICBM 152 template: a case from them, a simulation in which the brain sags by millimetres, and
-the scan as it is then. The commands are those of ``examples/there_and_back.py`` of the repository, which makes the volumes
-first and is what runs here; with a scan of your own they are the same. 3D Slicer opens what is written.
+Labels as FreeSurfer's of the ICBM 152 template: a case from them, a simulation in which the brain sags by millimetres,
+and the scan as it is then. The commands are those of ``examples/there_and_back.py`` of the repository, which makes the
+volumes first and is what runs here; with a scan of your own they are the same. 3D Slicer opens what is written.
 """
 
 import subprocess

@@ -29,5 +29,5 @@ def test_an_example_says_what_it_is_and_shows_a_picture(path):
 
 def test_the_page_of_the_api_has_every_public_name():
     page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"^\.\. auto\w+:: warpbrain\.(\w+)$", page, flags=re.MULTILINE))
+    named = set(re.findall(r"^\.\. auto\w+:: warpbrain\.(?:ensemble\.run\.)?(\w+)$", page, flags=re.MULTILINE))
     assert named == set(dir(wb)) - {"cases", "laws", "mechanisms"}
