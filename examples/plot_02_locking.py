@@ -45,4 +45,4 @@ plt.show()
 # %%
 # The beam, as it hangs.
 
-wb.run(case, device="cpu").plot(cut=None)
+done.plot(cut=None)
