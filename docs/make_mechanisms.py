@@ -20,7 +20,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import read_costs, sentences
+from warpbrain.report.mechanisms.cost import read_costs
 from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
 from warpbrain.report.mechanisms.index import index
 from warpbrain.report.mechanisms.page import page
@@ -56,7 +56,7 @@ def main() -> None:
             print(f"{kind}: {effects[kind].largest:.2f} mm", flush=True)
     costs = read_costs(sorted(RESULTS.glob("mechanisms_*.json")))
     for kind in mechanisms():
-        _write(PAGES / f"{kind}.md", page(kind, effects[kind], sentences(costs, kind)))
+        _write(PAGES / f"{kind}.md", page(kind, effects[kind]))
     _write(PAGES / "index.md", index(effects, costs))
     _write(PAGES / "pairs.md", pairs_page())
 

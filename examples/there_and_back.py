@@ -85,7 +85,10 @@ def write_volumes(folder: Path, t1: Any, grey: Any, white: Any) -> None:
     for name, array in (("T1", values), ("aseg", labels)):
         nibabel.save(nibabel.Nifti1Image(array, affine), folder / f"{name}.nii.gz")
     tissue = at[np.isin(labels, (*CORTEX, *WHITE))]
-    chosen = tissue[np.random.default_rng(0).choice(len(tissue), LANDMARKS, replace=False)]
+    rng = np.random.default_rng(0)
+    chosen = tissue[rng.choice(len(tissue), LANDMARKS, replace=False)]
+    # anywhere in their voxels
+    chosen = chosen + rng.uniform(-0.5, 0.5, chosen.shape) @ affine[:3, :3].T
     points = [{"label": f"L-{i + 1}", "position": position} for i, position in enumerate(chosen.tolist())]
     markup = {"type": "Fiducial", "coordinateSystem": "RAS", "coordinateUnits": "mm", "controlPoints": points}
     (folder / "landmarks.mrk.json").write_text(json.dumps({"markups": [markup]}, indent=2), encoding="utf-8")

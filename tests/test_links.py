@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "warpbrain"
 #: Folders with pages; the root has pages of its own.
-FOLDERS = ("docs", "bench", "concealed", "referee", "tests", "warpbrain")
+FOLDERS = ("docs", "bench", "concealed", "paper", "referee", "tests", "warpbrain")
 PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md"))])
 
 

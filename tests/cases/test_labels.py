@@ -159,6 +159,11 @@ def test_names_of_labels():
     }
 
 
+def test_names_as_programs_without_spaces_write_them():
+    found = parse_names(["1=GREY_MATTER,2=White-Matter,3=Gray_matter,500=Resection,7=Brain_Stem"])
+    assert list(found.values()) == ["grey matter", "white matter", "grey matter", "resection", "Brain_Stem"]
+
+
 @pytest.mark.parametrize(
     ("argument", "message"),
     [

@@ -4,7 +4,9 @@ import logging
 import os
 import signal
 from collections.abc import Iterator
+from dataclasses import replace
 
+import deadly_parts
 import distributed
 import pytest
 from command import warpbrain
@@ -71,6 +73,21 @@ def test_a_killed_worker_costs_only_time(cluster):
     assert bits(found) == bits(alone(work))
 
 
+def test_what_workers_die_of_has_failed_and_the_rest_goes_on(monkeypatch):
+    work = replace(job(2), samples=job(2).samples[:4])
+    monkeypatch.setattr("warpbrain.ensemble.cluster.compute_part", deadly_parts.compute)
+    monkeypatch.setattr("warpbrain.ensemble.cluster.parts_of", lambda job, *_: [job.part({0, 1}), job.part({2, 3})])
+    with Cluster("local:2", 1, "cpu", None, start_warp_quietly) as workers:
+        found = {outcome.number: outcome for part in workers.outcomes(work) for outcome in part}
+    assert sorted(found) == [0, 1, 2, 3]
+    assert [number for number, outcome in found.items() if outcome.failed] == [deadly_parts.DEADLY]
+    assert found[deadly_parts.DEADLY].reason.startswith("2 workers died while they computed it, the last one tcp://")
+    expected = bits(alone(work))
+    assert {number: value == expected[number] for number, value in bits(found).items()} == {
+        number: number != deadly_parts.DEADLY for number in range(4)
+    }
+
+
 def test_local_starts_its_own_cluster(tmp_path):
     arguments = [
         "ensemble",
@@ -113,6 +130,13 @@ def test_no_scheduler(monkeypatch):
     monkeypatch.setattr("warpbrain.ensemble.cluster._PATIENCE", 1)
     with pytest.raises(InputError, match=r"--dask tcp://127\.0\.0\.1:9: no scheduler with a worker answers"):
         Cluster("tcp://127.0.0.1:9", 1, "cpu", None, start_warp_quietly)
+
+
+def test_an_encrypted_scheduler_without_certificates():
+    with pytest.raises(
+        InputError, match=r"--dask tls://127\.0\.0\.1:9: needs certificates: set DASK_DISTRIBUTED__COMM__TLS"
+    ):
+        Cluster("tls://127.0.0.1:9", 1, "cpu", None, start_warp_quietly)
 
 
 def test_addresses():

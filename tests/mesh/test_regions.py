@@ -112,6 +112,35 @@ def test_sets_of_abaqus_that_part_the_body_are_its_tissues(tmp_path):
     assert read.mesh.element_sets == {}
 
 
+SECTIONS = """*SOLID SECTION, ELSET=REST, MATERIAL=gel
+,
+*Solid Section, elset=Soft, material=gel
+,
+"""
+
+
+def test_sets_of_abaqus_that_have_a_material_are_the_tissues(tmp_path):
+    """Whatever other sets there are, such as one of a load, that overlap them."""
+    read = read_regions(abaqus(tmp_path / "a.inp", ABAQUS + SECTIONS), "m")
+    named = {name: number for number, name in read.names.items()}
+    assert set(named) == {"Rest", "soft"}
+    np.testing.assert_array_equal(read.mesh.tissue == named["soft"], np.arange(48) < 2)
+    assert set(read.mesh.element_sets) == {"Stiff"}
+
+
+def test_sets_of_abaqus_that_elements_are_defined_in_are_the_tissues(tmp_path):
+    text = ABAQUS.replace("*ELEMENT, TYPE=C3D4\n{first}", "*ELEMENT, TYPE=C3D4, ELSET=First\n{first}")
+    read = read_regions(abaqus(tmp_path / "a.inp", text), "m")
+    assert set(read.names.values()) == {"First", "Rest"}
+    assert set(read.mesh.element_sets) == {"soft", "Stiff"}
+
+
+def test_sets_of_elements_that_are_no_tissues_are_said(tmp_path):
+    read = read_regions(abaqus(tmp_path / "a.inp"), "m")
+    assert read.names == {}
+    assert any("soft (2 tetrahedra)" in note and "are no tissues" in note for note in read.notes)
+
+
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
@@ -160,3 +189,10 @@ def test_node_sets_of_faces_and_of_values(tmp_path):
     assert set(sets) == {"marks-4", "marks-9", "flag", "region-7", "region-8"}
     np.testing.assert_array_equal(np.flatnonzero(sets["marks-4"]), TOP)
     np.testing.assert_array_equal(np.flatnonzero(sets["region-7"]), np.sort(LID[0]))
+
+
+def test_a_point_array_of_one_value_everywhere_is_no_node_set(tmp_path):
+    mesh = meshio.Mesh(MESH.points, [("tetra", MESH.tetrahedra)], cell_data={"medit:ref": [TISSUE]})
+    meshio.write(tmp_path / "a.mesh", mesh)
+    read = read_regions(tmp_path / "a.mesh", "m")
+    assert set(np.unique(read.mesh.tissue)) == {1, 2} and read.mesh.node_sets == {}

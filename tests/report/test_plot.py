@@ -46,7 +46,7 @@ def test_a_body_is_drawn_where_it_moves_to(done):
     actor = next(actor for actor in plotter.actors.values() if hasattr(actor, "mapper"))
     moved = 1000.0 * (done.mesh.points + 3.0 * done.u)
     np.testing.assert_allclose(actor.mapper.dataset.bounds[::2], moved.min(axis=0), atol=1e-3)
-    assert next(iter(plotter.scalar_bars.keys())).startswith("von Mises stress [Pa]")
+    assert next(iter(plotter.scalar_bars.keys())).startswith("von Mises stress")
     plotter.close()
 
 

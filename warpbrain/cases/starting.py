@@ -245,6 +245,8 @@ def summary(case: StartedCase) -> list[str]:
         *lines,
         f"written to {case.folder}",
         "Held at the node set 'base', the outer nodes that face down in the lower third: a first guess, check it.",
+        "Nothing acts yet: say in case.toml what does, or with --with, such as "
+        "--with gravity:direction=0/-1/0,level=60 for a patient on the back.",
         f"next: warpbrain cases check {case.folder}",
         f"      warpbrain cases show {case.folder}",
         f"      warpbrain run --case {case.folder}",

@@ -1,7 +1,8 @@
 """Workers of a Dask cluster, one a device. Dask is imported here and nowhere else.
 
 Each part carries everything it needs and its outcomes come back to the client, which writes them: workers share no file
-system with it. A worker that dies costs the time of its part, which the scheduler gives to another.
+system with it. A worker that dies costs the time of its part, which the scheduler gives to another. Where others die of
+it too, each of its samples is computed by itself, and those of which workers die have failed; the rest go on.
 """
 
 from __future__ import annotations
@@ -15,12 +16,14 @@ from typing import Any
 
 from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.memory import ENOUGH
-from warpbrain.ensemble.sample import Outcome
+from warpbrain.ensemble.sample import Outcome, failure
 from warpbrain.ensemble.workers import Prepare, compute_part, kind_of, parts_of
-from warpbrain.errors import InputError, SolveError
+from warpbrain.errors import InputError
 
 #: Seconds to wait for a scheduler to answer, and for its first worker.
 _PATIENCE = 30
+#: Workers of this machine that may die of a part until nobody takes it; other schedulers have their own count.
+_DEATHS = 2
 
 
 def local_workers(address: str) -> int | None:
@@ -78,6 +81,13 @@ class Cluster:
                 self._client.wait_for_workers(1, timeout=_PATIENCE)
             except OSError as error:
                 raise InputError(f"--dask {address}: no scheduler with a worker answers: {error}") from None
+            except TypeError:
+                if not address.startswith("tls://"):
+                    raise
+                variable = "DASK_DISTRIBUTED__COMM__TLS__CA_FILE"
+                raise InputError(
+                    f"--dask {address}: needs certificates: set {variable}, ... (docs/ensembles.md)"
+                ) from None
             self.kind = str(self._client.submit(_kind, device, prepare, pure=False).result())
             self._count = len(self._client.scheduler_info(n_workers=-1)["workers"])
             self.name = f"{self._count} workers of {self._client.scheduler.address}"
@@ -99,36 +109,50 @@ class Cluster:
         ------
         InputError
             If a worker has other versions than this machine, or no such device.
-        SolveError
-            If a part has ended its worker again and again.
         """
         import distributed
 
+        pending: dict[str, Job] = {}
+
+        def submit(part: Job) -> Any:
+            future = self._client.submit(compute_part, part, self._device, self._batch, self._prepare, pure=False)
+            pending[future.key] = part
+            return future
+
         parts = parts_of(job, self._count, self._batch or ENOUGH[self.kind])
-        pending = [
-            self._client.submit(compute_part, part, self._device, self._batch, self._prepare, pure=False)
-            for part in parts
-        ]
-        for part in distributed.as_completed(pending):
+        ending = distributed.as_completed([submit(part) for part in parts])
+        for future in ending:
+            part = pending.pop(future.key)
             try:
-                outcomes = part.result()
+                yield future.result()
             except distributed.KilledWorker as error:
-                raise SolveError(f"a part of the ensemble ended its worker again and again: {error}") from None
-            yield outcomes
+                numbers = [sample.number for sample in part.samples]
+                if len(numbers) > 1:
+                    ending.update([submit(part.part({number})) for number in numbers])
+                else:
+                    yield [failure(numbers[0], _why(error))]
             # it is written: the scheduler may forget it
-            part.release()
+            future.release()
 
 
 def _connect(stack: ExitStack, address: str, workers: int | None) -> Any:
     """A client of a scheduler, or of a new cluster of so many processes of this machine."""
+    import dask
     import distributed
 
     if workers is None:
         return stack.enter_context(distributed.Client(address, timeout=_PATIENCE))
-    cluster = distributed.LocalCluster(
-        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs="CRITICAL"
-    )
+    with dask.config.set({"distributed.scheduler.allowed-failures": _DEATHS - 1}):
+        cluster = distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs="CRITICAL"
+        )
     return stack.enter_context(distributed.Client(stack.enter_context(cluster)))
+
+
+def _why(error: Any) -> str:
+    """Why a sample has no answer that workers died of."""
+    count, last = error.allowed_failures + 1, error.last_worker.address
+    return f"{count} workers died while they computed it, the last one {last}: out of memory? Their logs say more"
 
 
 def _kind(device: str | None, prepare: Prepare) -> str:

@@ -24,7 +24,7 @@ from warpbrain.recordings.moving_markups import moved_markup
 
 _HEADER = (
     *("file", "label", "x_mm", "y_mm", "z_mm", "moved_x_mm", "moved_y_mm", "moved_z_mm"),
-    *("displacement_mm", "outside_mm"),
+    *("displacement_mm", "outside_mm", "transform_apart_mm"),
 )
 
 
@@ -72,12 +72,16 @@ class MovedPoints:
         How far outside the mesh they were before [mm].
     beyond : (n,) bool array
         Beyond the grid: they are taken not to move.
+    apart : (n,) array
+        How far from here the field, and so the transform that is written, puts them [mm]: it is linear between the
+        centres of voxels, and at a wall of tissue the displacement has a kink.
     """
 
     file: PointFile
     points: Floats
     outside: Floats
     beyond: Bools
+    apart: Floats
 
 
 def read_point_file(path: Path) -> PointFile:
@@ -133,10 +137,14 @@ def move_points(
     displacement = MILLIMETRES * place.interpolate(u)
     if middles is not None:
         displacement = MILLIMETRES * _quadratic(mesh, place.nodes, place.weights, u, middles)
-    outside = place.distance > 0.0
-    displacement[outside] = field.at(file.points[outside])
+    outside, of_field = place.distance > 0.0, field.at(file.points)
+    displacement[outside] = of_field[outside]
     return MovedPoints(
-        file, file.points + displacement, MILLIMETRES * place.distance, ~field.grid.contains(file.points)
+        file,
+        file.points + displacement,
+        MILLIMETRES * place.distance,
+        ~field.grid.contains(file.points),
+        np.linalg.norm(displacement - of_field, axis=1),
     )
 
 
@@ -165,9 +173,8 @@ def write_moved(folder: Path, moved: Sequence[MovedPoints]) -> list[str]:
         rows.writerow(_HEADER)
         for points in moved:
             sizes = np.linalg.norm(points.points - points.file.points, axis=1)
-            for label, before, after, size, outside in zip(
-                points.file.labels, points.file.points, points.points, sizes, points.outside, strict=True
-            ):
-                numbers = [f"{value:.4f}" for value in (*before, *after, size, outside)]
+            columns = (points.file.labels, points.file.points, points.points, sizes, points.outside, points.apart)
+            for label, before, after, size, outside, apart in zip(*columns, strict=True):
+                numbers = [f"{value:.4f}" for value in (*before, *after, size, outside, apart)]
                 rows.writerow([points.file.path.name, label, *numbers])
     return [*names, "moved.csv"]

@@ -18,6 +18,9 @@ import numpy as np
 
 from warpbrain.mesh.tet_mesh import MeshError
 
+#: Key of `info` of what is read.
+MATERIAL_SETS = "material sets"
+
 
 @dataclass
 class AbaqusSets:
@@ -31,16 +34,20 @@ class AbaqusSets:
         Numbers of the elements of each `*ELEMENT` line, which is a block of meshio's.
     node_sets, element_sets : dict of str to list of int
         Numbers of the members.
+    sections, of_elements : list of str
+        Names of the sets that `*SOLID SECTION` gives a material, and of those that `*ELEMENT` lines make.
     """
 
     nodes: list[int] = field(default_factory=list)
     elements: list[list[int]] = field(default_factory=list)
     node_sets: dict[str, list[int]] = field(default_factory=dict)
     element_sets: dict[str, list[int]] = field(default_factory=dict)
+    sections: list[str] = field(default_factory=list)
+    of_elements: list[str] = field(default_factory=list)
 
 
 def read_abaqus(path: Path) -> Any:
-    """Read a file: a `meshio.Mesh` with its sets.
+    """Read a file: a `meshio.Mesh` with its sets; `info[MATERIAL_SETS]` lists which of them may be the materials.
 
     Raises
     ------
@@ -72,6 +79,13 @@ def read_abaqus(path: Path) -> Any:
     raw.cell_sets = {
         name: [np.array([block[number] for number in ids if number in block], dtype=np.int64) for block in blocks]
         for name, ids in sets.element_sets.items()
+    }
+    by_name = {name.upper(): name for name in sets.element_sets}
+    raw.info = {
+        MATERIAL_SETS: [
+            list(dict.fromkeys(by_name[name.upper()] for name in names if name.upper() in by_name))
+            for names in (sets.sections, sets.of_elements)
+        ]
     }
     return raw
 
@@ -126,6 +140,10 @@ def _take(
     elif keyword == "ELEMENT":
         numbers = _elements(rows)
         sets.elements.append(numbers)
+        sets.of_elements += [options["ELSET"]] if options.get("ELSET") else []
+    elif keyword == "SOLID SECTION":
+        sets.sections += [options["ELSET"]] if options.get("ELSET") else []
+        return
     elif keyword in ("NSET", "ELSET"):
         of = sets.node_sets if keyword == "NSET" else sets.element_sets
         numbers = _members(rows, "GENERATE" in options, keyword, of, spelling)

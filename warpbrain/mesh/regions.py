@@ -1,7 +1,8 @@
 """What a mesh file says of its tissues and sets in the ways of other programs, without being asked for one of them.
 
 * Tissues: a whole-number array of the cells (VTK, XDMF, Medit), the physical groups of Gmsh, or sets of elements
-  (Abaqus' ``*ELSET``) each tetrahedron of which is in one of them and in no other.
+  (Abaqus' ``*ELSET``) of which every tetrahedron is in one and in no other: those that ``*SOLID SECTION`` gives a
+  material, else all there are, else those of ``*ELEMENT`` lines.
 * Node sets: the nodes of groups of faces, edges and points (Gmsh, ``*ELSET`` of shells), ``*NSET``, and each value of a
   whole-number array of the points.
 """
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.mesh.abaqus import MATERIAL_SETS
 from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, ends_inside_a_number, mesh_of, read_raw
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 
@@ -88,6 +90,9 @@ def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithReg
         if chosen != "tissue":
             what = "physical groups of Gmsh" if chosen == _PHYSICAL else f"values of the cell array '{chosen}'"
             notes.append(f"tissues are the {what}: {', '.join(names.get(int(v), str(int(v))) for v in values)}")
+    elif sets := {name: int(each.sum()) for name, each in _sets_of_tetrahedra(raw).items() if each.any()}:
+        listed = ", ".join(f"{name} ({count} tetrahedra)" for name, count in sets.items())
+        notes.append(f"sets of elements that overlap or leave some out are no tissues: {listed}")
     notes += _name_nodes(raw, chosen, physical)
     for name in raw.cell_sets or {}:
         if not (chosen == SETS and parts is not None and name in parts) and name not in _groups(raw):
@@ -154,19 +159,21 @@ def _chosen(path: Path, raw: Any, array: str | None) -> str | None:
 
 def _partition(raw: Any) -> list[str] | None:
     """Sets of elements of which every tetrahedron is in one, and in one only; None if there are none such."""
-    blocks = _blocks(raw)
-    members = {}
-    for name in raw.cell_sets or {}:
-        if name not in _groups(raw) and not name.startswith("gmsh:"):
-            each = _members(raw, name)
-            members[name] = np.concatenate([each[b] for b in blocks])
-    parts = {name: each for name, each in members.items() if each.any() and not each.all()}
-    if not parts:
+    members = _sets_of_tetrahedra(raw)
+    sections, of_elements = (raw.info or {}).get(MATERIAL_SETS, ([], []))
+    for names in (sections, list(members), of_elements):
+        parts = [name for name in names if members[name].any() and not members[name].all()]
         # one set of all, if it is the only one
-        whole = [name for name, each in members.items() if each.all()]
-        return whole if len(whole) == 1 else None
-    memberships = np.sum([each.astype(int) for each in parts.values()], axis=0)
-    return list(parts) if (memberships == 1).all() else None
+        parts = parts or [name for name in names if members[name].all()]
+        if parts and (np.sum([members[name].astype(int) for name in parts], axis=0) == 1).all():
+            return parts
+    return None
+
+
+def _sets_of_tetrahedra(raw: Any) -> dict[str, Bools]:
+    """Which tetrahedra (m,) are in each set of elements."""
+    names = [name for name in raw.cell_sets or {} if name not in _groups(raw) and not name.startswith("gmsh:")]
+    return {name: np.concatenate([_members(raw, name)[b] for b in _blocks(raw)]) for name in names}
 
 
 def _members(raw: Any, name: str) -> list[Bools]:
@@ -215,6 +222,9 @@ def _name_nodes(raw: Any, chosen: str | None, physical: Mapping[tuple[int, int],
         marks = np.unique(whole[whole != 0])
         if len(marks) > MOST_VALUES or _BOOKKEEPING.fullmatch(name):
             notes.append(f"point array '{name}' has {len(marks)} values: no node sets are made of it")
+            raw.point_data.pop(name)
+        elif len(marks) == 1 and whole.all():
+            # the same of every node, as Medit's numbers are that nobody has given
             raw.point_data.pop(name)
         elif len(marks) > 1:
             raw.point_data.pop(name)

@@ -9,8 +9,9 @@ from typing import Any
 
 #: What "before" is, by the unit of an error: nothing moves, or nothing pushes.
 _NOTHING = {"mm": "no motion", "N": "no force", "Pa": "no stress"}
-WORSE, IN_PART, NEARER, UNKNOWN = (
-    "worse than no motion at all", "in part worse than no motion", "nearer than no motion", "not compared"
+WORSE, IN_PART, NO_NEARER, NEARER, UNKNOWN = (
+    "worse than no motion at all", "in part worse than no motion", "no nearer than no motion", "nearer than no motion",
+    "not compared",
 )  # fmt: skip
 
 
@@ -21,7 +22,7 @@ class Explained:
     Attributes
     ----------
     verdict : str
-        One of `WORSE`, `IN_PART`, `NEARER` and `UNKNOWN`, of lengths; of other units alone, `UNKNOWN`.
+        One of `WORSE`, `IN_PART`, `NO_NEARER`, `NEARER` and `UNKNOWN`, of lengths; of other units alone, `UNKNOWN`.
     before, after : float or None
         Root mean square over all rows in mm, with nothing moved and with the state.
     sentences : tuple of str
@@ -63,6 +64,8 @@ def explained(entries: Sequence[Mapping[str, Any]], what: str = "this simulation
         verdict = WORSE
     elif worse:
         verdict = IN_PART
+    elif not _percent_gone(before, after):
+        verdict = NO_NEARER
     return Explained(verdict, before, after, tuple(sentences))
 
 
@@ -83,8 +86,17 @@ def _overall(before: float, after: float, what: str) -> str:
             f"{name} explains the recordings worse than no motion at all: RMSE {after:.3f} mm with it, {before:.3f} mm "
             "if nothing had moved."
         )
-    gone = 100.0 * (1.0 - after / before) if before > 0.0 else 0.0
+    gone = _percent_gone(before, after)
+    if not gone:
+        return (
+            f"{name} explains the recordings no better than no motion at all: RMSE {after:.3f} mm with it and without."
+        )
     return (
-        f"{name} takes {gone:.0f} % off the error of no motion at all: RMSE {before:.3f} mm if nothing had moved, "
+        f"{name} takes {gone} % off the error of no motion at all: RMSE {before:.3f} mm if nothing had moved, "
         f"{after:.3f} mm with it."
     )
+
+
+def _percent_gone(before: float, after: float) -> int:
+    """How much of an error is gone, in whole per cent."""
+    return round(100.0 * (1.0 - after / before)) if before > 0.0 else 0

@@ -25,14 +25,24 @@ from warpbrain.simulation.specimen_run import SpecimenRun
 
 #: What the fields are called that are shown unless another is asked for, and in which colours.
 _UNITS = {
-    "displacement": "displacement [mm]",
-    "displacement_mean": "mean displacement [mm]",
-    "displacement_sd": "standard deviation of the displacement [mm]",
-    "score": "score: chi-squared of 3 degrees of freedom",
-    "von_mises": "von Mises stress [Pa]",
+    "displacement": "displacement\n[mm]",
+    "displacement_mean": "mean displacement\n[mm]",
+    "displacement_sd": "standard deviation\n[mm]",
+    "score": "score\n(chi-squared)",
+    "von_mises": "von Mises stress\n[Pa]",
     "J": "volume ratio J",
-    "fluid_pressure": "fluid pressure [Pa]",
+    "fluid_pressure": "fluid pressure\n[Pa]",
 }
+
+#: Where it is looked at from, by the normal of the cut.
+_SIDES: dict[str | None, tuple[float, float, float]] = {
+    "x": (1.0, 0.6, 0.4),
+    "y": (0.6, 1.0, 0.4),
+    "z": (0.0, -0.5, 1.0),
+    None: (0.8, 0.85, 0.62),
+}
+#: Beside the body, not over it.
+_BAR = {"vertical": True, "position_x": 0.87, "position_y": 0.2, "height": 0.6, "title_font_size": 16}
 
 
 def plot(
@@ -41,6 +51,7 @@ def plot(
     field: str | None = None,
     exaggeration: float = 1.0,
     cut: str | None = "x",
+    view: tuple[float, float, float] | None = None,
     show: bool = True,
     screenshot: str | Path | None = None,
 ) -> Any:
@@ -58,6 +69,8 @@ def plot(
     cut : {"x", "y", "z"} or None
         Normal of a plane through the middle, one side of which is taken away: x is left and right, y back and front,
         z down and up.
+    view : (float, float, float), optional
+        Where it is looked at from, in RAS: by default towards the cut.
     show : bool
         Open a window, or draw into the notebook; otherwise only make the plotter.
     screenshot : path, optional
@@ -82,6 +95,9 @@ def plot(
 
     plotter = pyvista.Plotter(off_screen=True if screenshot is not None else None)
     _add(plotter, what, field, exaggeration, cut)
+    side = view or _SIDES[cut]
+    plotter.view_vector(side, viewup=(0.0, 1.0, 0.0) if cut == "z" and view is None else (0.0, 0.0, 1.0))
+    plotter.camera.zoom(1.1)
     if screenshot is not None:
         plotter.show(screenshot=str(screenshot))
     elif show:
@@ -97,7 +113,7 @@ def grid(what: Any) -> Any:
 
 
 def _add(plotter: Any, what: Any, field: str | None, exaggeration: float, cut: str | None) -> None:
-    if cut not in (None, "x", "y", "z"):
+    if cut not in _SIDES:
         raise InputError(f"cut = {cut!r}: expected 'x', 'y', 'z' or None")
     import pyvista
 
@@ -120,13 +136,10 @@ def _add(plotter: Any, what: Any, field: str | None, exaggeration: float, cut: s
         split_sharp_edges=True,
         categories=categories,
         show_scalar_bar=not categories,
-        scalar_bar_args={"title": f"{_UNITS.get(name, name)}\n", "color": "#333333", "fmt": "%.3g"},
+        scalar_bar_args={"title": f"{_UNITS.get(name, name)}\n", "color": "#333333", "fmt": "%.3g", **_BAR},
     )
     plotter.set_background("white")
     plotter.add_axes(xlabel="R", ylabel="A", zlabel="S", color="#333333")
-    side = {"x": (1.0, 0.6, 0.4), "y": (0.6, 1.0, 0.4), "z": (0.6, 0.6, 1.2), None: (0.8, 0.85, 0.62)}[cut]
-    plotter.view_vector(side, viewup=(0.0, 0.0, 1.0))
-    plotter.camera.zoom(1.3)
 
 
 @singledispatch

@@ -10,7 +10,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, in_three_dimensions
 from warpbrain.report.comparison import explained_of
-from warpbrain.report.explained import IN_PART, NEARER, UNKNOWN, WORSE, number
+from warpbrain.report.explained import IN_PART, NEARER, NO_NEARER, UNKNOWN, WORSE, number
 from warpbrain.report.generative.page import BLACK, GREEN, ORANGE, QUIET, VERMILLION
 from warpbrain.report.mesh_error import mesh_error_lines
 from warpbrain.report.page.document import document, header, listed, section, text, write_document
@@ -24,6 +24,7 @@ from warpbrain.simulation.result import Result
 BADGES = {
     NEARER: (GREEN, "#ffffff"),
     IN_PART: (ORANGE, BLACK),
+    NO_NEARER: (ORANGE, BLACK),
     WORSE: (VERMILLION, "#ffffff"),
     UNKNOWN: (QUIET, "#ffffff"),
 }

@@ -35,6 +35,8 @@ _MOST_VOXELS = 64_000_000
 _INSIDE = 0.5
 #: Part of the body outside an image from which on it is said.
 _CUT_OFF = 0.001
+#: From which on it is said that a point and the transform of the voxels disagree [mm].
+_APART = 0.05
 #: What the values of `trust.nii.gz` mean.
 TRUST = {
     SEEN: "recordings see a force, and nothing is left",
@@ -278,6 +280,11 @@ def _lines(
         if points.beyond.any():
             line += (
                 f", {np.count_nonzero(points.beyond)} beyond the image, which stay where they are if outside the mesh"
+            )
+        if len(far := points.apart[points.apart > _APART]):
+            line += (
+                f"; {len(far)} of them {_APART:g} to {far.max():.2g} mm from where the transform puts them, which is "
+                "linear between voxels: at a wall (moved.csv)"
             )
         lines += [line, *(f"note      {remark}" for remark in points.file.remarks)]
     for image in (asked.image, asked.labels):

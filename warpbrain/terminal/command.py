@@ -14,6 +14,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.claim import release
 from warpbrain.terminal.crash import SOFTWARE, where, write_report
 from warpbrain.terminal.interrupt import clear_up, stop_promptly
+from warpbrain.terminal.quiet import reason_of
 from warpbrain.terminal.record import Record
 
 
@@ -64,7 +65,7 @@ def exit_status(program: str, call: Callable[[], None], record: Record | None = 
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE
     except OSError as error:
-        print(f"{program}: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
+        print(f"{program}: {error.filename or 'output'}: {reason_of(error)}", file=sys.stderr)
         return 1
     except MemoryError as error:
         detail = " ".join(str(error).split())

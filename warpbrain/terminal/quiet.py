@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
+from pathlib import Path
 from typing import Any
+
+_NOT_KEPT = "kernels cannot be kept there"
 
 
 def start_warp_quietly() -> Any:
@@ -24,10 +27,23 @@ def start_warp_quietly() -> Any:
         wp.init()
     except OSError as error:
         # a home that cannot be written to: kernels are compiled into a folder in it
-        why = f"kernels cannot be kept there ({error.strerror}): set WARP_CACHE_PATH to a folder that can be written to"
-        raise OSError(error.errno, why, error.filename) from None
+        raise OSError(error.errno, _not_kept(error), error.filename) from None
     finally:
         os.dup2(saved, 2)
         os.close(saved)
         os.close(nowhere)
     return wp
+
+
+def reason_of(error: OSError) -> str:
+    """Why the system refused something, and what to do where it is a folder that kernels are kept in."""
+    warp = sys.modules.get("warp")
+    cache = warp.config.kernel_cache_dir if warp else None
+    said = str(error.strerror).startswith(_NOT_KEPT)
+    if cache and error.filename and not said and Path(os.fsdecode(error.filename)).is_relative_to(cache):
+        return _not_kept(error)
+    return error.strerror or str(error)
+
+
+def _not_kept(error: OSError) -> str:
+    return f"{_NOT_KEPT} ({error.strerror}): set WARP_CACHE_PATH to a folder that can be written to"

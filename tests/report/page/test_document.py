@@ -31,3 +31,12 @@ def test_a_column_in_which_nothing_stands_is_left_out():
 def test_a_filled_column_stays_where_it_is():
     page = table(("name", "check"), [["a", ""], ["b", "1.0"]], numbers=(1,))
     assert re.findall(r"<td[^>]*>(.*?)</td>", page) == ["a", "", "b", "1.0"]
+
+
+def test_what_stands_above_a_table_does_not_scroll_with_it():
+    page = table(("name", "unit"), [["a", "mm"], ["b", "mm"]], caption="Root mean square")
+    above, scrolling = page.split('<div class="wide"')
+    assert above == '<p class="note">Root mean square</p>' and 'aria-label="Root mean square"' in scrolling
+    # units need no room for lines, prose does
+    assert page.count('class="short"') == 6
+    assert 'class="short"' not in table(("why",), [["mm"], ["a sentence of many words"]])

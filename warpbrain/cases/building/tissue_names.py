@@ -22,7 +22,10 @@ _USUAL = {
     "grey": "grey matter",
     "gray": "grey matter",
     "gray matter": "grey matter",
+    "grey matter": "grey matter",
     "white": "white matter",
+    "white matter": "white matter",
+    RESECTION: RESECTION,
 }
 #: Names that the literature or other programs use; one that is nearly one of them was meant for it.
 _KNOWN = (
@@ -90,8 +93,8 @@ def parse_names(arguments: Sequence[str]) -> dict[int, str]:
 
 
 def usual_name(name: str) -> str:
-    """The name in the form that is used throughout: ``"gray"`` is ``"grey matter"``."""
-    low = " ".join(name.lower().split())
+    """The name in the form that is used throughout: ``"gray"`` and ``"GREY_MATTER"`` are ``"grey matter"``."""
+    low = " ".join(re.split(r"[\s_-]+", name.lower().strip(" _-")))
     if low == VENTRICLE or low in OUTSIDE:
         return low
     # a misspelt cavity would be meshed as a solid

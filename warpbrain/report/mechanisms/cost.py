@@ -37,22 +37,6 @@ def row_of(costs: Costs, kind: str) -> Mapping[str, Any] | None:
     return next((row for row in costs["rows"] if row["kind"] == kind), None)
 
 
-def sentences(measured: Sequence[Costs], kind: str) -> list[str]:
-    """What a mechanism's example costs, a line a machine."""
-    lines = []
-    for costs in measured:
-        row = row_of(costs, kind)
-        if row is not None:
-            linear, newton = _medians(row["cg_iterations"]), _medians(row["newton_iterations"])
-            lines.append(
-                f"- {machine(costs)}{_other_example(row)}: a time step takes {ratio(row['step']):.2f} times that of "
-                f"the plain model ({linear[1]:g} iterations of the linear solver for {linear[0]:g}), an iteration "
-                f"of Newton's method {ratio(row['newton']):.2f} times ({newton[1]:g} iterations to equilibrium for "
-                f"{newton[0]:g})."
-            )
-    return lines
-
-
 def reasons(measured: Sequence[Costs]) -> list[str]:
     """Why steps with some mechanisms take long, a line a machine and mechanism; none if none does."""
     lines = []

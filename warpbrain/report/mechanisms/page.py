@@ -10,10 +10,10 @@ from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.report.mechanisms.effect import Effect
-from warpbrain.report.mechanisms.picture import LARGEST, MAGNIFIED, PLACE
+from warpbrain.report.mechanisms.picture import MAGNIFIED, PLACE
 
 
-def page(kind: str, effect: Effect, costs: list[str]) -> str:
+def page(kind: str, effect: Effect) -> str:
     """The whole page.
 
     Parameters
@@ -21,8 +21,6 @@ def page(kind: str, effect: Effect, costs: list[str]) -> str:
     kind : str
     effect : Effect
         Of its example.
-    costs : list of str
-        What its example costs, a sentence a machine.
     """
     mechanism = mechanisms()[kind]
     module = sys.modules[mechanism.__module__]
@@ -32,9 +30,9 @@ def page(kind: str, effect: Effect, costs: list[str]) -> str:
     lines += ["## What it does to the phantom", "", *_picture(mechanism, effect), ""]
     lines += ["## What it is taken for", "", *confusions(mechanism), ""]
     lines += ["## Derivatives", "", *derivatives(mechanism), ""]
-    lines += ["## Cost", "", *(costs or ["Not measured yet."]), ""]
     lines += [
-        f"[{source.rsplit('/', 1)[1]}]({source}), [all mechanisms](index.md), [together with others](pairs.md)",
+        f"[{source.rsplit('/', 1)[1]}]({source}), [what it costs, all mechanisms](index.md#cost), "
+        "[together with others](pairs.md)",
         "",
     ]
     return "\n".join(lines)
@@ -59,10 +57,7 @@ def derivatives(mechanism: type[Mechanism]) -> list[str]:
     lines = []
     numbers = [f"`{key}`" for key in smooth_parameters(mechanism)]
     if numbers:
-        lines.append(
-            f"By {', '.join(numbers)}: the implicit function theorem, with five-point differences of what it does "
-            "([solvers](../solvers.md#derivatives))."
-        )
+        lines.append(f"By {', '.join(numbers)} ([how](../solvers.md#derivatives)).")
     for key, says in mechanism.parameters().items():
         if says.choices:
             lines.append(
@@ -91,7 +86,6 @@ def _picture(mechanism: type[Mechanism], effect: Effect) -> list[str]:
         "",
         f"![{mechanism.kind}: what it does to the phantom](../figures/mechanism-{mechanism.kind}.png)",
         "",
-        f"The phantom under 1 N on its cap, cut at y = {1000.0 * PLACE:.0f} mm. On the right what the mechanism adds "
-        f"to its displacement, {state}: shape and arrows {MAGNIFIED:g} times as large, colours up to {LARGEST:g} mm, "
-        f"the undeformed surface dashed. At most {effect.largest:.2f} mm, at ({place}) mm.",
+        f"The phantom under 1 N, cut at y = {1000.0 * PLACE:.0f} mm; right: what is added to its displacement, "
+        f"{state}, {MAGNIFIED:g} times as large. At most {effect.largest:.2f} mm, at ({place}) mm.",
     ]

@@ -1,0 +1,94 @@
+"""The site: `.ci/site` builds it with every example run; with `GALLERY=0` in the environment none is."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pyvista
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(Path(__file__).parent))
+# gallery scripts run in processes of their own kind: no window, one picture style
+pyvista.OFF_SCREEN = True
+pyvista.BUILDING_GALLERY = True
+os.environ.setdefault("MPLBACKEND", "agg")
+
+project = "warpbrain"
+author = "warpbrain maintainers"
+copyright = "warpbrain maintainers, Apache-2.0"
+try:
+    release = importlib.metadata.version("warpbrain")
+except importlib.metadata.PackageNotFoundError:
+    release = "0+unknown"
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["_build", "gallery/*.ipynb", "gallery/*.py", "gallery/*.md5", "gallery/*.zip", "figures"]
+html_theme = "furo"
+html_title = f"warpbrain {release}"
+html_copy_source = False
+html_static_path: list[str] = []
+
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 4
+# a heading level may be skipped where a page was made from a table; several classes have an attribute of one name
+suppress_warnings = ["myst.header", "config.cache", "ref.python"]
+
+default_role = "py:obj"
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+napoleon_numpy_docstring = True
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"/plot_",
+    "ignore_pattern": r"__init__\.py|there_and_back\.py",
+    "image_scrapers": ("matplotlib", "pyvista", "gallery_figures"),
+    "reset_modules": ("matplotlib",),
+    "download_all_examples": False,
+    "remove_config_comments": True,
+    "show_memory": False,
+    "min_reported_time": 0,
+    # an example that fails is a site that is wrong
+    "abort_on_example_error": True,
+    "only_warn_on_example_error": False,
+    "within_subsection_order": "FileNameSortKey",
+    "nested_sections": False,
+    "plot_gallery": os.environ.get("GALLERY", "1") != "0",
+}
+
+
+def linked_elsewhere(app: Any, name: str, source: list[str]) -> None:
+    """Before a page is parsed: `[text](../path)` becomes the text with the path of the file in the repository."""
+    page = Path(app.env.doc2path(name))
+    if page.suffix != ".md":
+        return
+
+    def shown(found: re.Match[str]) -> str:
+        text, target = found[1], found[2].partition("#")[0]
+        if "://" in target or not target:
+            return found[0]
+        file = (page.parent / target).resolve()
+        if file.is_relative_to(ROOT / "docs") or not file.is_relative_to(ROOT):
+            return found[0]
+        path = file.relative_to(ROOT).as_posix()
+        return text if path in text else f"{text} (`{path}` of the repository)"
+
+    source[0] = re.sub(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)", shown, source[0])
+
+
+def setup(app: Any) -> None:
+    """Called by Sphinx."""
+    app.connect("source-read", linked_elsewhere)

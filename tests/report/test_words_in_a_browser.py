@@ -1,0 +1,29 @@
+"""Names in a case that are HTML are words in its report: opened in headless Chromium, nothing of them runs."""
+
+from browser import needs_browser, opened
+from command import run
+from folders import write_recorded
+
+EVIL = "<img src=x onerror='window.ran=1'></script><script>window.ran=1</script>"
+CHANGES = [
+    ('title = "A block of gel"', f'title = "{EVIL}"'),
+    ('name = "soft"', f'name = "soft{EVIL}"'),
+    ('name = "table"', f'name = "table{EVIL}"'),
+]
+BEADS = f"id,x,y,z,ux,uy,uz\n{EVIL},10,10,10,0.1,0.0,-0.2\nb,20,15,25,0.0,0.1,-0.5\nc,5,5,30,0.3,0,-1\n"
+
+
+@needs_browser
+def test_nothing_of_a_name_runs(tmp_path):
+    folder = write_recorded(tmp_path / "case", *CHANGES, files={"recordings/beads.csv": BEADS})
+    text = (folder / "case.toml").read_text()
+    (folder / "case.toml").write_text(text.replace('name = "beads"', f'name = "beads{EVIL}"'))
+    ran = run(folder, "--out", tmp_path / "out")
+    assert ran.status == 0, ran.err
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert page.count("window.ran=1") > 3
+    look = "<script>setTimeout(() => { document.body.dataset.ran = String(window.ran); }, 300);</script>"
+    assert 'data-ran="undefined"' in opened(page.replace("</body>", look + "</body>"), tmp_path)
+    # the look itself: what does run is seen
+    bad = page.replace("</body>", EVIL + look + "</body>")
+    assert 'data-ran="1"' in opened(bad, tmp_path)
