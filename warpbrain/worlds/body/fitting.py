@@ -93,6 +93,8 @@ class Fitter:
             before, fit = fit, search.result()
             if abs(fit.log_evidence - before.log_evidence) < _SAME:
                 break
+        if not np.isfinite(fit.log_evidence):
+            raise FloatingPointError("its evidence is not a number")
         return fit
 
     def _mesh_error_changed(self, search: FitSearch, screened: Marginal, known: MeshErrors) -> bool:

@@ -69,6 +69,8 @@ class HypothesisSearch:
         self._sets: dict[frozenset[str], WeightedSet] = {}
         # of fitted sets whose supersets were weighed: what makes columns about the fit
         self._expanded: dict[frozenset[str], Effects] = {}
+        # fitted sets about which nothing is linear
+        self._unstable: set[frozenset[str]] = set()
 
     @property
     def weighted_sets(self) -> tuple[WeightedSet, ...]:
@@ -143,13 +145,16 @@ class HypothesisSearch:
         while not alone and (single := far_from_linear(list(self._sets.values()), self._bend)) is not None:
             self._fit(single.names)
         for _ in range(0 if alone else _MOST):
-            chosen = next_to_fit(self.weighted_sets, self.probabilities, self._expanded)
+            chosen = next_to_fit(self.weighted_sets, self.probabilities, {*self._expanded, *self._unstable})
             if chosen is None:
                 return
             if chosen.refit is None:
                 self._fit(chosen.names)
-            else:
+                continue
+            try:
                 self._weigh_supersets(chosen, chosen.refit)
+            except SolveError:
+                self._unstable.add(chosen.names)
 
     def fitted_with(self, mechanisms: frozenset[str], superset: WeightedSet | None = None) -> WeightedSet | None:
         """The most probable fitted set with exactly these mechanisms, fitted if none was; None if none can be.
