@@ -19,8 +19,10 @@ from warpbrain.estimation.registration import registration_of
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
+from warpbrain.physics.laws.ogden import Ogden
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.mechanisms.asymmetry import NEO_HOOKEAN
 from warpbrain.physics.proposal import Proposal
 from warpbrain.simulation.assumed import all_substituted
 from warpbrain.simulation.model import Material
@@ -35,6 +37,8 @@ from warpbrain.worlds.body.states import Hypothesis, States
 LAW = "shape of the law"
 #: The family of what is not known of the mesh's error.
 UNKNOWN_MESH = "mesh, unknown"
+#: Exponent of what stiffens in both directions.
+_STIFFENS = 8.0
 #: Step of a difference in `theta`.
 _STEP = 1e-3
 
@@ -199,7 +203,7 @@ def field_columns(at: Linearisation, states: States) -> Floats:
 
 
 def law_columns(effects: Effects, states: States) -> Floats:
-    """What another Poisson ratio, exponent and share of the second invariant change of what is recorded: (n, 3)."""
+    """What another Poisson ratio, exponent, share of the second invariant and stiffening change: (n, 4)."""
     proposals = [other_volume(states), *_other_shape(states)]
     return np.concatenate([effect.columns for effect in effects.of(proposals)], axis=1)
 
@@ -236,12 +240,29 @@ class _SecondInvariant(Mechanism):
         return MooneyRivlin(0.5 * mu * (1.0 - self.share), 0.5 * mu * self.share), poisson, formulation
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Stiffening(Mechanism):
+    """A law with a share of one that stiffens alike in compression and in tension."""
+
+    share: float
+    kind: ClassVar[str] = "stiffening"
+    sentence: ClassVar[str] = "The law stiffens with strain."
+
+    def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
+        """See `warpbrain.physics.mechanism.Substituting`; Ogden's law of three terms."""
+        exponents = (NEO_HOOKEAN, _STIFFENS, -_STIFFENS)
+        shares = (1.0 - self.share, 0.5 * self.share, 0.5 * self.share)
+        moduli = tuple(2.0 * law.shear_modulus * part / alpha for part, alpha in zip(shares, exponents, strict=True))
+        return Ogden(moduli, exponents), poisson, formulation
+
+
 def _other_shape(states: States) -> list[Proposal]:
     return [
         _always(states, "tissue.exponent"),
         Proposal.of_one(
             lambda share: _SecondInvariant(share=share), 0.5, belief("tissue.second_invariant"), "smooth", 0.5
         ),
+        Proposal.of_one(lambda share: _Stiffening(share=share), 0.5, belief("tissue.stiffening"), "smooth", 0.5),
     ]
 
 
