@@ -92,9 +92,11 @@ def test_simpleitk_agrees(folder, warped, verify):
         sitk.DisplacementFieldTransform(sitk.ReadImage(warped / f"transform-{name}.nii.gz", sitk.sitkVectorFloat64))
         for name in ("before-to-after", "after-to-before")
     )
-    _, before, after = moved_of(warped)
+    rows, before, after = moved_of(warped)
     signs = np.array([-1.0, -1.0, 1.0])
     moved = np.array([back.TransformPoint((signs * point).tolist()) for point in before]) * signs
+    apart = [float(row["transform_apart_mm"]) for row in rows]
+    np.testing.assert_allclose(apart, np.linalg.norm(moved - after, axis=1), atol=1e-3)
     verify(
         "landmarks in and beside a body of ten-node tetrahedra, largest error of moved.csv",
         "SimpleITK with the transform that is written",
