@@ -20,6 +20,9 @@ from warpbrain.kernels.powers import power_minus_one, power_quotient
 from warpbrain.physics.laws.device import PrincipalLaw
 from warpbrain.physics.laws.law import Law, require_finite
 
+#: Exponent of the one term that is the neo-Hookean law.
+NEO_HOOKEAN = 2.0
+
 
 @wp.func
 def _coupled_energy(l: Any, parameters: wp.array2d[Any], e: int):

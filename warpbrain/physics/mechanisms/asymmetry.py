@@ -13,14 +13,11 @@ from typing import ClassVar
 
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.laws import Law
-from warpbrain.physics.laws.ogden import Ogden
+from warpbrain.physics.laws.ogden import NEO_HOOKEAN, Ogden
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.words import Values, measured
-
-#: Exponent of the neo-Hookean law.
-NEO_HOOKEAN = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,10 +19,9 @@ from warpbrain.estimation.registration import registration_of
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
-from warpbrain.physics.laws.ogden import Ogden
+from warpbrain.physics.laws.ogden import NEO_HOOKEAN, Ogden
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.physics.mechanisms.asymmetry import NEO_HOOKEAN
 from warpbrain.physics.proposal import Proposal
 from warpbrain.simulation.assumed import all_substituted
 from warpbrain.simulation.model import Material
