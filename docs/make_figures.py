@@ -18,7 +18,7 @@ from warpbrain.report.generative.studies_picture import draw_studies
 
 FIGURES = Path(__file__).parent / "figures"
 #: Pictures of runs, of ensembles and of cases, by file.
-RUNS = {"0614.png": ["--case", "0614"], "0529.png": ["--case", "0529"]}
+RUNS = {"0614.png": ["--case", "0614"]}
 ENSEMBLES = {"0529-spread.png": ["--case", "0529", "--tissue", "single", "--grid"]}
 CASES = {"0529-case.png": ["0529"]}
 #: Colours that are left of a picture of curves, and its width [pixel]: a screen's, and a fraction of the bytes.

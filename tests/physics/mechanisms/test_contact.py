@@ -219,7 +219,7 @@ def test_a_brain_slides_along_its_own_curved_surface(name, state, iterations, de
     case = replace(find_case(name), gravity_axis=(0.0, -1.0, 0.0))
     case = replace(case, boundaries=tuple(b for b in case.boundaries if b.kind == "fixed"), mechanisms=())
     case = assume(assume(case, "gravity:level=40"), f"contact:nodes=surface,state={state}")
-    system = System(model_of_case(case)[0], device)
+    system = System(model_of_case(case), device)
     state_found = solve_equilibrium(system)
     assert len(state_found.history) <= iterations
     (term,) = system.terms
@@ -233,7 +233,7 @@ def test_a_brain_slides_along_its_own_curved_surface(name, state, iterations, de
 def test_it_slides_in_motion_too(device):
     case = assume(assume(find_case("0529"), "gravity:level=40"), "contact:nodes=surface,state=sliding,penalty=500")
     # stiff enough that what the penalty gives way is small: motion knows no augmentation
-    system = System(model_of_case(case)[0], device)
+    system = System(model_of_case(case), device)
     expected = solve_equilibrium(system).u
     relax_to_rest(system)
     assert np.abs(system.u.numpy() - expected).max() < 1e-4 * np.abs(expected).max()
