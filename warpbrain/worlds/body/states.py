@@ -265,9 +265,7 @@ class States:
             own = system if moments.cases[number] is case else self._system(hypothesis, moments.cases[number])
             near = start if not found else self._near.get(time, start)
             external = own.model.external_forces()
-            # on a CPU conjugate gradients solve a single state in the time that factors take
-            factors = None if own.device.is_cpu else self._factors_of(own)
-            solver = EquilibriumSolver(own, options, factors=factors)
+            solver = EquilibriumSolver(own, options, factors=self._factors_of(own))
             if nearby is not None and near is not None and not found:
                 near = nearby.toward_equilibrium(own, external, near, TOLERANCE)
             try:
