@@ -16,7 +16,7 @@ from warpbrain.simulation.sparse_factors import SparseFactors
 Floats = NDArray[np.float64]
 
 #: Iterations of a solve with factors that are near, and how many beyond these a factorisation takes as long as.
-_NEAR, _WORTH = 5, 60
+_NEAR, _WORTH = 5, 25
 
 
 class KeptFactors:

@@ -18,7 +18,7 @@ from warpbrain.worlds.body.mesh_share import excess_error
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.states import SolvedState
 
-#: How often at most a fit is repeated with the gross errors and the noise of its result.
+#: How often at most a fit is repeated with the error of the mesh, or with the gross errors and the noise, of its result.
 _ROUNDS = 3
 #: Change of the log evidence below which the fit is not repeated again.
 _SAME = 0.1
@@ -82,9 +82,11 @@ class Fitter:
         if subset is None:
             search.backtrack_to_base()
         search.minimise(relinearise=True)
-        if self.mesh_errors is not None and self._mesh_error_changed(search, screened, self.mesh_errors):
+        for _ in range(_ROUNDS):
+            if self.mesh_errors is None or not self._mesh_error_changed(search, screened, self.mesh_errors):
+                break
             search.start([search.z], search.state)
-            search.minimise(relinearise=False)
+            search.minimise(relinearise=True)
         fit = search.result()
         for _ in range(_ROUNDS):
             if not search.update_noise(fit):

@@ -292,7 +292,7 @@ class HypothesisSearch:
         """The most probable coordinates of a set in the linear model about the fit without any cause."""
         columns = np.column_stack([nothing.columns, candidate.columns[:, len(nothing.nuisances) :]])
         nuisances = self.base.nuisances
-        columns = nuisances.with_unknown_mesh(columns, candidate.columns[:, nuisances.part(UNKNOWN_MESH)])
+        columns = nuisances.with_family(UNKNOWN_MESH, columns, candidate.columns[:, nuisances.part(UNKNOWN_MESH)])
         model = GaussianModel(candidate.marginal.noise.noise_factor, columns)
         return model.coefficients(nothing.linear + candidate.residual - self.base.residual)[0]
 

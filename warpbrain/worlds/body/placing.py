@@ -126,7 +126,7 @@ def _with_radii(proposed: Proposal, centres: Floats) -> list[Proposal]:
 def _on_surface(base: Base, centre: Floats, reach: float, patch: Patch | None) -> Floats:
     """A point (3,) [m] and middles of faces about it (k, 3), of faces that are free, or that a patch is a part of.
 
-    They are half their reach apart or more.
+    They are a quarter of the reach apart or more.
     """
     mesh = base.at.system.model.mesh
     if patch is None:
@@ -140,6 +140,6 @@ def _on_surface(base: Base, centre: Floats, reach: float, patch: Patch | None) -
     for number in np.argsort(distance, kind="stable").tolist():
         if distance[number] > reach:
             break
-        if min(np.linalg.norm(np.array(chosen) - middles[number], axis=1)) >= 0.5 * reach:
+        if min(np.linalg.norm(np.array(chosen) - middles[number], axis=1)) >= 0.25 * reach:
             chosen.append(middles[number])
     return np.array(chosen)
