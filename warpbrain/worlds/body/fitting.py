@@ -99,6 +99,18 @@ class Fitter:
             raise FloatingPointError("its evidence is not a number")
         return fit
 
+    def begin(self, effects: tuple[Effect, ...], refit: Refit) -> Refit:
+        """The point of a fit with other effects that have as many coefficients, in the columns of that fit.
+
+        Raises
+        ------
+        SolveError
+            If there is no equilibrium.
+        """
+        search = FitSearch(self.base, self.mesh_errors, effects, refit.columns, refit.marginal)
+        search.start([search.begin_at(refit)], refit.state)
+        return search.result()
+
     def _mesh_error_changed(self, search: FitSearch, screened: Marginal, known: MeshErrors) -> bool:
         """Compute the error of the mesh at the best point; whether the search has to go on with it."""
         if search.effects:

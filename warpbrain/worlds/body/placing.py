@@ -96,6 +96,22 @@ def _effects_of(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect]
     return [result for result in switch_effects(effects, proposals) if isinstance(result, Effect)]
 
 
+def places_about(base: Base, proposed: Proposal, step: float) -> list[Proposal]:
+    """Proposals a step [m] from another one along each principal axis, back on the surface if it is of that.
+
+    And at the same place with other radii.
+    """
+    assert proposed.elsewhere is not None and proposed.centre is not None and proposed.radius is not None
+    axes = principal_axes(base.at.system.model.mesh.points)
+    centres = [proposed.centre + sign * step * axis for axis in axes for sign in (-1.0, 1.0)]
+    if proposed.on_surface:
+        middles = _middles(base, proposed.patch)
+        nearest = {int(np.argmin(np.sum((middles - centre) ** 2, axis=1))) for centre in centres}
+        centres = [middles[number] for number in sorted(nearest)]
+    others = [proposed.elsewhere(proposed.centre, factor * proposed.radius) for factor in _RADII if factor != 1.0]
+    return [*others, *(proposed.elsewhere(centre, proposed.radius) for centre in centres)]
+
+
 def _cell(base: Base, effect: Effect, spacing: float) -> list[Proposal]:
     """Proposals throughout the cell of an effect: on the surface all of it, in the depth a step to each side."""
     proposed = effect.proposed
@@ -128,13 +144,7 @@ def _on_surface(base: Base, centre: Floats, reach: float, patch: Patch | None) -
 
     They are a quarter of the reach apart or more.
     """
-    mesh = base.at.system.model.mesh
-    if patch is None:
-        held = np.asarray(base.at.system.model.constrained.reshape(-1, 3).all(axis=1))
-        faces = mesh.boundary[~held[mesh.boundary].any(axis=1)]
-    else:
-        faces = mesh.boundary[patch.held[mesh.boundary].all(axis=1)]
-    middles = mesh.points[faces].mean(axis=1)
+    middles = _middles(base, patch)
     distance = np.linalg.norm(middles - centre, axis=1)
     chosen = [centre]
     for number in np.argsort(distance, kind="stable").tolist():
@@ -143,3 +153,14 @@ def _on_surface(base: Base, centre: Floats, reach: float, patch: Patch | None) -
         if min(np.linalg.norm(np.array(chosen) - middles[number], axis=1)) >= 0.25 * reach:
             chosen.append(middles[number])
     return np.array(chosen)
+
+
+def _middles(base: Base, patch: Patch | None) -> Floats:
+    """Of faces (k, 3) [m] that are free, or that a patch is a part of."""
+    mesh = base.at.system.model.mesh
+    if patch is None:
+        held = np.asarray(base.at.system.model.constrained.reshape(-1, 3).all(axis=1))
+        faces = mesh.boundary[~held[mesh.boundary].any(axis=1)]
+    else:
+        faces = mesh.boundary[patch.held[mesh.boundary].all(axis=1)]
+    return np.asarray(mesh.points[faces].mean(axis=1))
