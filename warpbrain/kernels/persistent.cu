@@ -23,7 +23,7 @@ const REAL *const b_of = (const REAL *)b.data;
 REAL *const x_of = (REAL *)x.data;
 
 // -- what is kept on the chip: vectors and inverse diagonal blocks first, then as much of the matrix as there is room for
-enum { X, R, U, W, P, S, Q, Z, INVERSE, VECTORS = INVERSE + 3 };
+enum { X, R, U, W, P, S, Q, Z, M, INVERSE, VECTORS = INVERSE + 3 };
 double(*const partial)[SUMS] = (double(*)[SUMS])dynamic_smem_base;
 double(*const totals)[SUMS] = partial + 32;
 int *const quit = (int *)(totals + 32);
@@ -91,17 +91,25 @@ if (*quit)
     return;
 
 // -- meetings of all blocks
-double sums[SUMS];
-// What threads stored before is seen by all after it, and their four shares are added in an order that is always the
-// same. False if a block is missing: then every thread has to return.
-auto meet = [&](double s0, double s1, double s2, double s3) -> bool {
-    double s[SUMS] = {s0, s1, s2, s3};
-    for (int d = 16; d > 0; d /= 2)
-        for (int k = 0; k < SUMS; ++k)
-            s[k] += __shfl_xor_sync(ALL, s[k], d);
-    if (lane == 0)
-        for (int k = 0; k < SUMS; ++k)
-            partial[warp][k] = s[k];
+// Sums over a warp of four numbers: lane 8 k has the k-th, in an order that is always the same. Halves go different ways.
+auto warp_sums = [&](const double s[SUMS]) -> double {
+    const bool upper = lane & 16, odd = lane & 8;
+    double low = upper ? s[2] : s[0], high = upper ? s[3] : s[1];
+    low += __shfl_xor_sync(ALL, upper ? s[0] : s[2], 16);
+    high += __shfl_xor_sync(ALL, upper ? s[1] : s[3], 16);
+    double sum = odd ? high : low;
+    sum += __shfl_xor_sync(ALL, odd ? low : high, 8);
+    for (int d = 4; d > 0; d /= 2)
+        sum += __shfl_xor_sync(ALL, sum, d);
+    return sum;
+};
+double sums[SUMS] = {0.0, 0.0, 0.0, 0.0};
+// What threads stored before is seen by all after it, and their shares of `sums` are added in an order that is always
+// the same. False if a block is missing: then every thread has to return.
+auto meet = [&]() -> bool {
+    double sum = warp_sums(sums);
+    if (lane % 8 == 0)
+        partial[warp][lane / 8] = sum;
     __syncthreads();
     ++epoch;
     // a message is half a number and the epoch, which a single store of eight bytes cannot tear apart; a place is
@@ -109,23 +117,20 @@ auto meet = [&](double s0, double s1, double s2, double s3) -> bool {
     unsigned long long *const mail = (unsigned long long *)messages.data + size_t(epoch % 2) * grid * 2 * SUMS;
     if (warp == 0) {
         for (int k = 0; k < SUMS; ++k)
-            s[k] = lane < WARPS ? partial[lane][k] : 0.0;
-        for (int d = 16; d > 0; d /= 2)
-            for (int k = 0; k < SUMS; ++k)
-                s[k] += __shfl_xor_sync(ALL, s[k], d);
+            sums[k] = lane < WARPS ? partial[lane][k] : 0.0;
+        sum = warp_sums(sums);
         asm volatile("fence.acq_rel.gpu;" ::: "memory");
-        if (lane < 2 * SUMS) {
-            const double mine = lane < 4 ? (lane < 2 ? s[0] : s[1]) : (lane < 6 ? s[2] : s[3]);
-            const unsigned long long bits = __double_as_longlong(mine);
-            const unsigned long long half = lane % 2 ? bits >> 32 : bits & 0xffffffffull;
+        if (lane % 8 < 2) {
+            const unsigned long long bits = __double_as_longlong(sum);
+            const unsigned long long half = lane % 8 ? bits >> 32 : bits & 0xffffffffull;
             const unsigned long long message = half << 32 | epoch;
-            asm volatile("st.relaxed.gpu.global.u64 [%0], %1;" ::"l"(mail + 2 * SUMS * me + lane), "l"(message)
+            asm volatile("st.relaxed.gpu.global.u64 [%0], %1;" ::"l"(mail + 2 * SUMS * me + lane / 8 * 2 + lane % 8), "l"(message)
                          : "memory");
         }
     }
     if (warp < (grid + 31) / 32) {
         for (int k = 0; k < SUMS; ++k)
-            s[k] = 0.0;
+            sums[k] = 0.0;
         if (tid < grid) {
             const unsigned long long *const from = mail + 2 * SUMS * tid;
             unsigned long long begun = 0, now;
@@ -138,7 +143,7 @@ auto meet = [&](double s0, double s1, double s2, double s3) -> bool {
                                  : "l"(from + 2 * k)
                                  : "memory");
                     all_there = all_there && (unsigned)low == epoch && (unsigned)high == epoch;
-                    s[k] = __longlong_as_double((long long)(high >> 32 << 32 | low >> 32));
+                    sums[k] = __longlong_as_double((long long)(high >> 32 << 32 | low >> 32));
                 }
                 if (all_there)
                     break;
@@ -154,12 +159,9 @@ auto meet = [&](double s0, double s1, double s2, double s3) -> bool {
             }
             asm volatile("fence.acq_rel.gpu;" ::: "memory");
         }
-        for (int d = 16; d > 0; d /= 2)
-            for (int k = 0; k < SUMS; ++k)
-                s[k] += __shfl_xor_sync(ALL, s[k], d);
-        if (lane == 0)
-            for (int k = 0; k < SUMS; ++k)
-                totals[warp][k] = s[k];
+        sum = warp_sums(sums);
+        if (lane % 8 == 0)
+            totals[warp][lane / 8] = sum;
     }
     __syncthreads();
     for (int k = 0; k < SUMS; ++k) {
@@ -170,214 +172,203 @@ auto meet = [&](double s0, double s1, double s2, double s3) -> bool {
     return *(volatile int *)quit == 0;
 };
 
-// -- what all blocks read of each other: two places that take turns, four numbers a node
+// -- rows: LANES threads for each; of every four the first three have its components, of which the first three of all count
+const int component = min(sub % 4, 2);
+// Component of a row of `A v`, and if asked for of `|A| |v|`: of what was given before the last meeting, or of the guess.
 int turn = 0;
-auto outgoing = [&]() -> double * { return exchange.data + size_t(turn) * 4 * nodes; };
-auto incoming = [&](int node, double value[3]) {
-    const double *const from = exchange.data + (size_t(turn ^ 1) * nodes + node) * 4;
-    asm volatile("ld.global.cg.v2.f64 {%0, %1}, [%2];" : "=d"(value[0]), "=d"(value[1]) : "l"(from));
-    asm volatile("ld.global.cg.f64 %0, [%1];" : "=d"(value[2]) : "l"(from + 2));
-};
-auto initial = [&](int node, double value[3]) {
-    for (int c = 0; c < 3; ++c)
-        value[c] = double(x_of[3 * size_t(node) + c]);
-};
-
-// -- rows: LANES threads for each, of which the first three have its three components
-auto each_row = [&](auto &&act) {
-#pragma unroll 1
-    for (int base = warp * ROWS_OF_WARP; base < rows; base += ROWS_AT_ONCE) {
-        const int row = base + lane / LANES;
-        // threads without a component go along: they take part in shuffles
-        act(min(row, rows - 1), row < rows && sub < 3, 3 * min(row, rows - 1) + min(sub, 2));
-    }
-};
-// Component `sub` of a row of `A v`, and if asked for of `|A| |v|`.
-auto product = [&](auto &&get, int row, double *size) -> double {
-    const int end = keeps_offsets ? first[row + 1] : offsets.data[row0 + row + 1] - block0;
+bool of_guess = true, measured = true;
+double size;
+auto product = [&](int row) -> double {
+    const double *const given = exchange.data + size_t(turn ^ 1) * 4 * nodes;
+    auto get = [&](int node, double v[3]) {
+        if (of_guess) {
+            for (int c = 0; c < 3; ++c)
+                v[c] = double(x_of[3 * size_t(node) + c]);
+        } else {
+            const double *const from = given + 4 * size_t(node);
+            asm volatile("ld.global.cg.v2.f64 {%0, %1}, [%2];" : "=d"(v[0]), "=d"(v[1]) : "l"(from));
+            asm volatile("ld.global.cg.f64 %0, [%1];" : "=d"(v[2]) : "l"(from + 2));
+        }
+    };
     double y[3] = {0.0, 0.0, 0.0}, z[3] = {0.0, 0.0, 0.0};
     auto add = [&](int place, const double v[3]) {
         const REAL *const a = place < kept ? kept_values + 9 * place : all_values + 9 * (size_t(block0) + place);
-        for (int c = 0; c < 3; ++c) {
-            y[c] += double(a[3 * c]) * v[0] + double(a[3 * c + 1]) * v[1] + double(a[3 * c + 2]) * v[2];
-            if (size)
+        double entries[9];
+        for (int k = 0; k < 9; ++k)
+            entries[k] = double(a[k]);
+        for (int c = 0; c < 3; ++c)
+            for (int k = 0; k < 3; ++k)
+                y[c] += entries[3 * c + k] * v[k];
+        if (measured)
+            for (int c = 0; c < 3; ++c)
                 for (int k = 0; k < 3; ++k)
-                    z[c] += fabs(double(a[3 * c + k]) * v[k]);
-        }
+                    z[c] += fabs(entries[3 * c + k] * v[k]);
     };
     auto column = [&](int place) { return place < kept ? kept_columns[place] : columns.data[block0 + place]; };
+    const int end = keeps_offsets ? first[row + 1] : offsets.data[row0 + row + 1] - block0;
     int place = (keeps_offsets ? first[row] : offsets.data[row0 + row] - block0) + sub;
     // two at a time: both are on their way before the first is needed
 #pragma unroll 1
-    for (; place + LANES < end; place += 2 * LANES) {
+    for (; place < end; place += 2 * LANES) {
         double v[3], w[3];
+        const bool two = place + LANES < end;
         get(column(place), v);
-        get(column(place + LANES), w);
+        if (two)
+            get(column(place + LANES), w);
         add(place, v);
-        add(place + LANES, w);
+        if (two)
+            add(place + LANES, w);
     }
-    if (place < end) {
-        double v[3];
-        get(column(place), v);
-        add(place, v);
-    }
-    for (int d = LANES / 2; d > 0; d /= 2)
-        for (int c = 0; c < 3; ++c) {
-            y[c] += __shfl_xor_sync(ALL, y[c], d);
-            if (size)
-                z[c] += __shfl_xor_sync(ALL, z[c], d);
-        }
-    if (size)
-        *size = sub == 0 ? z[0] : sub == 1 ? z[1] : z[2];
-    return sub == 0 ? y[0] : sub == 1 ? y[1] : y[2];
+    // halves go different ways here, too: thread k of four has component k
+    auto component_sum = [&](const double v[3]) -> double {
+        const bool last = sub & 2, odd = sub & 1;
+        double low = last ? v[2] : v[0], high = last ? 0.0 : v[1];
+        low += __shfl_xor_sync(ALL, last ? v[0] : v[2], 2);
+        high += __shfl_xor_sync(ALL, last ? v[1] : 0.0, 2);
+        double sum = odd ? high : low;
+        sum += __shfl_xor_sync(ALL, odd ? low : high, 1);
+        for (int d = 4; d < LANES; d *= 2)
+            sum += __shfl_xor_sync(ALL, sum, d);
+        return sum;
+    };
+    if (measured)
+        size = component_sum(z);
+    return component_sum(y);
 };
-// Component `sub` of the inverse diagonal block times what the first three threads of the row have.
+// Component of the inverse diagonal block times what the first three threads of the row have.
 auto precondition = [&](int row, double v) -> double {
-    const double *const inverse = vectors + INVERSE * length + 9 * row + 3 * min(sub, 2);
+    const double *const inverse = vectors + INVERSE * length + 9 * row + 3 * component;
     double y = 0.0;
     for (int k = 0; k < 3; ++k)
         y += inverse[k] * __shfl_sync(ALL, v, k, LANES);
     return y;
 };
-auto vector = [&](int which) -> double * { return vectors + which * length; };
-auto give = [&](int row, double v) { outgoing()[4 * size_t(row0 + row) + sub] = v; };
 
 const double infinity = __longlong_as_double(0x7ff0000000000000ll);
-int iteration = 0;
-double gamma_before = 1.0, alpha = 1.0, least = infinity, before = infinity;
+int iteration = 0, since = 0;
+double gamma_before = 1.0, alpha = 1.0, beta = 0.0, least = infinity, before = infinity;
 double rr = 0.0, goal = 0.0, updated = infinity;
-bool fresh = true, ended = false;
+bool ended = false;
 
+// What is done between two meetings. An iteration has one (Ghysels and Vanroose 2014, algorithm 4); what comes before the
+// first and after the last, and every so often between, is the residual itself and what follows from it and from
+// the search direction: u = M r, w = A u, s = A p, q = M s, z = A q.
+enum Phase { GIVE_X, RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, ITERATE } phase = RESIDUAL;
 for (;;) {
-    // the residual itself, of the solution as it will be stored
-    double s0 = 0.0, s1 = 0.0, s2 = 0.0;
-    if (!fresh) {
-        each_row([&](int row, bool mine, int i) {
-            if (mine) {
-                vector(X)[i] = double(REAL(vector(X)[i]));
-                give(row, vector(X)[i]);
+    for (int k = 0; k < SUMS; ++k)
+        sums[k] = 0.0;
+    double *const outgoing = exchange.data + size_t(turn) * 4 * nodes;
+#pragma unroll 1
+    for (int base = warp * ROWS_OF_WARP; base < rows; base += ROWS_AT_ONCE) {
+        // threads without a component go along: they take part in shuffles
+        const int row = min(base + lane / LANES, rows - 1), i = 3 * row + component;
+        const bool mine = base + lane / LANES < rows && sub < 3;
+        auto vector = [&](int which) -> double & { return vectors[which * length + i]; };
+        const double y = phase == GIVE_X ? 0.0 : product(row);
+        double give;
+        if (phase == GIVE_X) {
+            // as it will be stored
+            give = double(REAL(vector(X)));
+            if (mine)
+                vector(X) = give;
+        } else if (phase == GET_W) {
+            give = vector(P);
+            if (mine)
+                vector(W) = y;
+        } else {
+            // what the preconditioner is applied to
+            double v = y;
+            if (phase == RESIDUAL) {
+                v = double(b_of[3 * size_t(row0) + i]) - y;
+            } else if (phase == GET_Z) {
+                v = vector(W);
+                if (mine)
+                    vector(Z) = y;
+            } else if (phase == ITERATE) {
+                const double w = vector(W), u = vector(U);
+                const double z = y + beta * vector(Z), q = vector(M) + beta * vector(Q);
+                const double s = w + beta * vector(S), p = u + beta * vector(P);
+                v = w - alpha * z;
+                if (mine) {
+                    vector(Z) = z;
+                    vector(Q) = q;
+                    vector(S) = s;
+                    vector(P) = p;
+                    vector(X) += alpha * p;
+                    vector(R) -= alpha * s;
+                    vector(U) = u - alpha * q;
+                    vector(W) = v;
+                }
+            } else if (phase == BEGIN && mine) {
+                vector(W) = y;
             }
-        });
-        if (!meet(0.0, 0.0, 0.0, 0.0))
-            return;
-        turn ^= 1;
-    }
-    each_row([&](int row, bool mine, int i) {
-        double size = 0.0;
-        const double Ax = fresh ? product(initial, row, &size) : product(incoming, row, &size);
-        const double bi = double(b_of[3 * size_t(row0) + i]), r = bi - Ax;
-        const double u = precondition(row, r);
-        if (mine) {
-            vector(R)[i] = r;
-            vector(U)[i] = u;
-            give(row, u);
-            s0 += r * r;
-            s1 += bi * bi;
-            size += fabs(bi);
-            s2 += size * size;
+            give = precondition(row, v);
+            if (mine && phase == RESIDUAL) {
+                vector(R) = v;
+                vector(U) = give;
+                const double bi = v + y, magnitude = size + fabs(bi);
+                sums[0] += v * v;
+                sums[1] += bi * bi;
+                sums[2] += magnitude * magnitude;
+            } else if (mine && phase == GET_S) {
+                vector(S) = y;
+                vector(Q) = give;
+            } else if (mine) {
+                vector(M) = give;
+                const double r = vector(R), u = vector(U), p = vector(P);
+                sums[0] += r * r;
+                sums[1] += r * u;
+                sums[2] += v * u;
+                sums[3] += p * p;
+            }
         }
-    });
-    if (!meet(s0, s1, s2, 0.0))
+        if (mine)
+            outgoing[4 * size_t(row0 + row) + sub] = give;
+    }
+    if (!meet())
         return;
     turn ^= 1;
-    rr = sums[0];
-    goal = tolerance * tolerance * sums[1];
-    const double rounding = 16.0 * ROUNDING * ROUNDING * sums[2];
-    if (!(rr > goal) || iteration >= max_iterations || ended)
-        break;
-    if (!(updated > goal)) {
-        // what is carried along says that this is the end, and is wrong
-        if (rr <= rounding) {
-            rr = updated;
+    if (phase == GIVE_X) {
+        phase = RESIDUAL;
+        measured = true;
+    } else if (phase == RESIDUAL) {
+        measured = false;
+        rr = sums[0];
+        goal = tolerance * tolerance * sums[1];
+        if (!(rr > goal) || ended || iteration >= max_iterations)
             break;
+        if (!(updated > goal)) {
+            // what is carried along says that this is the end, and is wrong, or as right as rounding allows
+            if (rr <= 16.0 * ROUNDING * ROUNDING * sums[2])
+                rr = updated;
+            if (rr > 0.25 * before || rr == updated)
+                break;
+            before = rr;
         }
-        if (rr > 0.25 * before)
-            break;
-        before = rr;
-    }
-    // what else follows from it and from the search direction: w = A u, s = A p, q = M s, z = A q
-    each_row([&](int row, bool mine, int i) {
-        const double w = product(incoming, row, nullptr);
-        if (mine) {
-            vector(W)[i] = w;
-            if (!fresh)
-                give(row, vector(P)[i]);
-        }
-    });
-    if (!fresh) {
-        if (!meet(0.0, 0.0, 0.0, 0.0))
-            return;
-        turn ^= 1;
-        each_row([&](int row, bool mine, int i) {
-            const double s = product(incoming, row, nullptr), q = precondition(row, s);
-            if (mine) {
-                vector(S)[i] = s;
-                vector(Q)[i] = q;
-                give(row, q);
-            }
-        });
-        if (!meet(0.0, 0.0, 0.0, 0.0))
-            return;
-        turn ^= 1;
-        each_row([&](int row, bool mine, int i) {
-            const double z = product(incoming, row, nullptr);
-            if (mine)
-                vector(Z)[i] = z;
-        });
-    }
-
-    // one meeting an iteration (Ghysels and Vanroose 2014, algorithm 4)
-    bool updates = false;
-    double beta = 0.0;
-    for (int since = 0;; ++since) {
-        double t0 = 0.0, t1 = 0.0, t2 = 0.0, t3 = 0.0;
-        each_row([&](int row, bool mine, int i) {
-            const double n = updates ? product(incoming, row, nullptr) : 0.0;
-            double m_before = 0.0, w = vector(W)[i];
-            if (updates) {
-                m_before = precondition(row, w);
-                if (mine) {
-                    const double z = n + beta * vector(Z)[i], q = m_before + beta * vector(Q)[i];
-                    const double s = w + beta * vector(S)[i], p = vector(U)[i] + beta * vector(P)[i];
-                    vector(Z)[i] = z;
-                    vector(Q)[i] = q;
-                    vector(S)[i] = s;
-                    vector(P)[i] = p;
-                    vector(X)[i] += alpha * p;
-                    vector(R)[i] -= alpha * s;
-                    vector(U)[i] -= alpha * q;
-                    w -= alpha * z;
-                    vector(W)[i] = w;
-                }
-            }
-            const double m = precondition(row, w);
-            if (mine) {
-                give(row, m);
-                const double r = vector(R)[i], u = vector(U)[i], p = vector(P)[i];
-                t0 += r * r;
-                t1 += r * u;
-                t2 += w * u;
-                t3 += p * p;
-            }
-        });
-        if (!meet(t0, t1, t2, t3))
-            return;
-        turn ^= 1;
+        phase = of_guess ? BEGIN : GET_W;
+        of_guess = false;
+    } else if (phase == GET_W) {
+        phase = GET_S;
+    } else if (phase == GET_S) {
+        phase = GET_Z;
+    } else {
         updated = sums[0];
         const double gamma = sums[1];
         // p . A p is gamma / alpha
-        if (updates && sums[3] > 0.0)
+        if (phase == ITERATE && sums[3] > 0.0)
             least = fmin(least, gamma_before / alpha / sums[3]);
         ended = iteration >= max_iterations || (watch && least <= 0.0);
-        if (ended || !(updated > goal) || since == RENEWED_EVERY)
-            break;
+        since = phase == ITERATE ? since + 1 : 0;
+        phase = ITERATE;
+        if (ended || !(updated > goal) || since == RENEWED_EVERY) {
+            phase = GIVE_X;
+            continue;
+        }
         beta = iteration > 0 ? gamma / gamma_before : 0.0;
         alpha = gamma / (sums[2] - beta * gamma / alpha);
         gamma_before = gamma;
-        updates = true;
         ++iteration;
     }
-    fresh = false;
 }
 
 for (int i = tid; i < length; i += THREADS)

@@ -1,19 +1,21 @@
 """Conjugate gradients as one launch on a GPU, in which all blocks stay and talk to each other.
 
-A launch takes some two microseconds even in a graph, and conjugate gradients of a brain's mesh would have nine of them an
-iteration for half a microsecond's worth of work. Here a block has rows of the matrix for the whole solve, on its
+A launch takes some two microseconds even in a graph, and conjugate gradients of a brain's mesh would have nine of them
+an iteration for half a microsecond of work. Here a block has its rows of the matrix for the whole solve, on its
 multiprocessor as far as they fit (PERKS: Zhang et al. 2023, doi 10.1145/3577193.3593705), and all blocks meet once an
-iteration: pipelined conjugate gradients (Ghysels and Vanroose 2014, Parallel Computing 40, 224, algorithm 4) need the sums
-and the neighbours' numbers at the same time. Their recurrences lose digits, so they start again from the residual itself
-every so often (Cools, Cornelis and Vanroose 2019, doi 10.1016/j.parco.2019.05.002), and it is that which has to reach the
-tolerance in the end. Vectors and sums are double in either precision.
+iteration: pipelined conjugate gradients (Ghysels and Vanroose 2014, Parallel Computing 40, 224, algorithm 4) need the
+sums and the numbers of neighbours at the same time. Their recurrences lose digits. So they start again from the
+residual itself every so often, with the search direction kept (Cools, Yetkin, Agullo, Giraud and Vanroose 2018, SIAM J.
+Matrix Anal. Appl. 39, 426), and it is the residual itself that has to reach the tolerance in the end. Vectors and sums
+are double in either precision.
 
-**Meetings.** No more blocks than multiprocessors, one on each: all run at once. Each block writes its sums, labelled with the
-number of the meeting, and waits for those of all others, which it adds in one order: the same bits every time. A block
-that hears nothing for two seconds gives up, and so do then all; `PersistentSolve.outcome` says so.
+**Meetings.** There are no more blocks than multiprocessors, and each of these has room for one: all run at once. A
+block writes its sums, labelled with the number of the meeting, and waits for those of all others, which it adds in one
+order: the same bits every time. A block that does not hear from another for two seconds gives up, then all do, and
+`PersistentSolve.outcome` raises: nothing hangs.
 """
 
-from dataclasses import dataclass
+import os
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -26,20 +28,22 @@ from warpbrain.errors import SolveError
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 
-#: Threads of a block, and how many of them share a row.
-THREADS, LANES = 1024, 8
+#: Threads of a block, and how many of them may share a row: the most with which all rows are under way at once.
+THREADS, LANES = 512, (16, 8, 4)
 #: What a kernel has of a multiprocessor's shared memory without asking for it [bytes].
 _RESERVED = 6 * 1024
-#: Numbers that a row of the matrix keeps, eight vectors of three components and an inverse diagonal block.
-_KEPT = 33
+#: Numbers of a row beside the matrix: nine vectors of three components and an inverse diagonal block.
+_NUMBERS = 36
+#: Sums of a meeting; a message has half of one.
+_SUMS = 4
 #: Rows that a block has at least, unless there are fewer: what two blocks say to each other takes longer than these.
 _LEAST_ROWS = 8
 
 
 @cache
-def persistent_kernel(precision: Precision, shared_bytes: int, threads: int = THREADS, lanes: int = LANES) -> Any:
-    """Make (once) the kernel for blocks with so much shared memory; launched over ``blocks * threads``."""
-    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+def persistent_kernel(precision: Precision, shared_bytes: int, threads: int, lanes: int) -> Any:
+    """Make (once) the kernel of blocks with so much shared memory and so many threads, of which `lanes` share a row."""
+    vec3, mat33 = precision.vec3, precision.mat33
     real = {"double": "double", "single": "float"}[precision.name]
     module = compiled_module(f"persistent_{precision.name}_{shared_bytes}_{threads}_{lanes}")
     module.options["block_dim"] = threads
@@ -90,10 +94,102 @@ def persistent_kernel(precision: Precision, shared_bytes: int, threads: int = TH
         outcome: wp.array[wp.float64],
     ):
         # all of the shared memory: the native code knows where it begins
-        memory = wp.tile_empty(shape=numbers, dtype=wp.float64, storage="shared")
+        wp.tile_empty(shape=numbers, dtype=wp.float64, storage="shared")
         solve(
             offsets, columns, values, diagonal, starts, b, x, tolerance, max_iterations, watch, jacobi, exchange,
             messages, scratch, control, outcome,
         )  # fmt: skip
 
     return conjugate_gradients
+
+
+def blocks_stay(device: wp.Device) -> bool:
+    """Whether blocks of a device can wait for each other: on a GPU since Volta, unless the environment forbids it.
+
+    ``WARPBRAIN_PERSISTENT=0`` is for GPUs of which another program holds multiprocessors for good.
+    """
+    return bool(device.is_cuda and device.arch >= 70 and os.environ.get("WARPBRAIN_PERSISTENT", "1") != "0")
+
+
+class PersistentSolve:
+    """Solves ``matrix x = b`` by one launch; its parameters are those of `warpbrain.kernels.linear.ConjugateGradient`.
+
+    Parameters
+    ----------
+    matrix : warp.sparse.BsrMatrix
+    diagonal : wp.array of int, shape (n,)
+    b, x : wp.array of vec3, shape (n,)
+    precision : Precision
+    max_iterations : int
+    jacobi : bool
+        Precondition by inverse diagonal blocks.
+    watch : bool
+        End where the smallest curvature is not positive.
+    """
+
+    def __init__(
+        self,
+        matrix: BsrMatrix,
+        diagonal: wp.array,
+        b: wp.array,
+        x: wp.array,
+        precision: Precision,
+        *,
+        max_iterations: int,
+        jacobi: bool,
+        watch: bool,
+    ) -> None:
+        device, n = b.device, b.shape[0]
+        self._blocks = max(1, min(device.sm_count, THREADS, n // _LEAST_ROWS))
+        offsets = matrix.offsets.numpy()
+        # rows by the number of their entries
+        starts = np.searchsorted(offsets, np.linspace(0, offsets[-1], self._blocks + 1))
+        starts[0], starts[-1] = 0, n
+        rows = int(np.max(np.diff(starts)))
+        lanes = next((lanes for lanes in LANES if rows * lanes <= THREADS), LANES[-1])
+        shared = (device.max_shared_memory_per_block - _RESERVED) // 8 * 8
+        self._kernel = persistent_kernel(precision, shared, THREADS, lanes)
+
+        def zeros(count: int, dtype: Any) -> wp.array:
+            return wp.zeros(count, dtype=dtype, device=device)
+
+        # two places that take turns, four numbers a node and a message for each half of a sum
+        exchange, self._messages = zeros(2 * 4 * n, wp.float64), zeros(2 * 2 * _SUMS * self._blocks, wp.uint64)
+        # the last meeting, and whether one failed
+        self._control, self._outcome = zeros(2, int), zeros(4, wp.float64)
+        self._before = [
+            matrix.offsets, matrix.columns, matrix.values, diagonal, wp.array(starts, dtype=int, device=device), b, x,
+        ]  # fmt: skip
+        self._after = [
+            max_iterations, int(watch), int(jacobi), exchange, self._messages, zeros(_NUMBERS * n, wp.float64),
+            self._control, self._outcome,
+        ]  # fmt: skip
+        self._device = device
+
+    def launch(self, tolerance: float) -> None:
+        """Solve from the present content of `x`, until ``|b - A x| <= tolerance |b|``."""
+        wp.launch(
+            self._kernel,
+            dim=self._blocks * THREADS,
+            inputs=[*self._before, wp.float64(tolerance), *self._after],
+            device=self._device,
+            block_dim=THREADS,
+        )
+
+    def outcome(self) -> tuple[int, float, float, float]:
+        """Iterations, residual, the norm that was to be reached and the smallest curvature of the last solve.
+
+        Raises
+        ------
+        SolveError
+            If a block did not hear from another.
+        """
+        if self._control.numpy()[1]:
+            self._control.zero_()
+            self._messages.zero_()
+            raise SolveError(
+                f"conjugate gradients on {self._device.name}: its blocks waited two seconds for each other, because "
+                "something else holds a part of it; with WARPBRAIN_PERSISTENT=0 in the environment they need not wait"
+            )
+        iterations, residual, goal, curvature = self._outcome.numpy()
+        return int(iterations), float(residual), float(goal), float(curvature)
