@@ -1,11 +1,17 @@
-// Preconditioned conjugate gradients in one launch: the body of `solve` in persistent.py, which says what it does and
-// what its arguments are. THREADS, LANES, SHARED_BYTES and REAL are put before it there.
+// Preconditioned conjugate gradients in one launch: the body of `solve` in persistent.py and batched/persistent.py, which
+// say what it does and what its arguments are. BATCHED, THREADS, LANES, SHARED_BYTES, REAL and ROUNDING are put before it.
+//
+// Blocks are in groups; a group solves one system after the other. With BATCHED these are samples, of which one in a slot
+// has the numbers `slot + stride * k`; without, there is one group and one system.
 
 constexpr int WARPS = THREADS / 32;
 constexpr int ROWS_OF_WARP = 32 / LANES;
 constexpr int ROWS_AT_ONCE = THREADS / LANES;
 constexpr unsigned ALL = 0xffffffffu;
 constexpr int SUMS = 4;
+#if BATCHED
+constexpr int SCALARS = 6;
+#endif
 // iterations after which the recurrences start again from the residual itself
 constexpr int RENEWED_EVERY = 50;
 // [ns]; blocks that do not hear from each other for so long give up
@@ -14,13 +20,35 @@ constexpr unsigned long long PATIENCE = 2000000000ull;
 extern __shared__ char dynamic_smem_base[];
 
 const int tid = threadIdx.x, lane = tid % 32, warp = tid / 32, sub = lane % LANES;
-const int grid = gridDim.x, me = blockIdx.x;
+const int grid = starts.shape[0] - 1, group = blockIdx.x / grid, groups = gridDim.x / grid, me = blockIdx.x % grid;
 const int row0 = starts.data[me], rows = starts.data[me + 1] - row0;
 const int block0 = offsets.data[row0], blocks = offsets.data[row0 + rows] - block0;
 const int nodes = x.shape[0];
 const REAL *const all_values = (const REAL *)values.data;
 const REAL *const b_of = (const REAL *)b.data;
 REAL *const x_of = (REAL *)x.data;
+int *const state = control.data + 2 * group;
+unsigned long long *const mailbox = (unsigned long long *)messages.data + size_t(group) * grid * 4 * SUMS;
+double *const places = exchange.data + size_t(group) * 8 * nodes;
+#if BATCHED
+const int systems = count.data[0];
+const size_t stride = x.shape[2];
+constexpr int watch = 0, jacobi = 1;
+#else
+const int systems = 1;
+constexpr size_t stride = 1;
+#endif
+size_t slot = 0;
+// number k of the block in a place of these rows
+auto entry = [&](int place, int k) -> REAL {
+#if BATCHED
+    // what is left of the diagonal is kept right of it
+    const int pair = pairs.data[block0 + place];
+    return all_values[(pair < 0 ? 9 * size_t(-1 - pair) + k % 3 * 3 + k / 3 : 9 * size_t(pair) + k) * stride + slot];
+#else
+    return all_values[9 * (size_t(block0) + place) + k];
+#endif
+};
 
 // -- what is kept on the chip: vectors and inverse diagonal blocks first, then as much of the matrix as there is room for
 enum { X, R, U, W, P, S, Q, Z, M, INVERSE, VECTORS = INVERSE + 3 };
@@ -35,7 +63,7 @@ if (VECTORS * length * 8 <= left) {
     room += VECTORS * length * 8;
     left -= VECTORS * length * 8;
 } else {
-    vectors = scratch.data + size_t(VECTORS) * 3 * row0;
+    vectors = scratch.data + size_t(VECTORS) * 3 * (size_t(group) * nodes + row0);
 }
 int *first = (int *)room;
 const int offset_bytes = (4 * (rows + 1) + 7) / 8 * 8;
@@ -49,48 +77,19 @@ REAL *const kept_values = (REAL *)room;
 int *const kept_columns = (int *)(kept_values + 9 * size_t(kept));
 
 if (tid == 0)
-    *quit = control.data[1];
+    *quit = state[1];
 if (keeps_offsets)
     for (int i = tid; i <= rows; i += THREADS)
         first[i] = offsets.data[row0 + i] - block0;
-#pragma unroll 4
-for (int i = tid; i < 9 * kept; i += THREADS)
-    kept_values[i] = all_values[9 * size_t(block0) + i];
 for (int i = tid; i < kept; i += THREADS)
     kept_columns[i] = columns.data[block0 + i];
-for (int i = tid; i < length; i += THREADS) {
-    vectors[X * length + i] = double(x_of[3 * row0 + i]);
-    vectors[P * length + i] = vectors[S * length + i] = 0.0;
-    vectors[Q * length + i] = vectors[Z * length + i] = 0.0;
-}
-for (int i = tid; i < rows; i += THREADS) {
-    const REAL *const a = all_values + 9 * size_t(diagonal.data[row0 + i]);
-    double inverse[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-    if (jacobi) {
-        const double c0 = double(a[4]) * a[8] - double(a[5]) * a[7];
-        const double c1 = double(a[5]) * a[6] - double(a[3]) * a[8];
-        const double c2 = double(a[3]) * a[7] - double(a[4]) * a[6];
-        const double d = 1.0 / (a[0] * c0 + a[1] * c1 + a[2] * c2);
-        inverse[0] = d * c0;
-        inverse[1] = d * (double(a[2]) * a[7] - double(a[1]) * a[8]);
-        inverse[2] = d * (double(a[1]) * a[5] - double(a[2]) * a[4]);
-        inverse[3] = d * c1;
-        inverse[4] = d * (double(a[0]) * a[8] - double(a[2]) * a[6]);
-        inverse[5] = d * (double(a[2]) * a[3] - double(a[0]) * a[5]);
-        inverse[6] = d * c2;
-        inverse[7] = d * (double(a[1]) * a[6] - double(a[0]) * a[7]);
-        inverse[8] = d * (double(a[0]) * a[4] - double(a[1]) * a[3]);
-    }
-    for (int k = 0; k < 9; ++k)
-        vectors[INVERSE * length + 9 * i + k] = inverse[k];
-}
-// the same for all blocks: each reads it before the first meeting, and it is written after the last
-unsigned epoch = (unsigned)control.data[0];
+// the same for all blocks of a group: each reads it before the first meeting, and it is written after the last
+unsigned epoch = (unsigned)state[0];
 __syncthreads();
 if (*quit)
     return;
 
-// -- meetings of all blocks
+// -- meetings of the blocks of a group
 // Sums over a warp of four numbers: lane 8 k has the k-th, in an order that is always the same. Halves go different ways.
 auto warp_sums = [&](const double s[SUMS]) -> double {
     const bool upper = lane & 16, odd = lane & 8;
@@ -114,7 +113,7 @@ auto meet = [&]() -> bool {
     ++epoch;
     // a message is half a number and the epoch, which a single store of eight bytes cannot tear apart; a place is
     // written again only two meetings later, when all have read it
-    unsigned long long *const mail = (unsigned long long *)messages.data + size_t(epoch % 2) * grid * 2 * SUMS;
+    unsigned long long *const mail = mailbox + size_t(epoch % 2) * grid * 2 * SUMS;
     if (warp == 0) {
         for (int k = 0; k < SUMS; ++k)
             sums[k] = lane < WARPS ? partial[lane][k] : 0.0;
@@ -150,8 +149,8 @@ auto meet = [&]() -> bool {
                 if (tries % 1024 == 0) {
                     asm volatile("mov.u64 %0, %globaltimer;" : "=l"(now));
                     begun = begun == 0 ? now : begun;
-                    if (now - begun > PATIENCE || *(volatile int *)(control.data + 1)) {
-                        *(volatile int *)(control.data + 1) = 1;
+                    if (now - begun > PATIENCE || *(volatile int *)(state + 1)) {
+                        *(volatile int *)(state + 1) = 1;
                         *(volatile int *)quit = 1;
                         break;
                     }
@@ -179,11 +178,11 @@ int turn = 0;
 bool of_guess = true, measured = true;
 double size;
 auto product = [&](int row) -> double {
-    const double *const given = exchange.data + size_t(turn ^ 1) * 4 * nodes;
+    const double *const given = places + size_t(turn ^ 1) * 4 * nodes;
     auto get = [&](int node, double v[3]) {
         if (of_guess) {
             for (int c = 0; c < 3; ++c)
-                v[c] = double(x_of[3 * size_t(node) + c]);
+                v[c] = double(x_of[(3 * size_t(node) + c) * stride + slot]);
         } else {
             const double *const from = given + 4 * size_t(node);
             asm volatile("ld.global.cg.v2.f64 {%0, %1}, [%2];" : "=d"(v[0]), "=d"(v[1]) : "l"(from));
@@ -192,10 +191,9 @@ auto product = [&](int row) -> double {
     };
     double y[3] = {0.0, 0.0, 0.0}, z[3] = {0.0, 0.0, 0.0};
     auto add = [&](int place, const double v[3]) {
-        const REAL *const a = place < kept ? kept_values + 9 * place : all_values + 9 * (size_t(block0) + place);
         double entries[9];
         for (int k = 0; k < 9; ++k)
-            entries[k] = double(a[k]);
+            entries[k] = double(place < kept ? kept_values[9 * place + k] : entry(place, k));
         for (int c = 0; c < 3; ++c)
             for (int k = 0; k < 3; ++k)
                 y[c] += entries[3 * c + k] * v[k];
@@ -244,139 +242,227 @@ auto precondition = [&](int row, double v) -> double {
     return y;
 };
 
-const double infinity = __longlong_as_double(0x7ff0000000000000ll);
-int iteration = 0, since = 0;
-double gamma_before = 1.0, alpha = 1.0, beta = 0.0, least = infinity, before = infinity;
-double rr = 0.0, goal = 0.0, updated = infinity;
-bool ended = false;
-
 // What is done between two meetings. An iteration has one (Ghysels and Vanroose 2014, algorithm 4); what comes before the
 // first and after the last, and every so often between, is the residual itself and what follows from it and from
 // the search direction: u = M r, w = A u, s = A p, q = M s, z = A q.
-enum Phase { GIVE_X, RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, ITERATE } phase = RESIDUAL;
-for (;;) {
-    for (int k = 0; k < SUMS; ++k)
-        sums[k] = 0.0;
-    double *const outgoing = exchange.data + size_t(turn) * 4 * nodes;
-#pragma unroll 1
-    for (int base = warp * ROWS_OF_WARP; base < rows; base += ROWS_AT_ONCE) {
-        // threads without a component go along: they take part in shuffles
-        const int row = min(base + lane / LANES, rows - 1), i = 3 * row + component;
-        const bool mine = base + lane / LANES < rows && sub < 3;
-        auto vector = [&](int which) -> double & { return vectors[which * length + i]; };
-        const double y = phase == GIVE_X ? 0.0 : product(row);
-        double give;
-        if (phase == GIVE_X) {
-            // as it will be stored
-            give = double(REAL(vector(X)));
-            if (mine)
-                vector(X) = give;
-        } else if (phase == GET_W) {
-            give = vector(P);
-            if (mine)
-                vector(W) = y;
-        } else {
-            // what the preconditioner is applied to
-            double v = y;
-            if (phase == RESIDUAL) {
-                v = double(b_of[3 * size_t(row0) + i]) - y;
-            } else if (phase == GET_Z) {
-                v = vector(W);
-                if (mine)
-                    vector(Z) = y;
-            } else if (phase == ITERATE) {
-                const double w = vector(W), u = vector(U);
-                const double z = y + beta * vector(Z), q = vector(M) + beta * vector(Q);
-                const double s = w + beta * vector(S), p = u + beta * vector(P);
-                v = w - alpha * z;
-                if (mine) {
-                    vector(Z) = z;
-                    vector(Q) = q;
-                    vector(S) = s;
-                    vector(P) = p;
-                    vector(X) += alpha * p;
-                    vector(R) -= alpha * s;
-                    vector(U) = u - alpha * q;
-                    vector(W) = v;
-                }
-            } else if (phase == BEGIN && mine) {
-                vector(W) = y;
-            }
-            give = precondition(row, v);
-            if (mine && phase == RESIDUAL) {
-                vector(R) = v;
-                vector(U) = give;
-                const double bi = v + y, magnitude = size + fabs(bi);
-                sums[0] += v * v;
-                sums[1] += bi * bi;
-                sums[2] += magnitude * magnitude;
-            } else if (mine && phase == GET_S) {
-                vector(S) = y;
-                vector(Q) = give;
-            } else if (mine) {
-                vector(M) = give;
-                const double r = vector(R), u = vector(U), p = vector(P);
-                sums[0] += r * r;
-                sums[1] += r * u;
-                sums[2] += v * u;
-                sums[3] += p * p;
-            }
-        }
-        if (mine)
-            outgoing[4 * size_t(row0 + row) + sub] = give;
+enum Phase { GIVE_X, RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, ITERATE };
+const double infinity = __longlong_as_double(0x7ff0000000000000ll);
+for (int system = group; system < systems; system += groups) {
+    int iteration = 0, since = 0;
+    double gamma_before = 1.0, alpha = 1.0, beta = 0.0, least = infinity, before = infinity;
+    double rr = 0.0, goal = 0.0, updated = infinity;
+    bool ended = false, left_off = false;
+    Phase phase = RESIDUAL;
+    of_guess = measured = true;
+#if BATCHED
+    slot = slots.data[system];
+    double *const saved = memory.data + slot * (27 * size_t(nodes) + SCALARS);
+    double *const saved_vectors = saved + SCALARS + 27 * size_t(row0);
+    if (saved[0] >= 0.0) {
+        // it was left off
+        phase = RESUME;
+        of_guess = measured = false;
+        iteration = (int)saved[0], since = (int)saved[1];
+        gamma_before = saved[2], alpha = saved[3], before = saved[4], goal = saved[5];
     }
-    if (!meet())
-        return;
-    turn ^= 1;
-    if (phase == GIVE_X) {
-        phase = RESIDUAL;
-        measured = true;
-    } else if (phase == RESIDUAL) {
-        measured = false;
-        rr = sums[0];
-        goal = tolerance * tolerance * sums[1];
-        if (!(rr > goal) || ended || iteration >= max_iterations)
-            break;
-        if (!(updated > goal)) {
-            // what is carried along says that this is the end, and is wrong, or as right as rounding allows
-            if (rr <= 16.0 * ROUNDING * ROUNDING * sums[2])
-                rr = updated;
-            if (rr > 0.25 * before || rr == updated)
-                break;
-            before = rr;
-        }
-        phase = of_guess ? BEGIN : GET_W;
-        of_guess = false;
-    } else if (phase == GET_W) {
-        phase = GET_S;
-    } else if (phase == GET_S) {
-        phase = GET_Z;
-    } else {
-        updated = sums[0];
-        const double gamma = sums[1];
-        // p . A p is gamma / alpha
-        if (phase == ITERATE && sums[3] > 0.0)
-            least = fmin(least, gamma_before / alpha / sums[3]);
-        ended = iteration >= max_iterations || (watch && least <= 0.0);
-        since = phase == ITERATE ? since + 1 : 0;
-        phase = ITERATE;
-        if (ended || !(updated > goal) || since == RENEWED_EVERY) {
-            phase = GIVE_X;
+    // the last system's numbers are no longer needed
+    __syncthreads();
+#endif
+#pragma unroll 4
+    for (int i = tid; i < 9 * kept; i += THREADS)
+        kept_values[i] = entry(i / 9, i % 9);
+    for (int i = tid; i < length; i += THREADS) {
+#if BATCHED
+        if (phase == RESUME) {
+            for (int k = 0; k < 9; ++k)
+                vectors[k * length + i] = saved_vectors[k * length + i];
             continue;
         }
-        beta = iteration > 0 ? gamma / gamma_before : 0.0;
-        alpha = gamma / (sums[2] - beta * gamma / alpha);
-        gamma_before = gamma;
-        ++iteration;
+#endif
+        vectors[X * length + i] = double(x_of[(3 * size_t(row0) + i) * stride + slot]);
+        vectors[P * length + i] = vectors[S * length + i] = 0.0;
+        vectors[Q * length + i] = vectors[Z * length + i] = 0.0;
+    }
+    for (int i = tid; i < rows; i += THREADS) {
+        double a[9];
+        for (int k = 0; k < 9; ++k)
+            a[k] = double(all_values[(9 * size_t(diagonal.data[row0 + i]) + k) * stride + slot]);
+        double inverse[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+        if (jacobi) {
+            const double c0 = a[4] * a[8] - a[5] * a[7];
+            const double c1 = a[5] * a[6] - a[3] * a[8];
+            const double c2 = a[3] * a[7] - a[4] * a[6];
+            const double d = 1.0 / (a[0] * c0 + a[1] * c1 + a[2] * c2);
+            inverse[0] = d * c0;
+            inverse[1] = d * (a[2] * a[7] - a[1] * a[8]);
+            inverse[2] = d * (a[1] * a[5] - a[2] * a[4]);
+            inverse[3] = d * c1;
+            inverse[4] = d * (a[0] * a[8] - a[2] * a[6]);
+            inverse[5] = d * (a[2] * a[3] - a[0] * a[5]);
+            inverse[6] = d * c2;
+            inverse[7] = d * (a[1] * a[6] - a[0] * a[7]);
+            inverse[8] = d * (a[0] * a[4] - a[1] * a[3]);
+        }
+        for (int k = 0; k < 9; ++k)
+            vectors[INVERSE * length + 9 * i + k] = inverse[k];
+    }
+    __syncthreads();
+
+    for (;;) {
+        for (int k = 0; k < SUMS; ++k)
+            sums[k] = 0.0;
+#if BATCHED
+        // so few go on that the rest may wait for the next launch: asked for here, needed after the rows
+        const bool few = me == 0 && tid == 0 && *(volatile int *)remaining.data <= linger.data[0];
+#endif
+        double *const outgoing = places + size_t(turn) * 4 * nodes;
+#pragma unroll 1
+        for (int base = warp * ROWS_OF_WARP; base < rows; base += ROWS_AT_ONCE) {
+            // threads without a component go along: they take part in shuffles
+            const int row = min(base + lane / LANES, rows - 1), i = 3 * row + component;
+            const bool mine = base + lane / LANES < rows && sub < 3;
+            auto vector = [&](int which) -> double & { return vectors[which * length + i]; };
+            const double y = phase == GIVE_X || phase == RESUME ? 0.0 : product(row);
+            double give, bi = 0.0;
+            if (phase == GIVE_X) {
+                // as it will be stored
+                give = double(REAL(vector(X)));
+                if (mine)
+                    vector(X) = give;
+            } else if (phase == GET_W) {
+                give = vector(P);
+                if (mine)
+                    vector(W) = y;
+            } else {
+                // what the preconditioner is applied to
+                double v = y;
+                if (phase == RESIDUAL) {
+                    bi = double(b_of[(3 * size_t(row0) + i) * stride + slot]);
+                    v = bi - y;
+                } else if (phase == GET_Z || phase == RESUME) {
+                    v = vector(W);
+                    if (mine && phase == GET_Z)
+                        vector(Z) = y;
+                } else if (phase == ITERATE) {
+                    const double w = vector(W), u = vector(U);
+                    const double z = y + beta * vector(Z), q = vector(M) + beta * vector(Q);
+                    const double s = w + beta * vector(S), p = u + beta * vector(P);
+                    v = w - alpha * z;
+                    if (mine) {
+                        vector(Z) = z;
+                        vector(Q) = q;
+                        vector(S) = s;
+                        vector(P) = p;
+                        vector(X) += alpha * p;
+                        vector(R) -= alpha * s;
+                        vector(U) = u - alpha * q;
+                        vector(W) = v;
+                    }
+                } else if (phase == BEGIN && mine) {
+                    vector(W) = y;
+                }
+                give = precondition(row, v);
+                if (mine && phase == RESIDUAL) {
+                    vector(R) = v;
+                    vector(U) = give;
+                    const double magnitude = size + fabs(bi);
+                    sums[0] += v * v;
+                    sums[1] += bi * bi;
+                    sums[2] += magnitude * magnitude;
+                } else if (mine && phase == GET_S) {
+                    vector(S) = y;
+                    vector(Q) = give;
+                } else if (mine) {
+                    vector(M) = give;
+                    const double r = vector(R), u = vector(U), p = vector(P);
+                    sums[0] += r * r;
+                    sums[1] += r * u;
+                    sums[2] += v * u;
+                    // of many systems nobody asks for the curvature
+                    if (!BATCHED)
+                        sums[3] += p * p;
+                }
+            }
+            if (mine)
+                outgoing[4 * size_t(row0 + row) + sub] = give;
+        }
+#if BATCHED
+        if (few)
+            sums[3] = 1.0;
+#endif
+        if (!meet())
+            return;
+        turn ^= 1;
+        if (phase == GIVE_X) {
+            phase = RESIDUAL;
+            measured = true;
+        } else if (phase == RESIDUAL) {
+            measured = false;
+            rr = sums[0];
+            goal = tolerance * tolerance * sums[1];
+            if (!(rr > goal) || ended || iteration >= max_iterations)
+                break;
+            if (!(updated > goal)) {
+                // what is carried along says that this is the end, and is wrong, or as right as rounding allows
+                if (rr <= 16.0 * ROUNDING * ROUNDING * sums[2])
+                    rr = updated;
+                if (rr > 0.25 * before || rr == updated)
+                    break;
+                before = rr;
+            }
+            phase = of_guess ? BEGIN : GET_W;
+            of_guess = false;
+        } else if (phase == GET_W) {
+            phase = GET_S;
+        } else if (phase == GET_S) {
+            phase = GET_Z;
+        } else {
+            updated = sums[0];
+            const double gamma = sums[1];
+            // p . A p is gamma / alpha
+            if (!BATCHED && phase == ITERATE && sums[3] > 0.0)
+                least = fmin(least, gamma_before / alpha / sums[3]);
+            ended = iteration >= max_iterations || (watch && least <= 0.0);
+            since = phase == ITERATE ? since + 1 : phase == RESUME ? since : 0;
+            phase = ITERATE;
+            left_off = BATCHED && sums[3] > 0.0 && !ended && updated > goal;
+            if (left_off)
+                break;
+            if (ended || !(updated > goal) || since == RENEWED_EVERY) {
+                phase = GIVE_X;
+                continue;
+            }
+            beta = iteration > 0 ? gamma / gamma_before : 0.0;
+            alpha = gamma / (sums[2] - beta * gamma / alpha);
+            gamma_before = gamma;
+            ++iteration;
+        }
+    }
+
+#if BATCHED
+    if (left_off) {
+        for (int i = tid; i < length; i += THREADS)
+            for (int k = 0; k < 9; ++k)
+                saved_vectors[k * length + i] = vectors[k * length + i];
+        if (me == 0 && tid == 0) {
+            saved[0] = double(iteration), saved[1] = double(since);
+            saved[2] = gamma_before, saved[3] = alpha, saved[4] = before, saved[5] = goal;
+        }
+        continue;
+    }
+    if (me == 0 && tid == 0) {
+        solving.data[slot] = 0;
+        atomicSub(remaining.data, 1);
+    }
+#endif
+    for (int i = tid; i < length; i += THREADS)
+        x_of[(3 * size_t(row0) + i) * stride + slot] = REAL(vectors[X * length + i]);
+    if (me == 0 && tid == 0) {
+        outcome.data[4 * slot] = double(iteration);
+        outcome.data[4 * slot + 1] = sqrt(rr);
+        outcome.data[4 * slot + 2] = sqrt(goal);
+        outcome.data[4 * slot + 3] = least;
     }
 }
-
-for (int i = tid; i < length; i += THREADS)
-    x_of[3 * size_t(row0) + i] = REAL(vectors[X * length + i]);
-if (me == 0 && tid == 0) {
-    control.data[0] = (int)epoch;
-    outcome.data[0] = double(iteration);
-    outcome.data[1] = sqrt(rr);
-    outcome.data[2] = sqrt(goal);
-    outcome.data[3] = least;
-}
+if (me == 0 && tid == 0)
+    state[0] = (int)epoch;

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 from warp.sparse import BsrMatrix
 
 from warpbrain.errors import SolveError
@@ -33,28 +34,34 @@ THREADS, LANES = 512, (16, 8, 4)
 #: What a kernel has of a multiprocessor's shared memory without asking for it [bytes].
 _RESERVED = 6 * 1024
 #: Numbers of a row beside the matrix: nine vectors of three components and an inverse diagonal block.
-_NUMBERS = 36
+NUMBERS = 36
 #: Sums of a meeting; a message has half of one.
 _SUMS = 4
 #: Rows that a block has at least, unless there are fewer: what two blocks say to each other takes longer than these.
 _LEAST_ROWS = 8
 
 
+def native_code(precision: Precision, shared_bytes: int, threads: int, lanes: int, batched: bool = False) -> str:
+    """What the kernels consist of, for blocks with so much shared memory and so many threads, `lanes` for a row."""
+    real = {"double": "double", "single": "float"}[precision.name]
+    code = files("warpbrain.kernels").joinpath("persistent.cu").read_text(encoding="utf-8")
+    return (
+        f"#define BATCHED {int(batched)}\n"
+        f"using REAL = {real};\n"
+        f"constexpr int THREADS = {threads}, LANES = {lanes}, SHARED_BYTES = {shared_bytes};\n"
+        f"constexpr double ROUNDING = {precision.epsilon!r};\n"
+    ) + code
+
+
 @cache
 def persistent_kernel(precision: Precision, shared_bytes: int, threads: int, lanes: int) -> Any:
     """Make (once) the kernel of blocks with so much shared memory and so many threads, of which `lanes` share a row."""
     vec3, mat33 = precision.vec3, precision.mat33
-    real = {"double": "double", "single": "float"}[precision.name]
     module = compiled_module(f"persistent_{precision.name}_{shared_bytes}_{threads}_{lanes}")
     module.options["block_dim"] = threads
     numbers = wp.constant(shared_bytes // 8)
-    constants = (
-        f"using REAL = {real};\n"
-        f"constexpr int THREADS = {threads}, LANES = {lanes}, SHARED_BYTES = {shared_bytes};\n"
-        f"constexpr double ROUNDING = {precision.epsilon!r};\n"
-    )
 
-    @wp.func_native(constants + files("warpbrain.kernels").joinpath("persistent.cu").read_text(encoding="utf-8"))
+    @wp.func_native(native_code(precision, shared_bytes, threads, lanes))
     def solve(
         offsets: wp.array[int],
         columns: wp.array[int],
@@ -111,6 +118,59 @@ def blocks_stay(device: wp.Device) -> bool:
     return bool(device.is_cuda and device.arch >= 70 and os.environ.get("WARPBRAIN_PERSISTENT", "1") != "0")
 
 
+def shared_memory(device: wp.Device) -> int:
+    """What a block may have of a multiprocessor's shared memory [bytes]."""
+    return int(device.max_shared_memory_per_block - _RESERVED) // 8 * 8
+
+
+def share_rows(offsets: NDArray[np.int32], blocks: int) -> tuple[NDArray[np.int32], int]:
+    """First row of each block, by the entries (n + 1,) of rows, and how many threads are to share a row."""
+    starts = np.searchsorted(offsets, np.linspace(0, offsets[-1], blocks + 1)).astype(np.int32)
+    starts[0], starts[-1] = 0, len(offsets) - 1
+    rows = int(np.max(np.diff(starts)))
+    return starts, next((lanes for lanes in LANES if rows * lanes <= THREADS), LANES[-1])
+
+
+class Meetings:
+    """Where the blocks of some groups leave what others read.
+
+    Parameters
+    ----------
+    rows, blocks, groups : int
+        Of a system, of a group, and of all.
+    device : Device
+
+    Attributes
+    ----------
+    exchange : wp.array of double
+        Two places a group that take turns, with four numbers a row.
+    messages : wp.array of uint64
+        Two places a group that take turns, with a message for each half of a sum of a block.
+    scratch : wp.array of double
+        What has no room on the chip.
+    control : wp.array of int
+        Of each group the number of the last meeting, and whether one failed.
+    """
+
+    def __init__(self, rows: int, blocks: int, groups: int, device: wp.Device) -> None:
+        self._device = device
+        self.exchange = wp.zeros(groups * 8 * rows, dtype=wp.float64, device=device)
+        self.messages = wp.zeros(groups * 4 * _SUMS * blocks, dtype=wp.uint64, device=device)
+        self.scratch = wp.zeros(groups * NUMBERS * rows, dtype=wp.float64, device=device)
+        self.control = wp.zeros(groups * 2, dtype=int, device=device)
+
+    def check(self) -> None:
+        """Raise `SolveError` if a block did not hear from another; the next solve may then try again."""
+        if not np.any(self.control.numpy()[1::2]):
+            return
+        self.control.zero_()
+        self.messages.zero_()
+        raise SolveError(
+            f"conjugate gradients on {self._device.name}: its blocks waited two seconds for each other, because "
+            "something else holds a part of it; with WARPBRAIN_PERSISTENT=0 in the environment they need not wait"
+        )
+
+
 class PersistentSolve:
     """Solves ``matrix x = b`` by one launch; its parameters are those of `warpbrain.kernels.linear.ConjugateGradient`.
 
@@ -141,28 +201,15 @@ class PersistentSolve:
     ) -> None:
         device, n = b.device, b.shape[0]
         self._blocks = max(1, min(device.sm_count, THREADS, n // _LEAST_ROWS))
-        offsets = matrix.offsets.numpy()
-        # rows by the number of their entries
-        starts = np.searchsorted(offsets, np.linspace(0, offsets[-1], self._blocks + 1))
-        starts[0], starts[-1] = 0, n
-        rows = int(np.max(np.diff(starts)))
-        lanes = next((lanes for lanes in LANES if rows * lanes <= THREADS), LANES[-1])
-        shared = (device.max_shared_memory_per_block - _RESERVED) // 8 * 8
-        self._kernel = persistent_kernel(precision, shared, THREADS, lanes)
-
-        def zeros(count: int, dtype: Any) -> wp.array:
-            return wp.zeros(count, dtype=dtype, device=device)
-
-        # two places that take turns, four numbers a node and a message for each half of a sum
-        exchange, self._messages = zeros(2 * 4 * n, wp.float64), zeros(2 * 2 * _SUMS * self._blocks, wp.uint64)
-        # the last meeting, and whether one failed
-        self._control, self._outcome = zeros(2, int), zeros(4, wp.float64)
+        starts, lanes = share_rows(matrix.offsets.numpy(), self._blocks)
+        self._kernel = persistent_kernel(precision, shared_memory(device), THREADS, lanes)
+        self._meetings = m = Meetings(n, self._blocks, 1, device)
+        self._outcome = wp.zeros(4, dtype=wp.float64, device=device)
         self._before = [
             matrix.offsets, matrix.columns, matrix.values, diagonal, wp.array(starts, dtype=int, device=device), b, x,
         ]  # fmt: skip
         self._after = [
-            max_iterations, int(watch), int(jacobi), exchange, self._messages, zeros(_NUMBERS * n, wp.float64),
-            self._control, self._outcome,
+            max_iterations, int(watch), int(jacobi), m.exchange, m.messages, m.scratch, m.control, self._outcome,
         ]  # fmt: skip
         self._device = device
 
@@ -184,12 +231,6 @@ class PersistentSolve:
         SolveError
             If a block did not hear from another.
         """
-        if self._control.numpy()[1]:
-            self._control.zero_()
-            self._messages.zero_()
-            raise SolveError(
-                f"conjugate gradients on {self._device.name}: its blocks waited two seconds for each other, because "
-                "something else holds a part of it; with WARPBRAIN_PERSISTENT=0 in the environment they need not wait"
-            )
+        self._meetings.check()
         iterations, residual, goal, curvature = self._outcome.numpy()
         return int(iterations), float(residual), float(goal), float(curvature)
