@@ -9,7 +9,8 @@ are dealt with here and nowhere else:
 
 - on the CPU its CG reduces every tile of a dot product once per absent GPU lane. Naming the one system as a batch of
   one (`batch_offsets = [0, n]`) takes the code path that does not;
-- its matrix-vector product of 3 x 3 blocks has one thread for a scalar row. Ours has one for a block row;
+- its matrix-vector product of 3 x 3 blocks has one thread for a scalar row. Ours has one for a block row, and on a GPU
+  several for a block row;
 - its CG leaves the loop to the device on CUDA only. `_conditional_loop` does the same for a graph of the CPU, where
   Warp would unroll `max_iterations` of them into it;
 - its kernels are compiled ahead for arrays of scalars only; vectors of three would compile that module three times
@@ -32,6 +33,7 @@ from warp.sparse import BsrMatrix
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.persistent import PersistentSolve, blocks_stay
 from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.row_product import LANES, row_product_kernel
 
 #: Names of the preconditioners: inverse diagonal blocks, factorised sparse approximate inverse, none.
 PRECONDITIONERS = ("block-jacobi", "fsai", "none")
@@ -337,9 +339,10 @@ class ConjugateGradient:
     def _launch_product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         """`z = alpha A x + beta y`."""
         A, scalar = self._matrix, self._precision.scalar
+        on_gpu = self._device.is_cuda
         wp.launch(
-            self._kernels.multiply,
-            dim=self._size,
+            row_product_kernel(self._precision) if on_gpu else self._kernels.multiply,
+            dim=LANES * self._size if on_gpu else self._size,
             inputs=[A.offsets, A.columns, A.values, x, y, z, scalar(alpha), scalar(beta)],
             device=self._device,
         )
