@@ -9,6 +9,7 @@ constexpr int ROWS_OF_WARP = 32 / LANES;
 constexpr int ROWS_AT_ONCE = THREADS / LANES;
 constexpr unsigned ALL = 0xffffffffu;
 constexpr int SUMS = 4;
+constexpr int MOST_BLOCKS = 256;
 #if BATCHED
 constexpr int SCALARS = 6;
 #endif
@@ -53,8 +54,8 @@ auto entry = [&](int place, int k) -> REAL {
 // -- what is kept on the chip: vectors and inverse diagonal blocks first, then as much of the matrix as there is room for
 enum { X, R, U, W, P, S, Q, Z, M, INVERSE, VECTORS = INVERSE + 3 };
 double(*const partial)[SUMS] = (double(*)[SUMS])dynamic_smem_base;
-double(*const totals)[SUMS] = partial + 32;
-int *const quit = (int *)(totals + 32);
+double(*const totals)[SUMS] = partial + WARPS;
+int *const quit = (int *)(totals + MOST_BLOCKS / 32);
 char *room = (char *)(quit + 4);
 int left = SHARED_BYTES - (int)(room - dynamic_smem_base);
 const int length = 3 * rows;
@@ -163,11 +164,14 @@ auto meet = [&]() -> bool {
             totals[warp][lane / 8] = sum;
     }
     __syncthreads();
-    for (int k = 0; k < SUMS; ++k) {
-        sums[k] = 0.0;
-        for (int w = 0; w < (grid + 31) / 32; ++w)
-            sums[k] += totals[w][k];
-    }
+    for (int k = 0; k < SUMS; ++k)
+        sums[k] = totals[0][k];
+    // all on their way before the first is needed
+#pragma unroll
+    for (int w = 1; w < MOST_BLOCKS / 32; ++w)
+        if (w < (grid + 31) / 32)
+            for (int k = 0; k < SUMS; ++k)
+                sums[k] += totals[w][k];
     return *(volatile int *)quit == 0;
 };
 

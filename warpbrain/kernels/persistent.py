@@ -37,6 +37,8 @@ _RESERVED = 6 * 1024
 NUMBERS = 36
 #: Sums of a meeting; a message has half of one.
 _SUMS = 4
+#: Blocks that may meet.
+MOST_BLOCKS = 256
 #: Rows that a block has at least, unless there are fewer: what two blocks say to each other takes longer than these.
 _LEAST_ROWS = 8
 
@@ -200,7 +202,7 @@ class PersistentSolve:
         watch: bool,
     ) -> None:
         device, n = b.device, b.shape[0]
-        self._blocks = max(1, min(device.sm_count, THREADS, n // _LEAST_ROWS))
+        self._blocks = max(1, min(device.sm_count, MOST_BLOCKS, n // _LEAST_ROWS))
         starts, lanes = share_rows(matrix.offsets.numpy(), self._blocks)
         self._kernel = persistent_kernel(precision, shared_memory(device), THREADS, lanes)
         self._meetings = m = Meetings(n, self._blocks, 1, device)

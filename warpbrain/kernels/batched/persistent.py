@@ -13,7 +13,7 @@ import numpy as np
 import warp as wp
 
 from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.persistent import NUMBERS, THREADS, Meetings, native_code, share_rows, shared_memory
+from warpbrain.kernels.persistent import MOST_BLOCKS, NUMBERS, THREADS, Meetings, native_code, share_rows, shared_memory
 from warpbrain.kernels.precision import Precision
 
 #: What a system that is left off keeps: scalars, and nine vectors of three components a row.
@@ -136,7 +136,7 @@ class PersistentBatch:
         shared = shared_memory(device)
         # the few numbers for which rows shared out unevenly leave no room are read where they are
         needed = n * (8 * NUMBERS + 4) + len(pairs) * (9 * precision.numpy.itemsize + 4)
-        self._blocks = min(-(-needed // shared), device.sm_count, THREADS, n)
+        self._blocks = min(-(-needed // shared), device.sm_count, MOST_BLOCKS, n)
         self._groups = device.sm_count // self._blocks
         starts, lanes = share_rows(offsets.numpy(), self._blocks)
         self._solve, self._begin = persistent_batch_kernels(precision, shared, THREADS, lanes)
