@@ -30,7 +30,7 @@ const REAL *const b_of = (const REAL *)b.data;
 REAL *const x_of = (REAL *)x.data;
 int *const state = control.data + 2 * group;
 unsigned long long *const mailbox = (unsigned long long *)messages.data + size_t(group) * grid * 4 * SUMS;
-double *const places = exchange.data + size_t(group) * 8 * nodes;
+double *const places = exchange.data + size_t(group) * 12 * nodes, *const solution = places + 8 * size_t(nodes);
 #if BATCHED
 const int systems = count.data[0];
 const size_t stride = x.shape[2];
@@ -177,12 +177,13 @@ auto meet = [&]() -> bool {
 
 // -- rows: LANES threads for each; of every four the first three have its components, of which the first three of all count
 const int component = min(sub % 4, 2);
-// Component of a row of `A v`, and if asked for of `|A| |v|`: of what was given before the last meeting, or of the guess.
+// Component of a row of `A v`, of what was given before the last meeting; where the residual is measured of `A x` and
+// `|A| |x|`, of what has been reached or of the guess.
 int turn = 0;
 bool of_guess = true, measured = true;
 double size;
 auto product = [&](int row) -> double {
-    const double *const given = places + size_t(turn ^ 1) * 4 * nodes;
+    const double *const given = measured ? solution : places + size_t(turn ^ 1) * 4 * nodes;
     auto get = [&](int node, double v[3]) {
         if (of_guess) {
             for (int c = 0; c < 3; ++c)
@@ -249,7 +250,7 @@ auto precondition = [&](int row, double v) -> double {
 // What is done between two meetings. An iteration has one (Ghysels and Vanroose 2014, algorithm 4); what comes before the
 // first and after the last, and every so often between, is the residual itself and what follows from it and from
 // the search direction: u = M r, w = A u, s = A p, q = M s, z = A q.
-enum Phase { GIVE_X, RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, ITERATE };
+enum Phase { RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, ITERATE };
 const double infinity = __longlong_as_double(0x7ff0000000000000ll);
 for (int system = group; system < systems; system += groups) {
     int iteration = 0, since = 0;
@@ -326,14 +327,9 @@ for (int system = group; system < systems; system += groups) {
             const int row = min(base + lane / LANES, rows - 1), i = 3 * row + component;
             const bool mine = base + lane / LANES < rows && sub < 3;
             auto vector = [&](int which) -> double & { return vectors[which * length + i]; };
-            const double y = phase == GIVE_X || phase == RESUME ? 0.0 : product(row);
+            const double y = phase == RESUME ? 0.0 : product(row);
             double give, bi = 0.0;
-            if (phase == GIVE_X) {
-                // as it will be stored
-                give = double(REAL(vector(X)));
-                if (mine)
-                    vector(X) = give;
-            } else if (phase == GET_W) {
+            if (phase == GET_W) {
                 give = vector(P);
                 if (mine)
                     vector(W) = y;
@@ -367,6 +363,7 @@ for (int system = group; system < systems; system += groups) {
                 }
                 give = precondition(row, v);
                 if (mine && phase == RESIDUAL) {
+                    vector(X) = double(REAL(vector(X)));
                     vector(R) = v;
                     vector(U) = give;
                     const double magnitude = size + fabs(bi);
@@ -378,6 +375,8 @@ for (int system = group; system < systems; system += groups) {
                     vector(Q) = give;
                 } else if (mine) {
                     vector(M) = give;
+                    // as it will be stored, should this be the end
+                    solution[4 * size_t(row0 + row) + sub] = double(REAL(vector(X)));
                     const double r = vector(R), u = vector(U), p = vector(P);
                     sums[0] += r * r;
                     sums[1] += r * u;
@@ -397,10 +396,7 @@ for (int system = group; system < systems; system += groups) {
         if (!meet())
             return;
         turn ^= 1;
-        if (phase == GIVE_X) {
-            phase = RESIDUAL;
-            measured = true;
-        } else if (phase == RESIDUAL) {
+        if (phase == RESIDUAL) {
             measured = false;
             rr = sums[0];
             goal = tolerance * tolerance * sums[1];
@@ -433,7 +429,8 @@ for (int system = group; system < systems; system += groups) {
             if (left_off)
                 break;
             if (ended || !(updated > goal) || since == RENEWED_EVERY) {
-                phase = GIVE_X;
+                phase = RESIDUAL;
+                measured = true;
                 continue;
             }
             beta = iteration > 0 ? gamma / gamma_before : 0.0;

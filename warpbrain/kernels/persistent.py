@@ -145,7 +145,7 @@ class Meetings:
     Attributes
     ----------
     exchange : wp.array of double
-        Two places a group that take turns, with four numbers a row.
+        Two places a group that take turns, and one for the solution, with four numbers a row.
     messages : wp.array of uint64
         Two places a group that take turns, with a message for each half of a sum of a block.
     scratch : wp.array of double
@@ -156,7 +156,7 @@ class Meetings:
 
     def __init__(self, rows: int, blocks: int, groups: int, device: wp.Device) -> None:
         self._device = device
-        self.exchange = wp.zeros(groups * 8 * rows, dtype=wp.float64, device=device)
+        self.exchange = wp.zeros(groups * 12 * rows, dtype=wp.float64, device=device)
         self.messages = wp.zeros(groups * 4 * _SUMS * blocks, dtype=wp.uint64, device=device)
         self.scratch = wp.zeros(groups * NUMBERS * rows, dtype=wp.float64, device=device)
         self.control = wp.zeros(groups * 2, dtype=int, device=device)
