@@ -11,10 +11,12 @@ constexpr unsigned ALL = 0xffffffffu;
 constexpr int SUMS = 4;
 constexpr int MOST_BLOCKS = 256;
 #if BATCHED
-constexpr int SCALARS = 6;
+constexpr int SCALARS = 7;
 #endif
 // iterations after which the recurrences start again from the residual itself
 constexpr int RENEWED_EVERY = 50;
+// and after which rounding begins to cost more iterations than meetings cost time
+constexpr int PIPELINED = 200;
 // [ns]; blocks that do not hear from each other for so long give up
 constexpr unsigned long long PATIENCE = 2000000000ull;
 
@@ -249,14 +251,15 @@ auto precondition = [&](int row, double v) -> double {
 
 // What is done between two meetings. An iteration has one (Ghysels and Vanroose 2014, algorithm 4); what comes before the
 // first and after the last, and every so often between, is the residual itself and what follows from it and from
-// the search direction: u = M r, w = A u, s = A p, q = M s, z = A q.
-enum Phase { RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, ITERATE };
+// the search direction: u = M r, w = A u, s = A p, q = M s, z = A q. Long solves, and those whose end was none, go on
+// with textbook conjugate gradients, of three meetings an iteration: p = u + beta p; s = A p; x, r and u.
+enum Phase { RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, ITERATE, DIRECTION, CURVATURE, UPDATE };
 const double infinity = __longlong_as_double(0x7ff0000000000000ll);
 for (int system = group; system < systems; system += groups) {
     int iteration = 0, since = 0;
     double gamma_before = 1.0, alpha = 1.0, beta = 0.0, least = infinity, before = infinity;
     double rr = 0.0, goal = 0.0, updated = infinity;
-    bool ended = false, left_off = false;
+    bool ended = false, left_off = false, textbook = false;
     Phase phase = RESIDUAL;
     of_guess = measured = true;
 #if BATCHED
@@ -268,7 +271,7 @@ for (int system = group; system < systems; system += groups) {
         phase = RESUME;
         of_guess = measured = false;
         iteration = (int)saved[0], since = (int)saved[1];
-        gamma_before = saved[2], alpha = saved[3], before = saved[4], goal = saved[5];
+        gamma_before = saved[2], alpha = saved[3], before = saved[4], goal = saved[5], textbook = saved[6] > 0.0;
     }
     // the last system's numbers are no longer needed
     __syncthreads();
@@ -327,12 +330,24 @@ for (int system = group; system < systems; system += groups) {
             const int row = min(base + lane / LANES, rows - 1), i = 3 * row + component;
             const bool mine = base + lane / LANES < rows && sub < 3;
             auto vector = [&](int which) -> double & { return vectors[which * length + i]; };
-            const double y = phase == RESUME ? 0.0 : product(row);
+            const double y = phase == RESUME || phase == DIRECTION || phase == UPDATE ? 0.0 : product(row);
             double give, bi = 0.0;
             if (phase == GET_W) {
                 give = vector(P);
                 if (mine)
                     vector(W) = y;
+            } else if (phase == DIRECTION) {
+                give = vector(U) + beta * vector(P);
+                if (mine)
+                    vector(P) = give;
+            } else if (phase == CURVATURE) {
+                give = 0.0;
+                if (mine) {
+                    const double p = vector(P);
+                    vector(S) = y;
+                    sums[0] += p * y;
+                    sums[1] += p * p;
+                }
             } else {
                 // what the preconditioner is applied to
                 double v = y;
@@ -358,6 +373,12 @@ for (int system = group; system < systems; system += groups) {
                         vector(U) = u - alpha * q;
                         vector(W) = v;
                     }
+                } else if (phase == UPDATE) {
+                    v = vector(R) - alpha * vector(S);
+                    if (mine) {
+                        vector(X) += alpha * vector(P);
+                        vector(R) = v;
+                    }
                 } else if (phase == BEGIN && mine) {
                     vector(W) = y;
                 }
@@ -373,6 +394,11 @@ for (int system = group; system < systems; system += groups) {
                 } else if (mine && phase == GET_S) {
                     vector(S) = y;
                     vector(Q) = give;
+                } else if (mine && phase == UPDATE) {
+                    vector(U) = give;
+                    solution[4 * size_t(row0 + row) + sub] = double(REAL(vector(X)));
+                    sums[0] += v * v;
+                    sums[1] += v * give;
                 } else if (mine) {
                     vector(M) = give;
                     // as it will be stored, should this be the end
@@ -404,18 +430,29 @@ for (int system = group; system < systems; system += groups) {
                 break;
             if (!(updated > goal)) {
                 // what is carried along says that this is the end, and is wrong, or as right as rounding allows
-                if (rr <= 16.0 * ROUNDING * ROUNDING * sums[2])
+                if (rr <= 256.0 * ROUNDING * ROUNDING * sums[2])
                     rr = updated;
                 if (rr > 0.25 * before || rr == updated)
                     break;
                 before = rr;
+                textbook = true;
             }
-            phase = of_guess ? BEGIN : GET_W;
+            textbook = textbook || iteration >= PIPELINED;
+            phase = textbook ? RESUME : of_guess ? BEGIN : GET_W;
             of_guess = false;
+            since = 0;
         } else if (phase == GET_W) {
             phase = GET_S;
         } else if (phase == GET_S) {
             phase = GET_Z;
+        } else if (phase == DIRECTION) {
+            phase = CURVATURE;
+        } else if (phase == CURVATURE) {
+            if (sums[1] > 0.0)
+                least = fmin(least, sums[0] / sums[1]);
+            alpha = gamma_before / sums[0];
+            ++iteration;
+            phase = UPDATE;
         } else {
             updated = sums[0];
             const double gamma = sums[1];
@@ -423,20 +460,24 @@ for (int system = group; system < systems; system += groups) {
             if (!BATCHED && phase == ITERATE && sums[3] > 0.0)
                 least = fmin(least, gamma_before / alpha / sums[3]);
             ended = iteration >= max_iterations || (watch && least <= 0.0);
-            since = phase == ITERATE ? since + 1 : phase == RESUME ? since : 0;
-            phase = ITERATE;
+            since += phase == ITERATE;
             left_off = BATCHED && sums[3] > 0.0 && !ended && updated > goal;
             if (left_off)
                 break;
-            if (ended || !(updated > goal) || since == RENEWED_EVERY) {
+            if (ended || !(updated > goal) || (since == RENEWED_EVERY && !textbook)) {
                 phase = RESIDUAL;
                 measured = true;
                 continue;
             }
             beta = iteration > 0 ? gamma / gamma_before : 0.0;
-            alpha = gamma / (sums[2] - beta * gamma / alpha);
+            if (textbook) {
+                phase = DIRECTION;
+            } else {
+                phase = ITERATE;
+                alpha = gamma / (sums[2] - beta * gamma / alpha);
+                ++iteration;
+            }
             gamma_before = gamma;
-            ++iteration;
         }
     }
 
@@ -447,7 +488,7 @@ for (int system = group; system < systems; system += groups) {
                 saved_vectors[k * length + i] = vectors[k * length + i];
         if (me == 0 && tid == 0) {
             saved[0] = double(iteration), saved[1] = double(since);
-            saved[2] = gamma_before, saved[3] = alpha, saved[4] = before, saved[5] = goal;
+            saved[2] = gamma_before, saved[3] = alpha, saved[4] = before, saved[5] = goal, saved[6] = double(textbook);
         }
         continue;
     }

@@ -6,8 +6,8 @@ multiprocessor as far as they fit (PERKS: Zhang et al. 2023, doi 10.1145/3577193
 iteration: pipelined conjugate gradients (Ghysels and Vanroose 2014, Parallel Computing 40, 224, algorithm 4) need the
 sums and the numbers of neighbours at the same time. Their recurrences lose digits. So they start again from the
 residual itself every so often, with the search direction kept (Cools, Yetkin, Agullo, Giraud and Vanroose 2018, SIAM J.
-Matrix Anal. Appl. 39, 426), and it is the residual itself that has to reach the tolerance in the end. Vectors and sums
-are double in either precision.
+Matrix Anal. Appl. 39, 426), long solves go over to textbook conjugate gradients, and it is the residual itself that has
+to reach the tolerance in the end. Vectors and sums are double in either precision.
 
 **Meetings.** There are no more blocks than multiprocessors, and each of these has room for one: all run at once. A
 block writes its sums, labelled with the number of the meeting, and waits for those of all others, which it adds in one
