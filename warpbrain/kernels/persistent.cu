@@ -1,8 +1,9 @@
-// Preconditioned conjugate gradients in one launch: the body of `solve` in persistent.py and batched/persistent.py, which
-// say what it does and what its arguments are. BATCHED, THREADS, LANES, SHARED_BYTES, REAL and ROUNDING are put before it.
+// Preconditioned conjugate gradients in one launch: the body of `solve` in persistent.py and batched/persistent.py,
+// which say what it does and what its arguments are. BATCHED, THREADS, LANES, SHARED_BYTES, REAL and ROUNDING are put
+// before it.
 //
-// Blocks are in groups; a group solves one system after the other. With BATCHED these are samples, of which one in a slot
-// has the numbers `slot + stride * k`; without, there is one group and one system.
+// Blocks are in groups; a group solves one system after the other. With BATCHED these are samples, of which one in a
+// slot has the numbers `slot + stride * k`; without, there is one group and one system.
 
 constexpr int WARPS = THREADS / 32;
 constexpr int ROWS_OF_WARP = 32 / LANES;
@@ -53,7 +54,7 @@ auto entry = [&](int place, int k) -> REAL {
 #endif
 };
 
-// -- what is kept on the chip: vectors and inverse diagonal blocks first, then as much of the matrix as there is room for
+// -- what is kept on the chip: vectors and inverse diagonal blocks, then as much of the matrix as there is room for
 enum { X, R, U, W, P, S, Q, Z, M, INVERSE, VECTORS = INVERSE + 3 };
 double(*const partial)[SUMS] = (double(*)[SUMS])dynamic_smem_base;
 double(*const totals)[SUMS] = partial + WARPS;
@@ -93,7 +94,8 @@ if (*quit)
     return;
 
 // -- meetings of the blocks of a group
-// Sums over a warp of four numbers: lane 8 k has the k-th, in an order that is always the same. Halves go different ways.
+// Sums over a warp of four numbers: lane 8 k has the k-th, in an order that is always the same. Halves of the warp send
+// each other what the other one sums.
 auto warp_sums = [&](const double s[SUMS]) -> double {
     const bool upper = lane & 16, odd = lane & 8;
     double low = upper ? s[2] : s[0], high = upper ? s[3] : s[1];
@@ -126,8 +128,8 @@ auto meet = [&]() -> bool {
             const unsigned long long bits = __double_as_longlong(sum);
             const unsigned long long half = lane % 8 ? bits >> 32 : bits & 0xffffffffull;
             const unsigned long long message = half << 32 | epoch;
-            asm volatile("st.relaxed.gpu.global.u64 [%0], %1;" ::"l"(mail + 2 * SUMS * me + lane / 8 * 2 + lane % 8), "l"(message)
-                         : "memory");
+            unsigned long long *const to = mail + 2 * SUMS * me + lane / 8 * 2 + lane % 8;
+            asm volatile("st.relaxed.gpu.global.u64 [%0], %1;" ::"l"(to), "l"(message) : "memory");
         }
     }
     if (warp < (grid + 31) / 32) {
@@ -177,7 +179,8 @@ auto meet = [&]() -> bool {
     return *(volatile int *)quit == 0;
 };
 
-// -- rows: LANES threads for each; of every four the first three have its components, of which the first three of all count
+// -- rows: LANES threads for each; of every four the first three have its components, of which those of the first four
+// count
 const int component = min(sub % 4, 2);
 // Component of a row of `A v`, of what was given before the last meeting; where the residual is measured of `A x` and
 // `|A| |x|`, of what has been reached or of the guess.
@@ -249,8 +252,8 @@ auto precondition = [&](int row, double v) -> double {
     return y;
 };
 
-// What is done between two meetings. An iteration has one (Ghysels and Vanroose 2014, algorithm 4); what comes before the
-// first and after the last, and every so often between, is the residual itself and what follows from it and from
+// What is done between two meetings. An iteration has one (Ghysels and Vanroose 2014, algorithm 4); what comes before
+// the first and after the last, and every so often between, is the residual itself and what follows from it and from
 // the search direction: u = M r, w = A u, s = A p, q = M s, z = A q. Long solves, and those whose end was none, go on
 // with textbook conjugate gradients, of three meetings an iteration: p = u + beta p; s = A p; x, r and u.
 enum Phase { RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, ITERATE, DIRECTION, CURVATURE, UPDATE };
