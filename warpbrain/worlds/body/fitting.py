@@ -18,7 +18,7 @@ from warpbrain.worlds.body.mesh_share import excess_error
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.states import SolvedState
 
-#: How often at most a fit is repeated with the error of the mesh, or with the gross errors and the noise, of its result.
+#: How often at most a fit is repeated with the error of the mesh, or the gross errors and the noise, of its result.
 _ROUNDS = 3
 #: Change of the log evidence below which the fit is not repeated again.
 _SAME = 0.1
