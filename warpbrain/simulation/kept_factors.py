@@ -15,16 +15,20 @@ from warpbrain.simulation.sparse_factors import SparseFactors
 
 Floats = NDArray[np.float64]
 
-#: Iterations of a solve with factors that are near, and how many beyond these a factorisation takes as long as.
-_NEAR, _WORTH = 5, 25
+#: Iterations of a solve with factors that are near.
+_NEAR = 5
 
 
 class KeptFactors:
     """Of the stiffness of the last state that they were renewed at; of none at first."""
 
+    #: How many iterations beyond these a factorisation takes as long as.
+    _worth = 25
+
     def __init__(self) -> None:
         self._free: NDArray[np.bool_] | None = None
-        self._factors: SparseFactors | None = None
+        self._factors: Any = None
+        self._definite = False
         self._wasted = 0
 
     def serve(self, free: NDArray[np.bool_], definite: bool) -> bool:
@@ -32,10 +36,8 @@ class KeptFactors:
 
         And positive definite, if they have to be.
         """
-        if self._free is None or self._factors is None or self._wasted > _WORTH:
-            return False
         # with factors of an unstable state conjugate gradients could not tell that it is one
-        if definite and not self._factors.is_definite:
+        if self._free is None or self._wasted > self._worth or (definite and not self._definite):
             return False
         return np.array_equal(self._free, free)
 
@@ -50,12 +52,12 @@ class KeptFactors:
             self._factors = SparseFactors(stiffness.tocsr()[free][:, free])
         except RuntimeError:
             return False
-        self._free = free.copy()
+        self._free, self._definite = free.copy(), self._factors.is_definite
         return self.serve(free, definite)
 
     def solve(self, forces: Floats) -> Floats:
         """What nodal forces (3 n,) [N] move: (3 n,) [m], zero where components are not free."""
-        assert self._free is not None and self._factors is not None
+        assert self._free is not None
         displacement = np.zeros(len(forces))
         displacement[self._free] = self._factors.solve(forces[self._free])
         return displacement
