@@ -126,6 +126,8 @@ class FitSearch:
         z[part] *= sizes[0] / sizes[1] if sizes[1] else 1.0
         z[first : first + len(coefficients)] = coefficients
         self._linearised_at = z
+        # a place that leads to no state nearby is given up soon: from rest, in load steps, that takes minutes
+        self._solved = [(z[self._layout.nonlinear], subset.state.u)]
         if subset.mesh_share is not None:
             share = subset.mesh_share.extended(len(self.z) - first)
             self._take_mesh_share(share, z[first:])
