@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
-from warpbrain.estimation.likelihood import Noise, Rows
-from warpbrain.estimation.modes import Estimate
-from warpbrain.estimation.observations import Observation, Observations, Residuals
+from warpbrain.estimation.fit import Estimate
+from warpbrain.estimation.likelihood import Noise
+from warpbrain.estimation.observations import Observations, Sensors
 from warpbrain.estimation.registration import realigned
-from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import with_gross_errors
 from warpbrain.recordings.agreement import by_unit
 from warpbrain.recordings.comparison import Comparison
 from warpbrain.simulation.mesh_error import Found
@@ -96,80 +94,79 @@ class OverallErrors:
     def of(cls, each: Sequence[Prediction]) -> tuple[OverallErrors, ...]:
         """Of each role that has any."""
         found = []
-        for role in dict.fromkeys(one.role for one in each):
+        for role in dict.fromkeys(one.role for one in each if one.unit == "m"):
             lengths = [one for one in each if one.role == role and one.unit == "m"]
-            if lengths:
-                before = by_unit((one.unit, one.run.residuals_before) for one in lengths)["m"]
-                after = by_unit((one.unit, one.fitted.residuals_after) for one in lengths)["m"]
-                of_run = by_unit((one.unit, one.run.residuals_after) for one in lengths)["m"]
-                found.append(cls(role, sum(one.fitted.count for one in lengths), before, after, of_run))
+            residuals = (
+                [one.run.residuals_before for one in lengths],
+                [one.fitted.residuals_after for one in lengths],
+                [one.run.residuals_after for one in lengths],
+            )
+            errors = (by_unit(("m", one) for one in values)["m"] for values in residuals)
+            found.append(cls(role, sum(one.fitted.count for one in lengths), *errors))
         return tuple(found)
 
 
 def predictions(
     case: Case, estimate: Estimate, role: str, observations: Observations, joint: Floats
 ) -> tuple[Prediction, ...]:
-    """Recordings of one role beside an estimate.
+    """Recordings of one role, ``"fit"`` or ``"check"``, beside an estimate.
 
-    Parameters
-    ----------
-    case : Case
-    estimate : Estimate
-    role : {"fit", "check"}
-    observations : Observations
-        Of that role.
-    joint : (p + q, p + q) array
-        Covariance of parameters and nuisances.
+    `joint` (p + q, p + q) is the covariance of parameters and nuisances.
     """
+    if not observations.recordings:
+        return ()
     problem, point, derivatives = estimate.problem, estimate.point, estimate.linearised
     centre, motion = problem.observations.centre, problem.nuisances.motion(point.nuisances)
     rest = np.zeros_like(point.state.u)
     seen = problem.nuisances.observed(point.state, point.nuisances)
-    before, parts = observations.at(rest, rest, centre), observations.at(*seen, centre, motion)
+    before, after = observations.at(rest, rest, centre), observations.at(*seen, centre, motion)
     moments = problem.forward.moments
     run = compared(case, point.state.u, point.state.reactions, moments)
     fitted = compared(realigned(case, motion, centre), *seen, moments)
-    found = []
-    for number, (observation, first, part) in enumerate(zip(observations.recordings, before, parts, strict=True)):
-        jacobian = problem.nuisances.jacobian(
-            part, point.state.theta, point.nuisances, (derivatives.du, derivatives.dR)
-        )
-        deviation = np.sqrt(np.einsum("ndp,pq,ndq->nd", jacobian, joint, jacobian))
-        noise, own = point.known_noise, number
+    jacobian = problem.nuisances.jacobian(after, point.state.theta, point.nuisances, derivatives.du, derivatives.dR)
+    deviations = np.sqrt(np.einsum("np,pq,nq->n", jacobian, joint, jacobian))
+    found, last = [], 0
+    for one in observations.recordings:
+        shape = len(one.rows), one.size
+        members = np.arange(last, last + len(one.rows) * one.size)
+        last += len(members)
+        of_all, own = point.known_noise, members
         if role != "fit":
-            noise, own = _unseen(observation, part, jacobian, joint, noise), 0
-        known = role == "fit" or observation.sigma is not None
-        sigma, of_noise, gross = noise.of_recording(own, part.values.shape)
+            of_all, own = _unseen(after.of_rows(members), jacobian[members], joint, of_all), members - members[0]
+        known = role == "fit" or one.sigma is not None
+        sigma, of_noise = ((of_all.scale * of_all.sigma)[own].reshape(shape), of_all.deviation[own].reshape(shape))
+        deviation, residual = deviations[members].reshape(shape), after.residual[members].reshape(shape)
+        gross = np.zeros(len(one.rows), dtype=bool)
+        if one.unit == "m":
+            numbers = [k for k, rows in enumerate(of_all.rows.points) if own[0] <= rows[0] <= own[-1]]
+            gross = of_all.gross[numbers]
         found.append(
             Prediction(
-                observation.name,
-                observation.kind,
+                one.name,
+                one.kind,
                 role,
-                observation.unit,
-                observation.rows,
-                first.values,
-                part.values,
-                sigma if known else None,
+                one.unit,
+                one.rows,
+                before.residual[members].reshape(shape),
+                residual,
+                sigma[:, 0] if known else None,
                 deviation,
                 gross,
-                coverage(part.values, np.hypot(deviation, of_noise), gross) if known else None,
-                run[observation.name],
-                fitted[observation.name],
+                coverage(residual, np.hypot(deviation, of_noise), gross) if known else None,
+                run[one.name],
+                fitted[one.name],
             )
         )
     return tuple(found)
 
 
-def _unseen(observation: Observation, part: Residuals, jacobian: Floats, joint: Floats, fitted: Noise) -> Noise:
+def _unseen(rows: Sensors, jacobian: Floats, joint: Floats, fitted: Noise) -> Noise:
     """The noise of a recording that was not fitted, its gross errors beside what the estimate knows of it."""
-    rows = replace(Rows.of(Observations((observation,), ()), (part,)), unresolved=fitted.rows.unresolved)
-    noise = Noise(rows, rows.sigma, fitted.scale, np.ones(len(rows.points)), fitted.outliers)
-    if observation.sigma is None or fitted.outliers is None:
+    sigma = np.where(np.isnan(rows.sigma), 1.0 / np.sqrt(rows.weights), rows.sigma)
+    noise = Noise(rows, sigma, fitted.scale, np.ones(len(rows.points)), fitted.outliers, fitted.unresolved)
+    if np.isnan(rows.sigma).any():
         return noise
-    columns = jacobian.reshape(-1, jacobian.shape[2]) @ np.linalg.cholesky(joint)
-    model = GaussianModel(noise.factor, columns, noise.scale)
-    found = with_gross_errors(model, part.values.ravel(), rows.points, fitted.outliers)
-    return replace(noise, inflation=found.inflation)
+    return noise.with_gross_errors(rows.residual, jacobian @ np.linalg.cholesky(joint))
 
 
 def compared(case: Case, u: Floats, reactions: Floats, moments: Moments) -> Mapping[str, Comparison]:

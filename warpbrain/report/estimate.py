@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.estimation.laplace import Laplace
+from warpbrain.estimation.fit import Laplace
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.estimation.prediction import INTERVALS, OverallErrors, Prediction
