@@ -31,8 +31,8 @@ from warpbrain.simulation.locking import elements_of_fits, on_linear_elements
 
 #: The error of the mesh is computed again until the estimate moves by no more than this, in standard deviations.
 _SETTLED = 0.2
-#: Tolerance of Gauss-Newton before the error of the mesh is known.
-_BEFORE = 0.1
+#: Tolerance of Gauss-Newton before the error of the mesh is known, and with it.
+_BEFORE, _AFTER = 0.1, 1e-4
 #: A mesh whose displacements change by more than this on elements of half the size is too coarse to be corrected well.
 _TOO_COARSE = 0.15
 #: And no more often than this.
@@ -142,19 +142,8 @@ class Estimation:
         if doubts:
             with self._counted("chain"):
                 chain = self._sample(target, proposal, importance)
-        return Posterior(
-            self.case,
-            self.options,
-            self.prior,
-            modes,
-            tuple(self._remarks),
-            tuple(errors),
-            importance,
-            doubts,
-            chain,
-            self._solves,
-            self.seconds,
-        )
+        about = self.case, self.options, self.prior, modes, tuple(self._remarks), tuple(errors)
+        return Posterior(*about, importance, doubts, chain, self._solves, self.seconds)
 
     @contextmanager
     def _counted(self, solves: str, seconds: str = "") -> Iterator[None]:
@@ -170,12 +159,10 @@ class Estimation:
         It goes on from `starts`, estimates with other nuisances, if there are any.
         """
         found, failures = [], []
-        begun = {id(mode.problem.mode): mode for mode in starts}
-        for prior_mode in self.prior_modes:
-            if starts and id(prior_mode) not in begun:
-                continue
+        begun = [(one.problem.mode, one) for one in starts] or [(mode, None) for mode in self.prior_modes]
+        for prior_mode, start in begun:
             try:
-                found.append(self._fit_one(prior_mode, nuisances, begun.get(id(prior_mode))))
+                found.append(self._fit_one(prior_mode, nuisances, start))
             except SolveError as error:
                 failures.append(error)
                 remark = f"{_where(self.parameters, prior_mode)}: {error}"
@@ -186,20 +173,17 @@ class Estimation:
         return tuple(sorted(found, key=lambda mode: -mode.log_evidence))
 
     def _fit_one(self, prior_mode: PriorMode, nuisances: Nuisances, start: Estimate | None) -> Estimate:
-        many = len(self.prior_modes) > 1
-        text = "Gauss-Newton" + (f", {_where(self.parameters, prior_mode)}" if many else "")
+        text = "Gauss-Newton" + (f", {_where(self.parameters, prior_mode)}" if len(self.prior_modes) > 1 else "")
         self.listener.stage(text if start is None else f"{text}, with the error of the mesh")
         problem = Problem(self.forward, self.observations, prior_mode, self.options.likelihood, nuisances)
         # what is only the start of something better need not be exact
         final = self.options.discretisation is None or nuisances.error is not None
-        tolerance = self.options.tolerance if final else max(self.options.tolerance, _BEFORE)
-        search = GaussNewton(problem, tolerance, self.listener.step)
+        search = GaussNewton(problem, _AFTER if final else _BEFORE, self.listener.step)
         if start is None:
             found = search.solve()
         else:
-            known = start.point.nuisances
             values = nuisances.prior.mean.copy()
-            values[len(values) - len(known) :] = known
+            values[len(values) - len(start.point.nuisances) :] = start.point.nuisances
             found = search.solve(start.point.state, values)
         if not found.converged:
             self._remarks.append(f"{text}: not converged")
@@ -211,11 +195,9 @@ class Estimation:
         finer = [FinerMesh(self._device) for _ in self.forward.states]
         for _ in range(_MOST_ERRORS):
             self.listener.stage("error of the mesh: one equilibrium on elements of half the size")
-            best = modes[0]
-            derivatives = best.linearised.du, best.linearised.dR
-            errors.append(discretisation_error(finer, self.forward, best.point.state, derivatives))
-            nuisances = Nuisances(believed, errors[-1], self._registration)
-            modes = self.fit(nuisances, modes)
+            state, first_order = modes[0].point.state, modes[0].linearised
+            errors.append(discretisation_error(finer, self.forward, state, (first_order.du, first_order.dR)))
+            modes = self.fit(Nuisances(believed, errors[-1], self._registration), modes)
             if np.sqrt(2.0 * modes[0].laplace.posterior.negative_log(errors[-1].change.theta)) <= _SETTLED:
                 break
         else:
@@ -239,9 +221,8 @@ class Estimation:
         solves = self.options.chain
         self.listener.stage(f"Laplace's approximation fails: a chain of {solves} equilibria instead")
         best = int(np.argmax(importance.log_densities))
-        start = target.modes[0].theta
-        if np.isfinite(importance.log_densities[best]):
-            start = importance.theta[best]
+        found = np.isfinite(importance.log_densities[best])
+        start = importance.theta[best] if found else target.modes[0].theta
         rng = np.random.default_rng([self.options.seed, 1])
         return run_chain(target, proposal, start, solves, rng, lambda n: self.listener.progress(n / solves))
 

@@ -73,15 +73,7 @@ NAMES = (
 
 @dataclass(frozen=True)
 class Discretisation:
-    """What is believed of what smaller elements change: normal, of `b` and of each coefficient of `B`.
-
-    Attributes
-    ----------
-    mean, deviation : float
-        Of `b`.
-    shape : float
-        Standard deviation of each coefficient of `B`.
-    """
+    """What is believed of what smaller elements change: `b ~ N(mean, deviation^2)`, `B_ij ~ N(0, shape^2)`."""
 
     mean: float = field(default_factory=lambda: belief("mesh.amount"))
     deviation: float = field(default_factory=lambda: belief("mesh.amount_width"))
@@ -107,19 +99,11 @@ class Discretisation:
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """The error of a mesh, as far as it shows: the state on elements of half the size less the state.
+    """The error of a mesh, as far as it shows: the state on elements of half the size less the state."""
 
-    Attributes
-    ----------
-    u, reactions : (n, 3) array
-        At the nodes of the mesh [m] and [N].
-    theta : (p,) array
-        Where it was computed.
-    """
-
-    u: Floats
-    reactions: Floats
-    theta: Floats
+    u: Floats  # (n, 3), at the nodes of the mesh [m]
+    reactions: Floats  # (n, 3) [N]
+    theta: Floats  # (p,), where it was computed
 
     @property
     def size(self) -> float:
@@ -141,27 +125,13 @@ class Difference:
 
 @dataclass(frozen=True, eq=False)
 class DiscretisationError:
-    """The error of the mesh of s states, of an amount and a shape that are not known.
+    """The error of the mesh of s states; `values` (37,) are `b` and the coefficients of `B`, ordered as `NAMES`."""
 
-    `values` (37,) are `b` and the coefficients of `B`, in the order of `NAMES`.
-
-    Attributes
-    ----------
-    change : Difference
-        `d`: what elements of half the size change.
-    du, dR : (p, s n, 3) array
-        Its derivatives by `theta`.
-    positions : (s n, 3) array
-        Of the nodes in each state, from the mean of all in units of their root mean square radius.
-    part : float
-        `k`: the part of the displacement on elements of half the size that is `d`, its projection.
-    """
-
-    change: Difference
-    du: Floats
+    change: Difference  # `d`: what elements of half the size change
+    du: Floats  # (p, s n, 3), its derivatives by `theta`
     dR: Floats
-    positions: Floats
-    part: float
+    positions: Floats  # (s n, 3), of nodes, from the mean of all in units of their root mean square radius
+    part: float  # `k`: the part of the displacement on elements of half the size that is `d`, its projection
 
     def amount(self, b: float) -> tuple[float, float]:
         """`a`, and its derivative by `b`."""
@@ -225,24 +195,10 @@ class FinerMesh:
     def difference(
         self, case: Case, theta: Floats, system: System, u: Floats, reactions: Floats, tolerance: float = ROUGH
     ) -> Difference:
-        """By how much the state of a case differs from that on the mesh as it is.
+        """By how much the state of a case with the tissue of `theta` (p,) differs from that on the mesh as it is.
 
-        Parameters
-        ----------
-        case : Case
-            With the tissue of `theta` (p,).
-        theta : (p,) array
-        system : System
-            Of the case; its displacement is the state's afterwards.
-        u, reactions : (n, 3) array
-            The state on the mesh as it is [m] and [N].
-        tolerance : float
-            Out-of-balance force of the finer state, relative.
-
-        Raises
-        ------
-        SolveError
-            If there is no equilibrium on the finer mesh.
+        That is `u` [m] and `reactions` [N] (n, 3) of a system, whose displacement is the state's afterwards;
+        `tolerance` is the out-of-balance force of the finer state, relative. `SolveError` if there is none.
         """
         self.solves += 1
         finer = FinerCase(case)
@@ -325,21 +281,9 @@ class FinerMesh:
 def discretisation_error(
     finer: Sequence[FinerMesh], forward: Forward, state: State, derivatives: tuple[Floats, Floats]
 ) -> DiscretisationError:
-    """The error of states, to first order in the parameters.
+    """The error of s states, to first order in the parameters, by which derivatives (p, s n, 3) of u and reactions are.
 
-    Parameters
-    ----------
-    finer : sequence of FinerMesh
-        For each of the s states one.
-    forward : Forward
-    state : State
-    derivatives : pair of (p, s n, 3) arrays
-        Of displacement and reactions by the parameters.
-
-    Raises
-    ------
-    SolveError
-        If there is no stable equilibrium on the finer mesh.
+    `SolveError` if there is no stable equilibrium on a finer mesh.
     """
     theta, parameters, count = state.theta, forward.parameters, len(forward.states)
     errors, by_theta = [], []

@@ -39,20 +39,12 @@ class Laplace:
     could explain as well (its Schur complement). Beside the prior covariance `L L^T` its measure is `L^T I L`: along an
     eigenvector of the eigenvalue `e` the data know `e` times as much as the prior, and the variance falls to
     `1/(1 + e)` of what it was.
-
-    Attributes
-    ----------
-    parameters : Parameters
-    theta : (p,) array
-        Its mean: the estimate.
-    prior : Gaussian
-    information : (p, p) array
     """
 
     parameters: Parameters
-    theta: Floats
+    theta: Floats  # (p,), its mean: the estimate
     prior: Gaussian
-    information: Floats
+    information: Floats  # (p, p)
 
     @classmethod
     def of(cls, problem: Problem, theta: Floats, linearised: Linearised) -> Laplace:
@@ -125,27 +117,13 @@ def _normalised(columns: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class GaussNewtonStep:
-    """One line of the history.
+    """One line of the history."""
 
-    Attributes
-    ----------
-    iteration : int
-        From 1.
-    objective : float
-        `-ln` of likelihood times prior, before the step.
-    decrement : float
-        Length of the whole step in standard deviations of the posterior.
-    step : float
-        Share of it that was taken.
-    newton_iterations : int
-        Of all equilibria that were tried.
-    """
-
-    iteration: int
-    objective: float
-    decrement: float
-    step: float
-    newton_iterations: int
+    iteration: int  # from 1
+    objective: float  # `-ln` of likelihood times prior, before the step
+    decrement: float  # length of the whole step in standard deviations of the posterior
+    step: float  # share of it that was taken
+    newton_iterations: int  # of all equilibria that were tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,10 +194,7 @@ class GaussNewton:
     """
 
     def __init__(
-        self,
-        problem: Problem,
-        tolerance: float = 1e-3,
-        on_step: Callable[[GaussNewtonStep], None] | None = None,
+        self, problem: Problem, tolerance: float = 1e-3, on_step: Callable[[GaussNewtonStep], None] | None = None
     ) -> None:
         self.problem = problem
         self.tolerance = tolerance
@@ -227,21 +202,10 @@ class GaussNewton:
         self._history: list[GaussNewtonStep] = []
 
     def solve(self, start: State | None = None, nuisances: Floats | None = None) -> Estimate:
-        """Go from a start to the estimate.
+        """Go from a state and nuisances (q,) to the estimate.
 
-        Parameters
-        ----------
-        start : State, optional
-            The state in the middle of the prior by default, and then the first stage is that of large residuals.
-        nuisances : (q,) array, optional
-            Their middle by default.
-
-        Raises
-        ------
-        InputError
-            If the laws of the middle of the prior are not stable.
-        SolveError
-            If there is no equilibrium to start from.
+        By default from the middle of the prior, and then the first stage is that of large residuals: `InputError` if
+        its laws are not stable, `SolveError` if there is no equilibrium to start from.
         """
         problem = self.problem
         values = problem.nuisances.prior.mean if nuisances is None else nuisances

@@ -32,23 +32,13 @@ _DERIVATIVES = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Equilibria of a case.
-
-    Attributes
-    ----------
-    theta : (p,) array
-    u, reactions : (s n, 3) array
-        Displacement [m], and what holds the constrained components [N], in s states.
-    newton_iterations : int
-        That it took.
-    passed_unstable : bool
-        The way to it led past states with an indefinite tangent: a slowly growing load may reach another one.
-    """
+    """Equilibria of a case, in s states."""
 
     theta: Floats
-    u: Floats
-    reactions: Floats
-    newton_iterations: int
+    u: Floats  # (s n, 3) [m]
+    reactions: Floats  # (s n, 3), what holds the constrained components [N]
+    newton_iterations: int  # that it took
+    #: The way to it led past states with an indefinite tangent: a slowly growing load may reach another one.
     passed_unstable: bool = False
 
 
@@ -66,11 +56,6 @@ class Forward:
         See `Model`.
     moments : Moments, optional
         Its states; the end alone unless given.
-
-    Attributes
-    ----------
-    solves : int
-        Equilibria that were asked for.
     """
 
     def __init__(
@@ -85,6 +70,7 @@ class Forward:
         self.case = case
         self.moments = Moments.of(case, ()) if moments is None else moments
         self.states = tuple(OneState(one, self.parameters, theta, device, elements) for one in self.moments.cases)
+        #: Equilibria that were asked for.
         self.solves = 0
 
     @property

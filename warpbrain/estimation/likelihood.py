@@ -70,29 +70,14 @@ class IndependentNoise:
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """What the noise of residuals is, with everything that is estimated integrated out.
-
-    Attributes
-    ----------
-    rows : Sensors
-    sigma : (n,) array
-        Standard deviation of the independent part of each number, at a scale of 1.
-    scale : float
-        Factor on all of it.
-    inflation : (g,) array
-        How many times larger the noise of each point is: 1 of a sound one, more of a gross error.
-    outliers : Outliers or None
-        What was believed of them; None: there are none.
-    unresolved : float
-        Part of the change over an element that the mesh does not show.
-    """
+    """What the noise of residuals is, with everything that is estimated integrated out."""
 
     rows: Sensors
-    sigma: Floats
-    scale: float
-    inflation: Floats
-    outliers: Outliers | None
-    unresolved: float = 0.0
+    sigma: Floats  # (n,), of the independent part of each number, at a scale of 1
+    scale: float  # factor on all of it
+    inflation: Floats  # (g,), how many times larger the noise of each point is: 1, or more of a gross error
+    outliers: Outliers | None  # what was believed of them; None: there are none
+    unresolved: float = 0.0  # part of the change over an element that the mesh does not show
 
     @property
     def gross(self) -> Bools:
@@ -189,17 +174,10 @@ class Likelihood:
     outliers: Outliers | None = field(default_factory=outliers)
 
     def noise(self, rows: Sensors, left: Floats, expected: Floats, columns: Floats) -> Noise:
-        """The most probable noise about a fit.
+        """The most probable noise about a fit, which leaves residuals `left` (n,).
 
-        Parameters
-        ----------
-        rows : Sensors
-        left : (n,) array
-            What the fit leaves.
-        expected : (n,) array
-            Residuals in the middle of the prior, by the linear model about the fit.
-        columns : (n, k) array
-            What one standard deviation of each number that is estimated changes.
+        In the middle of the prior they are `expected` (n,), by the linear model about the fit, and one standard
+        deviation of each number that is estimated changes them by `columns` (n, k).
         """
         sigma, declared, undeclared = _beginnings(rows)
         for members in undeclared:

@@ -8,7 +8,7 @@ another: no function here looks at both.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -38,62 +38,27 @@ _KEPT = 16
 
 @dataclass(frozen=True, eq=False)
 class Sensors:
-    """The n numbers that were recorded, at a state.
+    """The n numbers that were recorded, at a state."""
 
-    Attributes
-    ----------
-    residual : (n,) array
-        What was recorded less what was computed [m] or [N]; of surfaces the signed distance.
-    computed : (n,) array
-        What was computed; of surfaces the displacement along their normals.
-    by_displacement, by_reactions : (n, 3 N) SciPy CSR
-        Derivatives of what was computed by displacement and reactions at its time.
-    rigid : (n, 6) array
-        Derivatives of what was recorded by a rigid motion of it (`registration`).
-    sigma : (n,) array
-        Declared standard deviation of the noise; NaN where it is to be estimated.
-    positions : (n, 3) array
-        Where [m]; NaN of forces.
-    directions : (n, 3) array
-        In which direction a displacement was recorded; zero of forces.
-    over_element : (n, 3) array
-        `change_over_element` along each axis [m]; zero of all but points.
-    groups : (n,) int array
-        Number of the point, or of the row of a recording, that each belongs to, increasing.
-    recordings : (n,) int array
-        Number of the recording.
-    times : (n,) array
-        When [s]; infinite of the end.
-    names : tuple of str
-        Of the recordings.
-    after, before : (n,) int array
-        Numbers of the times of states that each row is compared with, and counted from; -1: from rest.
-    references : (n,) array
-        When the state was from which it is counted [s]; 0: rest.
-    share : (n,) array or float
-        How many times what changes the last state alike at all times changes a row: 1, and less where a state is
-        smaller.
-    weights : (n,) array or float
-        Of rows whose noise is to be estimated: its variance is the recording's over this.
-    """
-
-    residual: Floats
-    computed: Floats
-    by_displacement: Any
-    by_reactions: Any
-    rigid: Floats
-    sigma: Floats
-    positions: Floats
-    directions: Floats
-    over_element: Floats
-    groups: Ints
-    recordings: Ints
-    times: Floats
-    names: tuple[str, ...]
-    after: Ints
-    before: Ints
-    references: Floats
+    residual: Floats  # what was recorded less what was computed [m] or [N]; of surfaces the signed distance
+    computed: Floats  # of surfaces the displacement along their normals
+    by_displacement: Any  # SciPy CSR (n, 3 N), of what was computed by the displacement at its time
+    by_reactions: Any  # the same by the reactions
+    rigid: Floats  # (n, 6), of what was recorded by a rigid motion of it (`registration`)
+    sigma: Floats  # declared standard deviation of the noise; NaN where it is to be estimated
+    positions: Floats  # (n, 3), where [m]; NaN of forces
+    directions: Floats  # (n, 3), in which direction a displacement was recorded; zero of forces
+    over_element: Floats  # (n, 3), `change_over_element` along each axis [m]; zero of all but points
+    groups: Ints  # number of the point, or of the row of a recording, increasing
+    recordings: Ints  # number of the recording
+    times: Floats  # when [s]; infinite of the end
+    names: tuple[str, ...]  # of the recordings
+    after: Ints  # number of the time of the state that each is compared with
+    before: Ints  # the same, counted from; -1: from rest
+    references: Floats  # when that state was [s]; 0: rest
+    #: How many times what changes the last state alike at all times changes a row: less where a state is smaller.
     share: Floats | float = 1.0
+    #: Of rows whose noise is to be estimated: its variance is the recording's over this.
     weights: Floats | float = 1.0
 
     def __len__(self) -> int:
@@ -153,84 +118,33 @@ _At = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats, Any, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
-    """Rows of a recording that are compared with one state: fields as of `Observation`."""
-
-    rows: Ints
-    weights: Floats
-    size: int
-    positions: Floats
-    edges: Floats
-    at: _At
-
-
-@dataclass(frozen=True, eq=False)
 class Observation:
-    """The n rows of one recording that count.
-
-    Attributes
-    ----------
-    name, kind, unit : str
-    rows : (n,) int array
-        Their numbers in the recording; the first of those that are copies of each other.
-    sigma : (n,) array or None
-        Standard deviation of one component; None: to be estimated.
-    weights : (n,) array
-        Where sigma is estimated, the variance of a row is its square over this; else it is in `sigma` already.
-    size : int
-        Components of a row.
-    positions : (n, 3) array
-        What a wrong registration moves [m]; NaN of forces.
-    edges : (n,) array
-        Mean length of the edges of the element in which each point is [m]; zero of all but points.
-    over_element : (n, size, 3) array
-    times, after : (n,) array
-        When each was recorded [s], and the number of the state then (`Moments`).
-    reference, before : float, int
-        The time from which they are counted [s] and the number of the state then; 0 and -1: rest.
-    parts : tuple of (int, _Part)
-        Numbers of states, and the rows that are compared with each.
-    """
+    """The n rows of one recording that count and are compared with one state."""
 
     name: str
     kind: str
     unit: str
-    rows: Ints
-    sigma: Floats | None
-    weights: Floats
-    size: int
-    positions: Floats
-    edges: Floats
-    over_element: Floats
-    times: Floats
-    after: Ints
-    reference: float
+    rows: Ints  # their numbers in the recording; the first of those that are copies of each other
+    sigma: Floats | None  # standard deviation (n,) of one component; None: to be estimated
+    weights: Floats  # where sigma is estimated, the variance of a row is its square over this; else it is in it already
+    size: int  # components of a row
+    positions: Floats  # (n, 3), what a wrong registration moves [m]; NaN of forces
+    edges: Floats  # (n,), mean length of the edges of the element in which each is [m]; zero of all but points
+    over_element: Floats  # (n, size, 3)
+    times: Floats  # (n,), when [s]
+    reference: float  # the time from which they are counted [s]; 0: rest
+    after: int  # numbers of the states that they are compared with, and counted from; -1: from rest (`Moments`)
     before: int
-    parts: tuple[tuple[int, _Part], ...]
-
-    def at(self, u: Floats, R: Floats, centre: Floats, motion: Floats) -> list[tuple[Floats, Floats, Any, Any]]:
-        """Of each part what `_At` gives, at displacements and reactions (s, N, 3) of s states."""
-        start = self.before
-        moved = ((u[k], R[k], p) if start < 0 else (u[k] - u[start], R[k] - R[start], p) for k, p in self.parts)
-        return [part.at(du, dR, centre, motion) for du, dR, part in moved]
+    at: _At
 
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Recordings of a case of one role.
+    """Recordings of a case of one role."""
 
-    Attributes
-    ----------
-    recordings : tuple of Observation
-    remarks : tuple of str
-        Recordings that say nothing of tissue, and why.
-    nodes : int
-        Of the simulated mesh.
-    """
-
-    recordings: tuple[Observation, ...]
-    remarks: tuple[str, ...]
-    nodes: int
+    recordings: tuple[Observation, ...]  # those of one name follow each other
+    remarks: tuple[str, ...]  # recordings that say nothing of tissue, and why
+    nodes: int  # of the simulated mesh
 
     @classmethod
     def to_fit(cls, case: Case, moments: Moments | None = None) -> Observations:
@@ -275,7 +189,7 @@ class Observations:
                     "by itself is looked at in the end alone"
                 )
             else:
-                each.append((recording, _observation(case, recording, moments)))
+                each += [(recording, one) for one in _observations(case, recording, moments)]
         return cls(_with_changes(each), tuple(remarks), len(case.remaining[0].points))
 
     @cached_property
@@ -301,8 +215,12 @@ class Observations:
 
         about = self.centre if centre is None else centre
         by = np.zeros(6) if motion is None else motion
-        states = u.reshape(-1, self.nodes, 3), reactions.reshape(-1, self.nodes, 3)
-        parts = [part for one in self.recordings for part in one.at(*states, about, by)]
+        # the state from which is counted, -1, is zero
+        rest = np.zeros((1, self.nodes, 3))
+        U, R = (np.concatenate([field.reshape(-1, self.nodes, 3), rest]) for field in (u, reactions))
+        parts = [
+            one.at(U[one.after] - U[one.before], R[one.after] - R[one.before], about, by) for one in self.recordings
+        ]
         residual, rigid = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
         by_u, by_R = (vstack([part[k] for part in parts]).tocsr() for k in (2, 3))
         rows = Sensors(residual, residual, by_u, by_R, rigid, directions=rigid[:, :3].copy(), **self._rows)
@@ -326,15 +244,20 @@ class Observations:
             "recordings": each([np.full(len(one.rows), names.index(one.name)) for one in found]),
             "times": each([one.times for one in found]),
             "names": names,
-            "after": each([one.after for one in found]),
+            "after": each([np.full(len(one.rows), one.after) for one in found]),
             "before": each([np.full(len(one.rows), one.before) for one in found]),
             "references": each([np.full(len(one.rows), one.reference) for one in found]),
             "weights": each([one.weights for one in found]),
         }
 
 
-def _observation(case: Case, recording: Recording, moments: Moments) -> Observation:
-    makers: dict[type[Recording], tuple[str, Callable[[Case, Any, Ints], _Part]]] = {
+#: Rows, weights, size, positions and edges as of `Observation`, and `at`.
+_Made = tuple[Ints, Floats, int, Floats, Floats, _At]
+
+
+def _observations(case: Case, recording: Recording, moments: Moments) -> Iterator[Observation]:
+    """Of each state that rows of a recording are compared with."""
+    makers: dict[type[Recording], tuple[str, Callable[[Case, Any, Ints], _Made]]] = {
         PointsRecording: ("m", _points),
         SurfaceRecording: ("m", _surface),
         ForceRecording: ("N", _force),
@@ -352,31 +275,15 @@ def _observation(case: Case, recording: Recording, moments: Moments) -> Observat
         reason = "the weight of every point is zero" if zero else "no row is of a time after 0 s"
         raise InputError(f"recording '{recording.name}': {reason}")
     states = np.array([moments.number(time) for time in times[rows].tolist()])
-    numbers = np.unique(states).tolist()
-    parts = [make(case, recording, rows[states == number]) for number in numbers]
-    rows, weights, positions, edges = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("rows", "weights", "positions", "edges")
-    )
-    return Observation(
-        recording.name,
-        recording.kind,
-        unit,
-        rows,
-        _sigma(recording, rows, weights),
-        weights,
-        parts[0].size,
-        positions,
-        edges,
-        np.zeros((len(rows), parts[0].size, 3)),
-        times[rows],
-        np.repeat(numbers, [len(part.rows) for part in parts]),
-        recording.reference or 0.0,
-        -1 if recording.reference is None else moments.number(recording.reference),
-        tuple(zip(numbers, parts, strict=True)),
-    )
+    start = -1 if recording.reference is None else moments.number(recording.reference)
+    for number in np.unique(states).tolist():
+        own, weights, size, positions, edges, at = make(case, recording, rows[states == number])
+        sigma, change = _sigma(recording, own, weights), np.zeros((len(own), size, 3))
+        about = sigma, weights, size, positions, edges, change, times[own], recording.reference or 0.0
+        yield Observation(recording.name, recording.kind, unit, own, *about, number, start, at)
 
 
-def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Part:
+def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Made:
     from scipy.sparse import csr_matrix
 
     rows, weights = distinct_rows(recording, rows)
@@ -393,7 +300,7 @@ def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Part:
         rigid = -moved_back_columns(positions, motion, centre)
         return residual.ravel(), rigid.reshape(-1, 6), by_displacement, nothing
 
-    return _Part(rows, weights, 3, positions, edges, at)
+    return rows, weights, 3, positions, edges, at
 
 
 @lru_cache(maxsize=_KEPT)
@@ -410,7 +317,7 @@ def _located(mesh: TetMesh, points: bytes) -> tuple[Any, Any, Floats]:
     return matrix, kron(matrix, eye(3), format="csr"), location.edge
 
 
-def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Part:
+def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Made:
     from scipy.sparse import csr_matrix
 
     mesh = case.remaining[0]
@@ -438,10 +345,10 @@ def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Part:
         rigid = -np.einsum("nj,njk->nk", directions, moved_back_columns(positions, motion, centre))
         return side * closest.distance, rigid, by_displacement, csr_matrix(shape)
 
-    return _Part(rows, np.ones(len(rows)), 1, positions, np.zeros(len(rows)), at)
+    return rows, np.ones(len(rows)), 1, positions, np.zeros(len(rows)), at
 
 
-def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Part:
+def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Made:
     from scipy.sparse import csr_matrix, kron
 
     nodes = case.remaining[0].node_sets[case.boundary(recording.boundary).nodes]
@@ -459,7 +366,7 @@ def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Part:
         residual = force - reactions[nodes].sum(axis=0)[recorded]
         return residual.ravel(), np.zeros((residual.size, 6)), nothing, by_reactions
 
-    return _Part(rows, np.ones(len(rows)), size, np.full((len(rows), 3), np.nan), np.zeros(len(rows)), at)
+    return rows, np.ones(len(rows)), size, np.full((len(rows), 3), np.nan), np.zeros(len(rows)), at
 
 
 def _with_changes(each: Sequence[tuple[Recording, Observation]]) -> tuple[Observation, ...]:

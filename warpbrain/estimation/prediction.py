@@ -125,38 +125,24 @@ def predictions(
     fitted = compared(realigned(case, motion, centre), *seen, moments)
     jacobian = problem.nuisances.jacobian(after, point.state.theta, point.nuisances, derivatives.du, derivatives.dR)
     deviations = np.sqrt(np.einsum("np,pq,nq->n", jacobian, joint, jacobian))
-    found, last = [], 0
-    for one in observations.recordings:
-        shape = len(one.rows), one.size
-        members = np.arange(last, last + len(one.rows) * one.size)
-        last += len(members)
-        of_all, own = point.known_noise, members
+    found = []
+    for number, name in enumerate(after.names):
+        members = np.flatnonzero(after.recordings == number)
+        parts = [one for one in observations.recordings if one.name == name]
+        rows, first = np.concatenate([one.rows for one in parts]), parts[0]
+        shape = len(rows), first.size
+        seen_rows, noise = after.of_rows(members), point.known_noise
         if role != "fit":
-            of_all, own = _unseen(after.of_rows(members), jacobian[members], joint, of_all), members - members[0]
-        known = role == "fit" or one.sigma is not None
-        sigma, of_noise = ((of_all.scale * of_all.sigma)[own].reshape(shape), of_all.deviation[own].reshape(shape))
-        deviation, residual = deviations[members].reshape(shape), after.residual[members].reshape(shape)
-        gross = np.zeros(len(one.rows), dtype=bool)
-        if one.unit == "m":
-            numbers = [k for k, rows in enumerate(of_all.rows.points) if own[0] <= rows[0] <= own[-1]]
-            gross = of_all.gross[numbers]
-        found.append(
-            Prediction(
-                one.name,
-                one.kind,
-                role,
-                one.unit,
-                one.rows,
-                before.residual[members].reshape(shape),
-                residual,
-                sigma[:, 0] if known else None,
-                deviation,
-                gross,
-                coverage(residual, np.hypot(deviation, of_noise), gross) if known else None,
-                run[one.name],
-                fitted[one.name],
-            )
-        )
+            noise = _unseen(seen_rows, jacobian[members], joint, noise)
+        own = members if role == "fit" else members - members[0]
+        known = role == "fit" or first.sigma is not None
+        gross = noise.gross[[k for k, at in enumerate(noise.rows.points) if own[0] <= at[0] <= own[-1]]]
+        gross = gross if len(gross) else np.zeros(len(rows), dtype=bool)
+        residual, deviation = seen_rows.residual.reshape(shape), deviations[members].reshape(shape)
+        within = coverage(residual, np.hypot(deviation, noise.deviation[own].reshape(shape)), gross) if known else None
+        sigma = (noise.scale * noise.sigma)[own].reshape(shape)[:, 0] if known else None
+        about = name, first.kind, role, first.unit, rows, before.residual[members].reshape(shape), residual
+        found.append(Prediction(*about, sigma, deviation, gross, within, run[name], fitted[name]))
     return tuple(found)
 
 

@@ -31,19 +31,11 @@ _AT_BEST = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Nuisances:
-    """The nuisances of an estimation; a vector of q numbers holds those that there are, in this order.
+    """The nuisances of an estimation; a vector of q numbers holds those that there are, in this order."""
 
-    Attributes
-    ----------
-    discretisation, error : Discretisation and DiscretisationError, or None
-        The amount of the mesh's error, and that error; without them states are taken for exact.
-    registration : Registration or None
-        Without it positions are taken as they were recorded.
-    """
-
-    discretisation: Discretisation | None = None
+    discretisation: Discretisation | None = None  # with `error`; without them states are taken for exact
     error: DiscretisationError | None = None
-    registration: Registration | None = None
+    registration: Registration | None = None  # without it positions are taken as they were recorded
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -96,27 +88,14 @@ class Nuisances:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Parameters with everything that is known there.
-
-    Attributes
-    ----------
-    state : State
-    nuisances : (q,) array
-    rows : Sensors
-        With a rigid motion of what was recorded taken off.
-    noise : Noise or IndependentNoise
-    misfit : float
-        `-ln` of the likelihood and of the nuisances' density.
-    objective : float
-        With that of the prior.
-    """
+    """Parameters with everything that is known there."""
 
     state: State
-    nuisances: Floats
-    rows: Sensors
+    nuisances: Floats  # (q,)
+    rows: Sensors  # with a rigid motion of what was recorded taken off
     noise: Noise | IndependentNoise
-    misfit: float
-    objective: float
+    misfit: float  # `-ln` of the likelihood and of the nuisances' density
+    objective: float  # with that of the prior
 
     @property
     def known_noise(self) -> Noise:
@@ -132,27 +111,14 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """Derivatives of the objective at a point by `theta` and the nuisances, p + q numbers.
+    """Derivatives of the objective at a point by `theta` and the nuisances, p + q numbers."""
 
-    Attributes
-    ----------
-    jacobian : (n, p + q) array
-        Of the residuals.
-    gradient : (p + q,) array
-    information : (p + q, p + q) array
-        Of the data alone.
-    hessian : (p + q, p + q) array
-        Of the objective, to first order in the residuals: positive definite.
-    du, dR : (p, N, 3) array
-        Derivatives of the displacement [m] and of the reactions [N].
-    """
-
-    jacobian: Floats
-    gradient: Floats
-    information: Floats
-    hessian: Floats
-    du: Floats
-    dR: Floats
+    jacobian: Floats  # (n, p + q), of the residuals
+    gradient: Floats  # (p + q,)
+    information: Floats  # (p + q, p + q), of the data alone
+    hessian: Floats  # of the objective, to first order in the residuals: positive definite
+    du: Floats  # (p, N, 3), of the displacement [m] by `theta`
+    dR: Floats  # (p, N, 3), of the reactions [N]
 
 
 @dataclass(frozen=True, eq=False)

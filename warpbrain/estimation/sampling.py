@@ -38,17 +38,11 @@ class Target:
 
     That is the prior of the generative model, not its normal approximation, times the likelihood of an equilibrium that
     was solved, with the nuisances integrated out. States are predicted from the nearest mode, where solving starts.
-
-    Attributes
-    ----------
-    unstable, failed : int
-        Points whose laws were not stable, and points without an equilibrium.
     """
 
     def __init__(self, prior: Prior, modes: Sequence[Estimate]) -> None:
-        self.prior = prior
-        self.modes = tuple(modes)
-        self.problem = modes[0].problem
+        self.prior, self.modes, self.problem = prior, tuple(modes), modes[0].problem
+        #: Points whose laws were not stable, and points without an equilibrium.
         self.unstable = self.failed = 0
 
     def linearised(self, theta: Floats) -> float:
@@ -219,22 +213,12 @@ def generalised_pareto(x: Floats) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Importance:
-    """Weighted draws: the check of Laplace's approximation.
+    """Weighted draws: the check of Laplace's approximation."""
 
-    Attributes
-    ----------
-    theta : (n, p) array
-    log_densities : (n,) array
-        Of the posterior, up to a constant; minus infinity where there is no equilibrium.
-    smoothed : Smoothed
-    unstable, failed : int
-        Draws whose law was not stable, and draws without an equilibrium: their weight is zero.
-    """
-
-    theta: Floats
-    log_densities: Floats
+    theta: Floats  # (n, p)
+    log_densities: Floats  # (n,), of the posterior, up to a constant; minus infinity where there is no equilibrium
     smoothed: Smoothed
-    unstable: int
+    unstable: int  # draws whose law was not stable, and draws without an equilibrium: their weight is zero
     failed: int
 
     @cached_property
@@ -285,24 +269,12 @@ def importance_sampling(
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Draws of the posterior.
+    """Draws of the posterior."""
 
-    Attributes
-    ----------
-    theta : (n, p) array
-        After the beginning, which is forgotten.
-    solves : int
-        Equilibria in all.
-    accepted : float
-        Part of the solved proposals that were taken.
-    effective : (p,) array
-        Independent draws that would tell as much of each parameter.
-    """
-
-    theta: Floats
-    solves: int
-    accepted: float
-    effective: Floats
+    theta: Floats  # (n, p), after the beginning, which is forgotten
+    solves: int  # equilibria in all
+    accepted: float  # part of the solved proposals that were taken
+    effective: Floats  # (p,), independent draws that would tell as much of each parameter
 
 
 def run_chain(
@@ -318,18 +290,8 @@ def run_chain(
     A proposal must first pass with the state that derivatives at the estimate predict, which costs no equilibrium; only
     then is its equilibrium solved, and what the prediction got wrong decides (Christen and Fox 2005, J. Comput. Graph.
     Stat. 14, 795). Proposals are steps in turn with draws of the mixture around all estimates, which cross from one
-    mode of Ogden's exponents to another.
-
-    Parameters
-    ----------
-    target, proposal
-    start : (p,) array
-        Where the posterior is not zero; `SolveError` if it has no equilibrium.
-    solves : int
-        Equilibria that may be solved.
-    rng : Generator
-    on_solve : callable
-        Called with the number of each.
+    mode of Ogden's exponents to another. At most `solves` equilibria are solved, of each of which the
+    number is told. `SolveError` if there is none at the start (p,).
     """
     here, cheap = target.log_density(start), target.linearised(start)
     if not np.isfinite(here):

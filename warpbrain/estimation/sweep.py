@@ -71,25 +71,10 @@ def sweep(
     device: str | None = None,
     on_point: Callable[[SweepPoint], None] | None = None,
 ) -> Sweep:
-    """Sweep the curves of a generative model.
+    """Sweep the curves of a generative model over values of `k`; the case's laws say what kind each tissue has.
 
-    Parameters
-    ----------
-    case : Case
-        Its laws say what kind of law each tissue has.
-    model : Process
-    values : sequence of float
-        Of `k`.
-    known : mapping, optional
-        Points of an interrupted sweep by their `k`, which are not computed again.
-    device : str, optional
-    on_point : callable, optional
-        Called with each new point.
-
-    Raises
-    ------
-    InputError
-        If there is nothing to compare with, or a tissue has no group, or one that the model has seen no study of.
+    Points of an interrupted sweep that are known by their `k` are not computed again; each new one is told.
+    `InputError` if there is nothing to compare with, or a tissue has no group that the model has seen a study of.
     """
     moments = Moments.recorded(case)
     observations = Observations.to_fit(case, moments)
