@@ -31,8 +31,8 @@ from warpbrain.simulation.locking import elements_of_fits, on_linear_elements
 
 #: The error of the mesh is computed again until the estimate moves by no more than this, in standard deviations.
 _SETTLED = 0.2
-#: Tolerance of Gauss-Newton before the error of the mesh is known, and with it.
-_BEFORE, _AFTER = 0.1, 1e-4
+#: Tolerance of Gauss-Newton before the error of the mesh is known.
+_BEFORE = 0.1
 #: A mesh whose displacements change by more than this on elements of half the size is too coarse to be corrected well.
 _TOO_COARSE = 0.15
 #: And no more often than this.
@@ -178,7 +178,8 @@ class Estimation:
         problem = Problem(self.forward, self.observations, prior_mode, self.options.likelihood, nuisances)
         # what is only the start of something better need not be exact
         final = self.options.discretisation is None or nuisances.error is not None
-        search = GaussNewton(problem, _AFTER if final else _BEFORE, self.listener.step)
+        tolerance = self.options.tolerance if final else max(self.options.tolerance, _BEFORE)
+        search = GaussNewton(problem, tolerance, self.listener.step)
         if start is None:
             found = search.solve()
         else:

@@ -264,16 +264,17 @@ class GaussNewton:
         along = problem.nuisances.prior.standard_deviations
         scale = np.concatenate([problem.parameters.reach, 10.0 * along])
         whitening = np.linalg.inv(problem.prior.factor)
-        ends = (np.append(end, np.full(len(along), sign)) for end, sign in (
-            (problem.mode.low, -np.inf), (problem.mode.high, np.inf)))  # fmt: skip
-        low, high = ((end - start.coordinates) / scale for end in ends)
+        open_ends = ((problem.mode.low, -np.inf), (problem.mode.high, np.inf))
+        low, high = (np.pad(end, (0, len(along)), constant_values=sign) for end, sign in open_ends)
+        x0 = start.coordinates
+        bounds = np.minimum((low - x0) / scale, 0.0), np.maximum((high - x0) / scale, 0.0)
 
         def rows(z: Floats) -> Floats:
             """In standard deviations, those of the prior among them."""
             nonlocal newton, trial
             there = start
             if z.any():
-                theta, nuisances = np.split(start.coordinates + scale * z, [len(problem.parameters)])
+                theta, nuisances = np.split(x0 + scale * z, [len(problem.parameters)])
                 problem.parameters.require_possible(theta)
                 here, derivatives = best
                 # where derivatives say the state will be
@@ -300,13 +301,7 @@ class GaussNewton:
                 self._on_step(step)
 
         # an unstable law, no equilibrium, or one that is unstable: nearer to the last point there is none
-        _, left = minimise(
-            rows,
-            columns,
-            np.zeros(len(scale)),
-            tolerance,
-            bounds=(np.minimum(low, 0.0), np.maximum(high, 0.0)),
-            cannot_be=(InputError, SolveError),
-            on_step=on_step,
-        )
+        fails = InputError, SolveError
+        z = np.zeros_like(x0)
+        _, left = minimise(rows, columns, z, tolerance, bounds=bounds, cannot_be=fails, on_step=on_step)
         return *best, left

@@ -112,17 +112,17 @@ class Noise:
             log_density += float(self.outliers.log_probabilities[kinds].sum())
         return log_density
 
+    @cached_property
+    def _model(self) -> GaussianModel:
+        return GaussianModel(self.factor, np.zeros((len(self.rows), 0)), self.scale)
+
     def negative_log(self, residual: Floats) -> float:
         """`-ln p` of residuals (n,), with that of the noise itself."""
-        n = len(residual)
-        volume = float(np.log(np.diag(self.factor)).sum()) + n * math.log(math.sqrt(2.0 * math.pi) * self.scale)
-        return 0.5 * float(np.sum(self.standardised(residual) ** 2)) + volume - self.log_prior
+        return -float(self._model.log_density(residual)) - self.log_prior
 
     def standardised(self, numbers: Floats) -> Floats:
         """Numbers (n, ...) in coordinates in which noise is independent and of unit variance."""
-        from scipy.linalg import solve_triangular
-
-        return np.asarray(solve_triangular(self.factor, numbers, lower=True, check_finite=False) / self.scale)
+        return self._model.whitened(numbers)
 
     @cached_property
     def deviation(self) -> Floats:
@@ -136,35 +136,42 @@ class Noise:
 
     def log_evidence(self, expected: Floats, columns: Floats) -> float:
         """`ln p` of residuals (n,) with columns (n, k) integrated out, and of the noise itself."""
-        return float(GaussianModel(self.factor, columns, self.scale).log_density(expected)) + self.log_prior
+        return float(self._model.with_columns(columns).log_density(expected)) + self.log_prior
 
     def with_gross_errors(self, expected: Floats, columns: Floats) -> Noise:
         """The same with the most probable gross errors; arguments as of `log_evidence`."""
         if self.outliers is None or not self.rows.points:
             return self
         sound = replace(self, inflation=np.ones_like(self.inflation))
-        model = GaussianModel(sound.factor, columns, self.scale)
+        model = sound._model.with_columns(columns)
         return replace(self, inflation=with_gross_errors(model, expected, self.rows.points, self.outliers).inflation)
 
     def with_likely_scale(self, expected: Floats, columns: Floats) -> Noise:
         """The same with the most probable factor on it."""
-        model = GaussianModel(self.factor, columns)
-
-        def negative(log_scale: float) -> float:
-            scale = math.exp(log_scale)
-            return -float(model.with_scale(scale).log_density(expected)) - float(log_scale_density(np.array(scale)))
-
-        values, _ = scales()
-        return replace(self, scale=math.exp(_least(negative, math.log(values.min()), math.log(values.max()))))
+        low, *_, high = sorted(scales()[0].tolist())
+        model = self._model.of_noise(columns)
+        return replace(self, scale=_likely_scale(model, expected, low, high, log_scale_density))
 
     def with_likely_sigma(self, members: Bools, expected: Floats, columns: Floats) -> Noise:
         """The same with another size of a recording (n,) that declares none: the likeliest of its own rows."""
-        model = GaussianModel(self.factor, columns).rows(members)
-        size = math.exp(
-            _least(lambda log: -float(model.with_scale(math.exp(log)).log_density(expected[members])), -2.0, 2.0)
-        )
+        model = self._model.of_noise(columns).rows(members)
+        size = _likely_scale(model, expected[members], math.exp(-2.0), math.exp(2.0))
         likely = np.maximum(size / self.scale * self.sigma, LEAST_SIGMA)
         return replace(self, sigma=np.where(members, likely, self.sigma))
+
+
+def _likely_scale(
+    model: GaussianModel, rows: Floats, low: float, high: float, log_prior: Callable[[Floats], Floats] = np.zeros_like
+) -> float:
+    """The most probable factor on the noise of rows (n,), between two."""
+    from scipy.optimize import minimize_scalar
+
+    def negative(log_scale: float) -> float:
+        scale = math.exp(log_scale)
+        return -float(model.with_scale(scale).log_density(rows)) - float(log_prior(np.array(scale)))
+
+    bounds = math.log(low), math.log(high)
+    return math.exp(minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-4}).x)
 
 
 @dataclass(frozen=True)
@@ -209,9 +216,3 @@ class Likelihood:
                 break
             found = other
         return found
-
-
-def _least(function: Callable[[float], float], low: float, high: float) -> float:
-    from scipy.optimize import minimize_scalar
-
-    return float(minimize_scalar(function, bounds=(low, high), method="bounded", options={"xatol": 1e-4}).x)

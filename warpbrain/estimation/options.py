@@ -27,6 +27,8 @@ class EstimationOptions:
         Equilibria of the chain that replaces it where it fails.
     seed : int
         Of those draws.
+    tolerance : float
+        Of Gauss-Newton, see `GaussNewton`.
     """
 
     likelihood: Likelihood = field(default_factory=Likelihood)
@@ -35,6 +37,7 @@ class EstimationOptions:
     samples: int = 40
     chain: int = 300
     seed: int = 0
+    tolerance: float = 1e-4
 
     def __post_init__(self) -> None:
         if not isinstance(self.registration, bool):

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
-from warpbrain.gp.coordinates import Coordinate, coordinates, from_coordinates, to_coordinates
+from warpbrain.gp.coordinates import Coordinate, coordinates, laws_from, to_coordinates
 from warpbrain.physics.laws import Law, NeoHookean
 from warpbrain.physics.laws.stability import require_stable
 from warpbrain.physics.mechanism import Substituting
@@ -132,12 +132,7 @@ class Parameters:
         point = np.asarray(theta, dtype=np.float64)
         if point.shape != (len(self),) or not np.isfinite(point).all():
             raise InputError(f"theta = {point.tolist()}: expected {len(self)} numbers: {', '.join(self.names)}")
-        laws, at = [], 0
-        for name in self.laws_of:
-            size = len(coordinates(name))
-            laws.append(from_coordinates(name, point[at : at + size].tolist()))
-            at += size
-        return tuple(laws)
+        return laws_from(self.laws_of, point.tolist())
 
     def materials(self, theta: ArrayLike) -> dict[int, Material]:
         """Materials by tissue label; `InputError` as from `laws`."""
