@@ -159,6 +159,7 @@ class Estimation:
         It goes on from `starts`, estimates with other nuisances, if there are any.
         """
         found, failures = [], []
+        begun: list[tuple[PriorMode, Estimate | None]]
         begun = [(one.problem.mode, one) for one in starts] or [(mode, None) for mode in self.prior_modes]
         for prior_mode, start in begun:
             try:

@@ -281,7 +281,7 @@ class FinerMesh:
 def discretisation_error(
     finer: Sequence[FinerMesh], forward: Forward, state: State, derivatives: tuple[Floats, Floats]
 ) -> DiscretisationError:
-    """The error of s states, to first order in the parameters, by which derivatives (p, s n, 3) of u and reactions are.
+    """The error of s states, to first order in the parameters; `derivatives` (p, s n, 3) of u and reactions by these.
 
     `SolveError` if there is no stable equilibrium on a finer mesh.
     """
@@ -297,11 +297,12 @@ def discretisation_error(
             f"the error of the mesh is not known: on elements of half the size {failure}; it can be left out, and "
             "then the estimate holds for this mesh only"
         ) from None
-    change = Difference(*(np.concatenate([getattr(one, k) for one in errors]) for k in ("u", "reactions")), theta)
+    u, reactions = (np.concatenate([getattr(one, name) for one in errors]) for name in ("u", "reactions"))
     du, dR = (np.concatenate(parts, axis=1) for parts in zip(*by_theta, strict=True))
-    there = state.u + change.u
-    part = float(np.vdot(change.u, there)) / max(float(np.vdot(there, there)), 1e-300)
+    there = state.u + u
+    part = float(np.vdot(u, there)) / max(float(np.vdot(there, there)), 1e-300)
     points = forward.case.remaining[0].points
     away = points - points.mean(axis=0)
     positions = np.tile(away / root_mean_square(away), (count, 1))
+    change = Difference(u, reactions, theta)
     return DiscretisationError(change, du - derivatives[0], dR - derivatives[1], positions, part)

@@ -92,8 +92,8 @@ class Sensors:
         some = replace(self, **{k: v[rows] for k, v in values.items() if k != "names" and not np.isscalar(v)})
         if time is None:
             return some
-        zero = np.zeros(len(some), dtype=np.int64)
-        return replace(some, times=zero + time, after=zero, before=zero - 1, references=0.0 * zero, share=1.0)
+        at, first = np.full(len(some), time), np.zeros(len(some), dtype=np.int64)
+        return replace(some, times=at, after=first, before=first - 1, references=np.zeros(len(some)), share=1.0)
 
     def answer(self, du: Floats, dR: Floats) -> Floats:
         """Change (n,) of what is computed by changes of displacement and reactions (N, 3) at its time alone."""
