@@ -13,6 +13,7 @@ from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.estimation.prediction import INTERVALS, Prediction
 from warpbrain.estimation.registration import registration_of
+from warpbrain.estimation.sampling import Chain
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.fingerprints import fingerprints
@@ -27,10 +28,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
     """Everything that is known of an estimate, with units in keys or beside the values; docs/estimation.md."""
     prior, parameters, case, options = posterior.prior, posterior.parameters, posterior.case, posterior.options
     said, check, chain, best = posterior.identifiability, posterior.importance, posterior.chain, posterior.best
-    noise, sampled = best.point.known_noise, None
-    if chain is not None:
-        sampled = {"draws": len(chain.theta), "equilibria": chain.solves}
-        sampled |= {"accepted": chain.accepted, "effective_draws": chain.effective}
+    noise = best.point.known_noise
     return {
         "case": {"name": case.name, "title": case.title, "origin": case.origin, "assumptions": list(case.assumptions)},
         "inputs_sha256": fingerprints(case),
@@ -58,7 +56,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
             "standard_deviation": check.standard_deviations,
             "doubts": list(posterior.doubts),
         },
-        "chain": sampled,
+        "chain": None if chain is None else _describe_chain(chain),
         "modes": [
             {"theta": mode.theta, "probability": probability, "share_of_prior": mode.problem.mode.share}
             for mode, probability in zip(posterior.modes, posterior.mode_probabilities, strict=True)
@@ -174,6 +172,11 @@ def _directions(laplace: Laplace) -> list[dict[str, Any]]:
         {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": told, "undone": undone}
         for gain, told, undone in zip(laplace.gains.tolist(), laplace.combinations, laplace.directions, strict=True)
     ]
+
+
+def _describe_chain(chain: Chain) -> dict[str, Any]:
+    drawn = {"draws": len(chain.theta), "equilibria": chain.solves}
+    return {**drawn, "accepted": chain.accepted, "effective_draws": chain.effective}
 
 
 def _describe_prediction(prediction: Prediction) -> dict[str, Any]:
