@@ -28,7 +28,7 @@ from warpbrain.gp.trained import trained
 
 def error(found: Any) -> float:
     """Root mean square error at all fitted recordings [mm]."""
-    return 1000.0 * found.together[0].after
+    return 1000.0 * found.overall_errors[0].after
 
 
 def main() -> None:
