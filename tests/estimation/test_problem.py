@@ -55,7 +55,7 @@ def test_the_gradient_is_that_of_the_objective(problem: Problem, known: bool) ->
     noise = None
     if known:
         point = problem.with_likely_noise(point, problem.linearise(point))
-        noise = point.known_noise
+        noise = point.noise
 
     states = {}
 
@@ -77,7 +77,7 @@ def test_the_gradient_is_that_of_the_objective(problem: Problem, known: bool) ->
 def test_nuisances_are_at_their_best_and_integrated_out(problem: Problem) -> None:
     state = problem.forward.solve(THETA)
     point = problem.at(state, problem.nuisances.prior.mean)
-    noise = problem.with_likely_noise(point, problem.linearise(point)).known_noise
+    noise = problem.with_likely_noise(point, problem.linearise(point)).noise
     misfit, best = problem.without_nuisances(state, problem.nuisances.prior.mean, noise)
     gradient = problem.linearise(best).gradient[2:]
     size = np.sqrt(np.diag(problem.linearise(best).hessian)[2:])

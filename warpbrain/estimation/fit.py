@@ -18,7 +18,7 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import State
 from warpbrain.estimation.gaussian import Gaussian
-from warpbrain.estimation.likelihood import IndependentNoise, Noise
+from warpbrain.estimation.likelihood import IndependentNoise
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.problem import Linearised, Point, Problem
 from warpbrain.inference.least_squares import minimise
@@ -150,7 +150,7 @@ class Estimate:
     def log_evidence(self) -> float:
         """Log probability of what was recorded and of this mode, by Laplace, up to what all modes have in common."""
         prior, point = self.problem.mode, self.point
-        misfit, _ = self.problem.without_nuisances(point.state, point.nuisances, point.known_noise)
+        misfit, _ = self.problem.without_nuisances(point.state, point.nuisances, point.noise)
         log_volume = 0.5 * float(np.linalg.slogdet(self.laplace.covariance)[1])
         log_volume -= float(np.log(np.diag(prior.gaussian.factor)).sum())
         return float(np.log(prior.share)) + log_volume - misfit - prior.gaussian.negative_log(self.theta)
@@ -163,7 +163,7 @@ class Estimate:
 
     def require_explained(self) -> None:
         """Raise `SolveError` if nearly all rows are gross errors: such an estimate is of nothing."""
-        gross = self.point.known_noise.gross
+        gross = self.point.noise.gross
         explained = int(np.count_nonzero(~gross))
         if explained < _FEWEST_EXPLAINED * len(gross):
             names = ", ".join(f"'{one.name}'" for one in self.problem.observations.recordings if one.unit == "m")
@@ -218,7 +218,7 @@ class GaussNewton:
         for number in range(_ROUNDS):
             last = point.noise
             point = problem.with_likely_noise(point, linearised)
-            settled = isinstance(last, Noise) and point.known_noise.is_near(last)
+            settled = not isinstance(last, IndependentNoise) and point.noise.is_near(last)
             tolerance = self.tolerance if number else max(_ROUGHLY, self.tolerance)
             point, linearised, left = self._descend(point, linearised, tolerance)
             if settled:
@@ -248,7 +248,6 @@ class GaussNewton:
             last = point.noise
             point, linearised, _ = self._descend(point, linearised, _ROUGHLY)
             point = self.problem.at(point.state, point.nuisances)
-            assert isinstance(last, IndependentNoise) and isinstance(point.noise, IndependentNoise)
             if np.abs(np.log(point.noise.sigma / last.sigma)).max() < _SETTLED:
                 break
         return point, linearised

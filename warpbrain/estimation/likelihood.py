@@ -45,30 +45,6 @@ def _beginnings(rows: Sensors) -> tuple[Floats, list[Bools], list[Bools]]:
 
 
 @dataclass(frozen=True, eq=False)
-class IndependentNoise:
-    """Independent noise with standard deviations (n,), for the way to the estimate."""
-
-    sigma: Floats
-
-    @classmethod
-    def as_large_as(cls, rows: Sensors) -> IndependentNoise:
-        """As large as the residuals of each recording are, but no less than declared."""
-        sigma, declared, undeclared = _beginnings(rows)
-        for each, least in ((declared, 1.0), (undeclared, LEAST_SIGMA)):
-            for members in each:
-                sigma[members] *= max(root_mean_square(rows.residual[members] / sigma[members]), least)
-        return cls(sigma)
-
-    def negative_log(self, residual: Floats) -> float:
-        """`-ln p` of residuals (n,)."""
-        return float(np.sum(np.log(self.sigma) + 0.5 * self.standardised(residual) ** 2))
-
-    def standardised(self, numbers: Floats) -> Floats:
-        """Numbers (n, ...) in units of the noise."""
-        return np.asarray((numbers.T / self.sigma).T)
-
-
-@dataclass(frozen=True, eq=False)
 class Noise:
     """What the noise of residuals is, with everything that is estimated integrated out."""
 
@@ -158,6 +134,27 @@ class Noise:
         size = _likely_scale(model, expected[members], math.exp(-2.0), math.exp(2.0))
         likely = np.maximum(size / self.scale * self.sigma, LEAST_SIGMA)
         return replace(self, sigma=np.where(members, likely, self.sigma))
+
+
+class IndependentNoise(Noise):
+    """Independent noise, sound and of a scale of 1, for the way to the estimate."""
+
+    @classmethod
+    def as_large_as(cls, rows: Sensors) -> IndependentNoise:
+        """As large as the residuals of each recording are, but no less than declared."""
+        sigma, declared, undeclared = _beginnings(rows)
+        for each, least in ((declared, 1.0), (undeclared, LEAST_SIGMA)):
+            for members in each:
+                sigma[members] *= max(root_mean_square(rows.residual[members] / sigma[members]), least)
+        return cls(rows, sigma, 1.0, np.ones(len(rows.points)), None)
+
+    def negative_log(self, residual: Floats) -> float:
+        """`-ln p` of residuals (n,), up to a constant."""
+        return float(np.sum(np.log(self.sigma) + 0.5 * self.standardised(residual) ** 2))
+
+    def standardised(self, numbers: Floats) -> Floats:
+        """Numbers (n, ...) in units of the noise."""
+        return np.asarray((numbers.T / self.sigma).T)
 
 
 def _likely_scale(

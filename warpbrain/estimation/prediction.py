@@ -131,7 +131,7 @@ def predictions(
         parts = [one for one in observations.recordings if one.name == name]
         rows, first = np.concatenate([one.rows for one in parts]), parts[0]
         shape = len(rows), first.size
-        seen_rows, noise = after.of_rows(members), point.known_noise
+        seen_rows, noise = after.of_rows(members), point.noise
         if role != "fit":
             noise = _unseen(seen_rows, jacobian[members], joint, noise)
         own = members if role == "fit" else members - members[0]

@@ -93,15 +93,9 @@ class Point:
     state: State
     nuisances: Floats  # (q,)
     rows: Sensors  # with a rigid motion of what was recorded taken off
-    noise: Noise | IndependentNoise
+    noise: Noise
     misfit: float  # `-ln` of the likelihood and of the nuisances' density
     objective: float  # with that of the prior
-
-    @property
-    def known_noise(self) -> Noise:
-        """The noise of an estimate, where it is always known."""
-        assert isinstance(self.noise, Noise)
-        return self.noise
 
     @property
     def coordinates(self) -> Floats:
@@ -144,7 +138,7 @@ class Problem:
         both = self.mode.gaussian, self.nuisances.prior
         return Gaussian(np.concatenate([one.mean for one in both]), block_diag(*(one.covariance for one in both)))
 
-    def at(self, state: State, nuisances: Floats, noise: Noise | IndependentNoise | None = None) -> Point:
+    def at(self, state: State, nuisances: Floats, noise: Noise | None = None) -> Point:
         """The objective at a state; noise that is as large as the residuals are, unless it is known."""
         seen = self.nuisances.observed(state, nuisances)
         rows = self.observations.at(*seen, motion=self.nuisances.motion(nuisances))

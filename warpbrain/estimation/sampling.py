@@ -70,7 +70,7 @@ class Target:
         return min(self.modes, key=lambda mode: mode.laplace.posterior.negative_log(theta))
 
     def _log_density(self, state: State, start: Point) -> float:
-        misfit, _ = self.problem.without_nuisances(state, start.nuisances, start.known_noise)
+        misfit, _ = self.problem.without_nuisances(state, start.nuisances, start.noise)
         return float(self.prior.log_density(state.theta)) - misfit
 
     def _possible(self, theta: Floats) -> bool:

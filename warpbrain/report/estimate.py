@@ -28,7 +28,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
     """Everything that is known of an estimate, with units in keys or beside the values; docs/estimation.md."""
     prior, parameters, case, options = posterior.prior, posterior.parameters, posterior.case, posterior.options
     said, check, chain, best = posterior.identifiability, posterior.importance, posterior.chain, posterior.best
-    noise = best.point.known_noise
+    noise = best.point.noise
     return {
         "case": {"name": case.name, "title": case.title, "origin": case.origin, "assumptions": list(case.assumptions)},
         "inputs_sha256": fingerprints(case),
