@@ -25,8 +25,7 @@ from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.estimation.estimate import Estimation
-from warpbrain.estimation.gauss_newton import GaussNewton
-from warpbrain.estimation.modes import Estimate
+from warpbrain.estimation.fit import Estimate, GaussNewton
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.posterior import Posterior

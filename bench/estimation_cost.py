@@ -19,16 +19,16 @@ from warpbrain.cases.shipped import find_case
 from warpbrain.errors import SolveError
 from warpbrain.estimation.estimate import Estimation
 from warpbrain.estimation.forward import Forward
-from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.options import EstimationOptions
-from warpbrain.estimation.prior_modes import prior_of
+from warpbrain.estimation.prior import prior_of
+from warpbrain.estimation.problem import Nuisances
 from warpbrain.estimation.sweep import sweep
 from warpbrain.gp.trained import trained
 
 
 def error(found: Any) -> float:
     """Root mean square error at all fitted recordings [mm]."""
-    return 1000.0 * found.together[0].after
+    return 1000.0 * found.overall_errors[0].after
 
 
 def main() -> None:

@@ -17,8 +17,8 @@ from shapes import box
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.errors import SolveError
-from warpbrain.estimation.discretisation import Discretisation
 from warpbrain.estimation.estimate import estimate
+from warpbrain.estimation.finer_mesh import Discretisation
 from warpbrain.estimation.forward import Forward, State
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.gp.prior import Prior

@@ -11,7 +11,7 @@ from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.diagnosis.onset import OF_ITS_OWN, Onset, onset_of
 from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.estimation.declared_prior import declared
+from warpbrain.estimation.prior import declared
 from warpbrain.physics.mechanisms.drainage import Drainage
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.report.diagnosis.text import when_in_words
@@ -23,7 +23,6 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import Candidates, candidates_at, dictionary_of
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.sensors import sensors_at
 from warpbrain.worlds.body.states import TOLERANCE, Hypothesis, States, steps_to
 from warpbrain.worlds.body.time_courses import AT_ONCE, EVENLY, time_courses
 
@@ -89,7 +88,7 @@ def _followed(states: States, hypothesis: Hypothesis) -> Floats:
     recorded = [by_time[time] for time in states.times]
     u = np.concatenate([state.u for state in recorded])
     reactions = np.concatenate([model.reactions(state.internal, external) for state in recorded])
-    return sensors_at(states.observations, u, reactions, states.centre).computed
+    return states.observations.at(u, reactions, states.centre).computed
 
 
 def test_one_course_is_that_of_every_permeability(tmp_path) -> None:

@@ -7,8 +7,7 @@ import pytest
 from synthetic import GREY, WHITE, block, truth, with_laws
 
 from warpbrain.errors import InputError
-from warpbrain.estimation.discretisation import NAMES, Discretisation, DiscretisationError, discretisation_error
-from warpbrain.estimation.finer_mesh import FinerMesh
+from warpbrain.estimation.finer_mesh import NAMES, Discretisation, DiscretisationError, FinerMesh, discretisation_error
 from warpbrain.estimation.forward import Forward
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.laws import NeoHookean
@@ -20,8 +19,7 @@ CASE = block({"grey": GREY, "white": WHITE}, "gravity")
 def error_at(case, theta: np.ndarray) -> DiscretisationError:
     forward = Forward(case, theta, "cpu")
     state = forward.solve(theta)
-    derivatives = forward.differentiate(state)
-    return discretisation_error([FinerMesh("cpu")], forward, state, (derivatives.u, derivatives.reactions))
+    return discretisation_error([FinerMesh("cpu")], forward, state, forward.differentiate(state))
 
 
 @pytest.fixture(scope="module")

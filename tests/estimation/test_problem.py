@@ -4,19 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
 from scipy.stats import multivariate_normal
 from synthetic import GREY, WHITE, beads, block, lid, scale, truth
 
 from warpbrain.errors import InputError
-from warpbrain.estimation.discretisation import NAMES, Discretisation, discretisation_error
-from warpbrain.estimation.finer_mesh import FinerMesh
+from warpbrain.estimation.finer_mesh import NAMES, Discretisation, FinerMesh, discretisation_error
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gaussian import Gaussian
-from warpbrain.estimation.likelihood import Likelihood, Noise, Rows
-from warpbrain.estimation.nuisances import Nuisances
-from warpbrain.estimation.observations import Observations
-from warpbrain.estimation.prior_modes import PriorMode
-from warpbrain.estimation.problem import Problem
+from warpbrain.estimation.likelihood import Likelihood, Noise
+from warpbrain.estimation.observations import Observations, Sensors
+from warpbrain.estimation.prior import PriorMode
+from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.inference.noise import outliers
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
@@ -36,8 +35,7 @@ def problem(request: pytest.FixtureRequest) -> Problem:
     case = replace(case, recordings=recordings)
     forward = Forward(case, THETA, "cpu")
     state = forward.solve(THETA)
-    derivatives = forward.differentiate(state)
-    error = discretisation_error([FinerMesh("cpu")], forward, state, (derivatives.u, derivatives.reactions))
+    error = discretisation_error([FinerMesh("cpu")], forward, state, forward.differentiate(state))
     mode = PriorMode(
         1.0, Gaussian(np.log([1000.0, 900.0]), np.diag([0.5, 0.6])), np.full(2, -np.inf), np.full(2, np.inf)
     )
@@ -57,7 +55,7 @@ def test_the_gradient_is_that_of_the_objective(problem: Problem, known: bool) ->
     noise = None
     if known:
         point = problem.with_likely_noise(point, problem.linearise(point))
-        noise = point.known_noise
+        noise = point.noise
 
     states = {}
 
@@ -79,7 +77,7 @@ def test_the_gradient_is_that_of_the_objective(problem: Problem, known: bool) ->
 def test_nuisances_are_at_their_best_and_integrated_out(problem: Problem) -> None:
     state = problem.forward.solve(THETA)
     point = problem.at(state, problem.nuisances.prior.mean)
-    noise = problem.with_likely_noise(point, problem.linearise(point)).known_noise
+    noise = problem.with_likely_noise(point, problem.linearise(point)).noise
     misfit, best = problem.without_nuisances(state, problem.nuisances.prior.mean, noise)
     gradient = problem.linearise(best).gradient[2:]
     size = np.sqrt(np.diag(problem.linearise(best).hessian)[2:])
@@ -88,12 +86,23 @@ def test_nuisances_are_at_their_best_and_integrated_out(problem: Problem) -> Non
     assert other == pytest.approx(misfit, abs=1e-3)
 
 
+def rows_of(where: np.ndarray, sigma: float) -> Sensors:
+    """Points (n, 3) [m], each thrice, whose three components were recorded, and nothing else of them."""
+    n = len(where)
+    columns, zero = csr_matrix((n, 0)), np.zeros(n, dtype=int)
+    each = {"residual": np.zeros(n), "computed": np.zeros(n), "by_displacement": columns, "by_reactions": columns}
+    along, where_of = np.tile(np.eye(3), (n // 3, 1)), {"groups": np.arange(n) // 3, "recordings": zero}
+    of_points = {"rigid": np.zeros((n, 6)), "positions": where, "directions": along, "over_element": np.zeros((n, 3))}
+    when = {"times": np.full(n, np.inf), "after": zero, "before": zero - 1, "references": np.zeros(n)}
+    return Sensors(**each, **of_points, **where_of, **when, sigma=np.full(n, sigma), names=("points",))
+
+
 def test_noise_and_gross_errors_are_found_as_they_were_drawn(verify) -> None:
     """Rows drawn from the likelihood itself, without anything to estimate."""
     random = np.random.default_rng(0)
     where = np.repeat(random.uniform(0.0, 0.1, (150, 3)), 3, axis=0)
-    points = tuple(np.arange(3 * k, 3 * k + 3) for k in range(150))
-    rows = Rows(where, np.tile(np.eye(3), (150, 1)), np.full(450, 5e-4), np.zeros(450, int), np.array([True]), points)
+    rows = rows_of(where, 5e-4)
+    np.testing.assert_array_equal(rows.points, np.arange(450).reshape(150, 3))
     wrong = np.zeros(150, dtype=bool)
     wrong[:8] = True
     drawn = Noise(rows, rows.sigma, 1.5, np.where(wrong, 8.0, 1.0), outliers())
@@ -109,7 +118,7 @@ def test_noise_and_gross_errors_are_found_as_they_were_drawn(verify) -> None:
     covariance = 2.25 * drawn.factor @ drawn.factor.T
     expected = -multivariate_normal(np.zeros(450), covariance).logpdf(residual) - drawn.log_prior
     assert drawn.negative_log(residual) == pytest.approx(expected)
-    undeclared = replace(rows, sigma=np.ones(450), declared=np.array([False]))
+    undeclared = rows_of(where, np.nan)
     found = Likelihood().noise(undeclared, residual, residual, np.zeros((450, 0)))
     verify(
         "standard deviation of a noise that is not declared, 8 of 150 points gross errors",
@@ -120,7 +129,7 @@ def test_noise_and_gross_errors_are_found_as_they_were_drawn(verify) -> None:
 
 
 def test_no_point_is_a_gross_error_where_there_are_none() -> None:
-    rows = Rows(np.zeros((3, 3)), np.eye(3), np.full(3, 1e-3), np.zeros(3, int), np.array([True]), (np.arange(3),))
+    rows = rows_of(np.zeros((3, 3)), 1e-3)
     residual = np.full(3, 1.0)
     assert Likelihood().noise(rows, residual, residual, np.zeros((3, 0))).gross.all()
     assert not Likelihood(None).noise(rows, residual, residual, np.zeros((3, 0))).gross.any()
@@ -133,10 +142,9 @@ def test_points_are_located_anew_where_they_or_the_mesh_are_others() -> None:
     larger = replace(case, mesh=TetMesh(1.1 * mesh.points, mesh.tetrahedra, mesh.tissue, mesh.node_sets))
     u = case.mesh.points**2
     for there, recording in ((case, seen), (case, moved), (larger, seen)):
-        [one] = Observations.to_fit(replace(there, recordings=(recording,))).recordings
+        rows = Observations.to_fit(replace(there, recordings=(recording,))).at(u, np.zeros_like(u))
         expected = locate(there.mesh.points, there.mesh.tetrahedra, recording.points).interpolate(u)
-        values = one.at(u, np.zeros_like(u), np.zeros(3), np.zeros(6)).values
-        np.testing.assert_allclose(values, recording.displacement - expected, atol=1e-15)
+        np.testing.assert_allclose(rows.residual.reshape(-1, 3), recording.displacement - expected, atol=1e-15)
 
 
 def test_a_mechanism_that_says_the_law_is_refused() -> None:

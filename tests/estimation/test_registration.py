@@ -14,12 +14,11 @@ from warpbrain.errors import InputError
 from warpbrain.estimation.estimate import Estimation
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gaussian import Gaussian
-from warpbrain.estimation.likelihood import Likelihood, Noise, Rows
-from warpbrain.estimation.nuisances import Nuisances
+from warpbrain.estimation.likelihood import Likelihood, Noise
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
-from warpbrain.estimation.prior_modes import PriorMode
-from warpbrain.estimation.problem import Problem
+from warpbrain.estimation.prior import PriorMode
+from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.estimation.registration import moved_back, moved_back_columns, realigned, rigid_columns
 from warpbrain.recordings.registration import Registration
 from warpbrain.worlds.body.nuisances import nuisances_at
@@ -77,8 +76,8 @@ def test_an_exact_rigid_motion_is_recovered(seed: int, surface: bool, verify) ->
     nuisances = Nuisances(registration=Registration(1.0, 10.0))
     problem = Problem(forward, observations, mode, Likelihood(), nuisances)
     state = forward.solve(THETA)
-    rows = Rows.of(observations, problem.at(state, np.zeros(6)).parts)
-    exact = Noise(rows, np.full(len(rows.sigma), 1e-5), 1.0, np.ones(len(rows.points)), None)
+    rows = problem.at(state, np.zeros(6)).rows
+    exact = Noise(rows, np.full(len(rows), 1e-5), 1.0, np.ones(len(rows.points)), None)
     _, best = problem.without_nuisances(state, np.zeros(6), exact)
     # about the mean of what was recorded, which the shift moved: the shift is turned along
     away = best.nuisances - np.concatenate([Rotation.from_rotvec(by[3:]).apply(by[:3]), by[3:]])

@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 from scipy.stats import genpareto
 
-from warpbrain.estimation.chain import effective_size, run_chain
 from warpbrain.estimation.gaussian import Gaussian
-from warpbrain.estimation.importance import importance_sampling
-from warpbrain.estimation.pareto import generalised_pareto, pareto_smoothed
-from warpbrain.estimation.proposal import Proposal
+from warpbrain.estimation.sampling import (
+    Proposal,
+    effective_size,
+    generalised_pareto,
+    importance_sampling,
+    pareto_smoothed,
+    run_chain,
+)
 
 MEAN, DEVIATION = np.array([1.0, -2.0]), np.array([0.5, 0.1])
 

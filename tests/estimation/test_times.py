@@ -14,11 +14,10 @@ from warpbrain.estimation.estimate import Estimation
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.likelihood import Likelihood
-from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
-from warpbrain.estimation.prior_modes import PriorMode
-from warpbrain.estimation.problem import Problem
+from warpbrain.estimation.prior import PriorMode
+from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.trained import trained
 
@@ -49,7 +48,7 @@ def test_derivatives_over_times_are_differences(case: Case, verify) -> None:
     problem = Problem(forward, Observations.to_fit(case, moments), mode, Likelihood(), Nuisances())
     point = problem.at(forward.solve(THETA), np.zeros(0))
     column = problem.linearise(point).jacobian[:, 0]
-    sides = [problem.at(forward.solve(THETA + step), np.zeros(0)).residual for step in (1e-3, -1e-3)]
+    sides = [problem.at(forward.solve(THETA + step), np.zeros(0)).rows.residual for step in (1e-3, -1e-3)]
     difference = (sides[0] - sides[1]) / 2e-3
     verify(
         "derivative by stiffness of displacements at two times, and of displacements between these, under a weight "
@@ -58,7 +57,7 @@ def test_derivatives_over_times_are_differences(case: Case, verify) -> None:
         float(np.linalg.norm(column - difference) / np.linalg.norm(difference)),
         2e-5,
     )
-    assert np.abs(problem.at(forward.solve(np.log([WHITE.mu])), np.zeros(0)).residual).max() < 1e-8
+    assert np.abs(problem.at(forward.solve(np.log([WHITE.mu])), np.zeros(0)).rows.residual).max() < 1e-8
 
 
 def test_tissue_is_found_and_unseen_times_are_predicted(case: Case, verify) -> None:

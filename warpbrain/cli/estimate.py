@@ -134,7 +134,7 @@ def _registration(options: argparse.Namespace) -> Registration | None:
 
 def _options(options: argparse.Namespace) -> EstimationOptions:
     """What is asked for; refuses bad numbers before anything is computed."""
-    from warpbrain.estimation.discretisation import Discretisation
+    from warpbrain.estimation.finer_mesh import Discretisation
     from warpbrain.estimation.likelihood import Likelihood
     from warpbrain.estimation.options import EstimationOptions
 
@@ -157,7 +157,7 @@ def _estimate(
     out: Path,
 ) -> None:
     from warpbrain.estimation.estimate import Estimation, Listener
-    from warpbrain.estimation.modes import GaussNewtonStep
+    from warpbrain.estimation.fit import GaussNewtonStep
     from warpbrain.gp.trained import find_model
     from warpbrain.report import estimate_picture
     from warpbrain.report.estimate import describe_estimate

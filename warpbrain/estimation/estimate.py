@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,23 +12,17 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
 from warpbrain.cases.shipped import as_case
 from warpbrain.errors import SolveError
-from warpbrain.estimation.chain import Chain, run_chain
-from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, discretisation_error
-from warpbrain.estimation.finer_mesh import FinerMesh
+from warpbrain.estimation.finer_mesh import Discretisation, DiscretisationError, FinerMesh, discretisation_error
+from warpbrain.estimation.fit import Estimate, GaussNewton, GaussNewtonStep
 from warpbrain.estimation.forward import Forward
-from warpbrain.estimation.gauss_newton import GaussNewton, require_explained
-from warpbrain.estimation.importance import Importance, importance_sampling
-from warpbrain.estimation.modes import Estimate, GaussNewtonStep
-from warpbrain.estimation.nuisances import Nuisances
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.posterior import Posterior
-from warpbrain.estimation.prior_modes import PriorMode, prior_modes, prior_of
-from warpbrain.estimation.problem import Problem
-from warpbrain.estimation.proposal import Proposal
+from warpbrain.estimation.prior import PriorMode, prior_modes, prior_of
+from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.estimation.registration import registration_of
-from warpbrain.estimation.target import Target
+from warpbrain.estimation.sampling import Chain, Importance, Proposal, Target, importance_sampling, run_chain
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
 from warpbrain.recordings.agreement import root_mean_square
@@ -48,14 +43,8 @@ _MOST_ERRORS = 4
 class Listener:
     """Who wants to know how an estimation gets on.
 
-    Attributes
-    ----------
-    stage : callable
-        Called with a few words when a stage begins.
-    step : callable
-        Called with each step of Gauss-Newton.
-    progress : callable
-        Called with the part that is done of a stage of known length, from 0 to 1.
+    Called with a few words when a stage begins, with each step of Gauss-Newton, and with the part that is done of a
+    stage of known length, from 0 to 1.
     """
 
     stage: Callable[[str], None] = lambda _text: None
@@ -121,6 +110,7 @@ class Estimation:
         self.options = options or EstimationOptions()
         self.listener = listener or Listener()
         self.seconds = Seconds()
+        self._solves: dict[str, int] = {}
         self._device = device
         self._registration = registration_of(case) if self.options.registration else None
         self._remarks = on_linear_elements(case.poisson, "an estimate")
@@ -138,60 +128,42 @@ class Estimation:
 
     def run(self) -> Posterior:
         """All stages."""
-        with self.seconds.of("estimate"):
+        with self._counted("estimate"):
             modes = self.fit(Nuisances(registration=self._registration))
-        solves = {"estimate": self.forward.solves}
         errors: list[DiscretisationError] = []
         if self.options.discretisation is not None:
-            with self.seconds.of("error of the mesh"):
-                modes = self._corrected_for_mesh(modes, self.options.discretisation, errors, solves)
-        require_explained(modes[0])
-        before = self.forward.solves
-        with self.seconds.of("check of the posterior"):
+            with self._counted("estimate with the error of the mesh", "error of the mesh"):
+                modes = self._corrected_for_mesh(modes, self.options.discretisation, errors)
+        modes[0].require_explained()
+        with self._counted("check of the posterior"):
             target, proposal = Target(self.prior, modes), Proposal.of(modes)
             importance = self._check(target, proposal)
-        solves["check of the posterior"] = self.forward.solves - before
         doubts, chain = importance.doubts(modes[0].laplace), None
         if doubts:
-            before = self.forward.solves
-            with self.seconds.of("chain"):
+            with self._counted("chain"):
                 chain = self._sample(target, proposal, importance)
-            solves["chain"] = self.forward.solves - before
-        return Posterior(
-            self.case,
-            self.options,
-            self.prior,
-            modes,
-            tuple(self._remarks),
-            tuple(errors),
-            importance,
-            doubts,
-            chain,
-            solves,
-            self.seconds,
-        )
+        about = self.case, self.options, self.prior, modes, tuple(self._remarks), tuple(errors)
+        return Posterior(*about, importance, doubts, chain, self._solves, self.seconds)
+
+    @contextmanager
+    def _counted(self, solves: str, seconds: str = "") -> Iterator[None]:
+        """A stage whose equilibria and time are counted, by these names."""
+        before = self.forward.solves
+        with self.seconds.of(seconds or solves):
+            yield
+        self._solves[solves] = self.forward.solves - before
 
     def fit(self, nuisances: Nuisances, starts: tuple[Estimate, ...] = ()) -> tuple[Estimate, ...]:
-        """The estimate in every mode of the prior, the most probable first.
+        """The estimate in every mode of the prior, the most probable first; `SolveError` if there is none in any.
 
-        Parameters
-        ----------
-        nuisances : Nuisances
-        starts : tuple of Estimate, optional
-            Estimates with other nuisances, from which to go on.
-
-        Raises
-        ------
-        SolveError
-            If there is none in any mode.
+        It goes on from `starts`, estimates with other nuisances, if there are any.
         """
         found, failures = [], []
-        begun = {id(mode.problem.mode): mode for mode in starts}
-        for prior_mode in self.prior_modes:
-            if starts and id(prior_mode) not in begun:
-                continue
+        begun: list[tuple[PriorMode, Estimate | None]]
+        begun = [(one.problem.mode, one) for one in starts] or [(mode, None) for mode in self.prior_modes]
+        for prior_mode, start in begun:
             try:
-                found.append(self._fit_one(prior_mode, nuisances, begun.get(id(prior_mode))))
+                found.append(self._fit_one(prior_mode, nuisances, start))
             except SolveError as error:
                 failures.append(error)
                 remark = f"{_where(self.parameters, prior_mode)}: {error}"
@@ -202,8 +174,7 @@ class Estimation:
         return tuple(sorted(found, key=lambda mode: -mode.log_evidence))
 
     def _fit_one(self, prior_mode: PriorMode, nuisances: Nuisances, start: Estimate | None) -> Estimate:
-        many = len(self.prior_modes) > 1
-        text = "Gauss-Newton" + (f", {_where(self.parameters, prior_mode)}" if many else "")
+        text = "Gauss-Newton" + (f", {_where(self.parameters, prior_mode)}" if len(self.prior_modes) > 1 else "")
         self.listener.stage(text if start is None else f"{text}, with the error of the mesh")
         problem = Problem(self.forward, self.observations, prior_mode, self.options.likelihood, nuisances)
         # what is only the start of something better need not be exact
@@ -213,31 +184,23 @@ class Estimation:
         if start is None:
             found = search.solve()
         else:
-            known = start.point.nuisances
             values = nuisances.prior.mean.copy()
-            values[len(values) - len(known) :] = known
+            values[len(values) - len(start.point.nuisances) :] = start.point.nuisances
             found = search.solve(start.point.state, values)
         if not found.converged:
             self._remarks.append(f"{text}: not converged")
         return found
 
     def _corrected_for_mesh(
-        self,
-        modes: tuple[Estimate, ...],
-        believed: Discretisation,
-        errors: list[DiscretisationError],
-        solves: dict[str, int],
+        self, modes: tuple[Estimate, ...], believed: Discretisation, errors: list[DiscretisationError]
     ) -> tuple[Estimate, ...]:
-        before = self.forward.solves
         finer = [FinerMesh(self._device) for _ in self.forward.states]
         for _ in range(_MOST_ERRORS):
             self.listener.stage("error of the mesh: one equilibrium on elements of half the size")
-            best = modes[0]
-            derivatives = best.linearised.du, best.linearised.dR
-            errors.append(discretisation_error(finer, self.forward, best.point.state, derivatives))
-            nuisances = Nuisances(believed, errors[-1], self._registration)
-            modes = self.fit(nuisances, modes)
-            if np.sqrt(2.0 * modes[0].laplace.posterior.negative_log(errors[-1].theta)) <= _SETTLED:
+            state, first_order = modes[0].point.state, modes[0].linearised
+            errors.append(discretisation_error(finer, self.forward, state, (first_order.du, first_order.dR)))
+            modes = self.fit(Nuisances(believed, errors[-1], self._registration), modes)
+            if np.sqrt(2.0 * modes[0].laplace.posterior.negative_log(errors[-1].change.theta)) <= _SETTLED:
                 break
         else:
             self._remarks.append("the error of the mesh was still changing when it was last computed")
@@ -247,8 +210,7 @@ class Estimation:
                 f"the mesh is coarse: on elements of half the size displacements change by {100.0 * part:.0f} %; what "
                 "is left of its error may be larger than the intervals"
             )
-        solves["on elements of half the size"] = sum(mesh.solves for mesh in finer)
-        solves["estimate with the error of the mesh"] = self.forward.solves - before
+        self._solves["on elements of half the size"] = sum(mesh.solves for mesh in finer)
         return modes
 
     def _check(self, target: Target, proposal: Proposal) -> Importance:
@@ -261,9 +223,8 @@ class Estimation:
         solves = self.options.chain
         self.listener.stage(f"Laplace's approximation fails: a chain of {solves} equilibria instead")
         best = int(np.argmax(importance.log_densities))
-        start = target.modes[0].theta
-        if np.isfinite(importance.log_densities[best]):
-            start = importance.theta[best]
+        found = np.isfinite(importance.log_densities[best])
+        start = importance.theta[best] if found else target.modes[0].theta
         rng = np.random.default_rng([self.options.seed, 1])
         return run_chain(target, proposal, start, solves, rng, lambda n: self.listener.progress(n / solves))
 

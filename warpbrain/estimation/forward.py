@@ -20,7 +20,7 @@ from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.of_case import plain_model_of
-from warpbrain.simulation.sensitivity import Sensitivities, SensitivitySolver
+from warpbrain.simulation.sensitivity import SensitivitySolver
 from warpbrain.simulation.system import System
 
 #: Out-of-balance force of an equilibrium, relative: where differences of residuals must mean something, and where what
@@ -32,23 +32,13 @@ _DERIVATIVES = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Equilibria of a case.
-
-    Attributes
-    ----------
-    theta : (p,) array
-    u, reactions : (s n, 3) array
-        Displacement [m], and what holds the constrained components [N], in s states.
-    newton_iterations : int
-        That it took.
-    passed_unstable : bool
-        The way to it led past states with an indefinite tangent: a slowly growing load may reach another one.
-    """
+    """Equilibria of a case, in s states."""
 
     theta: Floats
-    u: Floats
-    reactions: Floats
-    newton_iterations: int
+    u: Floats  # (s n, 3) [m]
+    reactions: Floats  # (s n, 3), what holds the constrained components [N]
+    newton_iterations: int  # that it took
+    #: The way to it led past states with an indefinite tangent: a slowly growing load may reach another one.
     passed_unstable: bool = False
 
 
@@ -66,12 +56,6 @@ class Forward:
         See `Model`.
     moments : Moments, optional
         Its states; the end alone unless given.
-
-    Attributes
-    ----------
-    solves : int
-        Equilibria that were asked for.
-    moments : Moments
     """
 
     def __init__(
@@ -86,6 +70,7 @@ class Forward:
         self.case = case
         self.moments = Moments.of(case, ()) if moments is None else moments
         self.states = tuple(OneState(one, self.parameters, theta, device, elements) for one in self.moments.cases)
+        #: Equilibria that were asked for.
         self.solves = 0
 
     @property
@@ -94,27 +79,15 @@ class Forward:
         return self.states[-1].system
 
     def solve(self, theta: Floats, start: Floats | None = None, tolerance: float = EXACT) -> State:
-        """The equilibria of parameters.
+        """The equilibria of parameters (p,), from displacements (s n, 3) [m] near to them, or from rest.
 
-        Parameters
-        ----------
-        theta : (p,) array
-        start : (s n, 3) array, optional
-            Displacements [m] that are near to them; rest by default.
-        tolerance : {EXACT, ROUGH}
-
-        Raises
-        ------
-        SolveError
-            If one is not found.
+        `tolerance` is `EXACT` or `ROUGH`; `SolveError` if one is not found.
         """
         starts = [None] * len(self.states) if start is None else np.split(start, len(self.states))
         found: list[State] = []
         for state, near in zip(self.states, starts, strict=True):
             self.solves += 1
             found.append(state.solve(theta, found[-1].u if near is None and found else near, tolerance))
-        if len(found) == 1:
-            return found[0]
         return State(
             theta.copy(),
             np.concatenate([one.u for one in found]),
@@ -132,17 +105,12 @@ class Forward:
                 pass
         return self.solve(theta, starts[-1], tolerance)
 
-    def differentiate(self, state: State) -> Sensitivities:
+    def differentiate(self, state: State) -> tuple[Floats, Floats]:
         """Derivatives (p, s n, 3) of displacement and reactions by the parameters; `SolveError` if one is unstable."""
         displacements = np.split(state.u, len(self.states))
-        found = [one.differentiate(state.theta, u) for one, u in zip(self.states, displacements, strict=True)]
-        if len(found) == 1:
-            return found[0]
-        return Sensitivities(
-            np.concatenate([one.u for one in found], axis=1),
-            np.concatenate([one.reactions for one in found], axis=1),
-            tuple(sum(counts) for counts in zip(*(one.cg_iterations for one in found), strict=True)),
-        )
+        each = [one.differentiate(state.theta, u) for one, u in zip(self.states, displacements, strict=True)]
+        du, dR = (np.concatenate(parts, axis=1) for parts in zip(*each, strict=True))
+        return du, dR
 
 
 class OneState:
@@ -150,8 +118,7 @@ class OneState:
 
     def __init__(self, case: Case, parameters: Parameters, theta: Floats, device: str | None, elements: str) -> None:
         self.case, self._parameters = case, parameters
-        plain = plain_model_of(parameters.applied(case, theta))
-        self._plain = replace(plain, elements=elements)
+        self._plain = replace(plain_model_of(parameters.applied(case, theta)), elements=elements)
         self.system = System(self._model(theta), device)
         self._last: Floats | None = None
         self._external = self.system.model.external_forces()
@@ -167,15 +134,16 @@ class OneState:
         found = self._solvers[tolerance].solve(self._external, start)
         reactions = self.system.model.reactions(found.internal, self._external)
         self._last = found.u
-        return State(theta.copy(), found.u, reactions, len(found.history), found.unstable_iterations > 0)
+        return State(theta, found.u, reactions, len(found.history), found.unstable_iterations > 0)
 
-    def differentiate(self, theta: Floats, u: Floats) -> Sensitivities:
+    def differentiate(self, theta: Floats, u: Floats) -> tuple[Floats, Floats]:
         """Derivatives of a state by its parameters; `SolveError` if it is unstable."""
         remembers = any(term.memory for term in self.system.terms)
         if remembers and (self._last is None or not np.array_equal(u, self._last)):
             # what contacts have found is that of the state that was solved for last
             u = self.solve(theta, u).u
-        return self._sensitivity.solve(u, self._model, theta)
+        found = self._sensitivity.solve(u, self._model, theta)
+        return found.u, found.reactions
 
     def _model(self, theta: Floats) -> Model:
         plain = replace(self._plain, materials=self._parameters.materials(theta))

@@ -13,19 +13,7 @@ from warpbrain.errors import InputError
 
 @dataclass(frozen=True, eq=False)
 class Gaussian:
-    """A normal distribution of `theta`.
-
-    Parameters
-    ----------
-    mean : (p,) array
-    covariance : (p, p) array
-        Symmetric and positive definite.
-
-    Raises
-    ------
-    InputError
-        If the covariance is not positive definite.
-    """
+    """A normal distribution of `theta`: mean (p,) and covariance (p, p), positive definite or `InputError`."""
 
     mean: Floats
     covariance: Floats

@@ -12,12 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.estimation.modes import Estimate
+from warpbrain.estimation.fit import Estimate
 from warpbrain.estimation.parameters import Parameter
 from warpbrain.physics.words import enumerated
-
-#: Parameters with their weights in a direction.
-Parts = Sequence[tuple[Parameter, float]]
 
 #: Gains from which a direction is told, and below which it is hidden.
 TOLD, HIDDEN = 1.0, 0.1
@@ -27,6 +24,9 @@ _NEGLIGIBLE = 0.1
 _UNMOVED = 1e-4
 #: Two parts of a direction that differ by less than this are the same.
 _ALIKE = 0.1
+#: How a combination of parameters is told, and a change: of one, of moduli alike, of any.
+_COMBINATION = "the {}", "the geometric mean of the shear moduli of {}", "the combination {}"
+_CHANGE = "a change of the {}", "a change of the shear moduli of {} by one factor", "a change along {}"
 
 
 @dataclass(frozen=True)
@@ -57,18 +57,17 @@ class Identifiability:
     @property
     def sentences(self) -> tuple[str, ...]:
         """For people to read."""
+        said = []
         if self.nothing:
-            said = [
+            said.append(
                 "Not identifiable: the recordings say nothing of the tissue. What is given is the prior, no finding."
-            ]
-        else:
-            said = []
-            if self.informed:
-                said.append(f"The recordings inform {enumerated(self.informed)}.")
-            if self.weakly_informed:
-                said.append(f"They inform a little {enumerated(self.weakly_informed)}.")
-            if self.hidden:
-                said.append(f"They do not see {enumerated(self.hidden)}: there the estimate is the prior.")
+            )
+        if self.informed:
+            said.append(f"The recordings inform {enumerated(self.informed)}.")
+        if self.weakly_informed:
+            said.append(f"They inform a little {enumerated(self.weakly_informed)}.")
+        if self.hidden and not self.nothing:
+            said.append(f"They do not see {enumerated(self.hidden)}: there the estimate is the prior.")
         if self.scale_is_hidden:
             said.append(
                 "Absolute stiffness cannot be told from displacements that displacements cause: a recorded force, or a "
@@ -81,21 +80,21 @@ def identifiability(estimate: Estimate) -> Identifiability:
     """What the data of an estimate inform."""
     posterior = estimate.laplace
     parameters, gains = tuple(posterior.parameters), posterior.gains
-    told, between = gains >= TOLD, (gains < TOLD) & (gains >= HIDDEN)
+    told, hidden = gains >= TOLD, gains < HIDDEN
     # one prior standard deviation of a parameter is the unit in which changes of different kinds compare
     unit = posterior.prior.standard_deviations
     # a factor on all moduli moves nothing if displacements do it all, and everything under a weight or a force
     scale = posterior.parameters.is_modulus.astype(np.float64)
     moved = np.linalg.norm(np.tensordot(scale, estimate.linearised.du, axes=1))
     known = float(scale @ posterior.information @ scale) / float(scale @ posterior.prior.precision @ scale)
-    informed, weakly_informed = (
-        tuple(combination(_parts(parameters, row, 1.0 / unit)) for row in _reduced(posterior.combinations[rows] * unit))
-        for rows in (told, between)
-    )
+
+    def combinations(rows: Floats) -> tuple[str, ...]:
+        return tuple(in_words(parameters, row / unit, _COMBINATION) for row in _reduced(rows * unit))
+
     return Identifiability(
-        informed,
-        weakly_informed,
-        tuple(change(_parts(parameters, row, unit)) for row in _reduced(posterior.directions[gains < HIDDEN] / unit)),
+        combinations(posterior.combinations[told]),
+        combinations(posterior.combinations[~told & ~hidden]),
+        tuple(in_words(parameters, row * unit, _CHANGE) for row in _reduced(posterior.directions[hidden] / unit)),
         known < HIDDEN and bool(moved <= _UNMOVED * np.linalg.norm(estimate.point.state.u)),
     )
 
@@ -108,52 +107,23 @@ def _reduced(rows: Floats) -> Floats:
         rows[k] /= rows[k, column]
         others = np.arange(len(rows)) != k
         rows[others] -= np.outer(rows[others, column], rows[k])
-    return rows
+    return np.where(np.abs(rows) >= _NEGLIGIBLE * np.abs(rows).max(axis=1, keepdims=True, initial=0.0), rows, 0.0)
 
 
-def _parts(parameters: Sequence[Parameter], row: Floats, unit: Floats) -> Parts:
-    """Parameters that count, in order; in their own units, the largest 1."""
-    counted = np.flatnonzero(np.abs(row) >= _NEGLIGIBLE * np.abs(row).max()).tolist()
-    weights = row * unit
-    weights = weights / weights[counted][np.abs(weights[counted]).argmax()]
-    return [(parameters[k], float(weights[k])) for k in counted]
-
-
-def combination(parts: Parts) -> str:
-    """A combination of parameters in words."""
-    return _in_words(parts, "the {}", "the geometric mean of the shear moduli of {}", "the combination {}")
-
-
-def change(parts: Parts) -> str:
-    """A change of parameters, in words."""
-    return _in_words(
-        parts, "a change of the {}", "a change of the shear moduli of {} by one factor", "a change along {}"
-    )
-
-
-def _in_words(parts: Parts, single: str, alike: str, other: str) -> str:
+def in_words(parameters: Sequence[Parameter], row: Floats, words: tuple[str, str, str]) -> str:
+    """A direction (p,) in parameters of their own units; those with a weight of zero are not in it."""
+    single, alike, other = words
+    weights = row / row[np.abs(row).argmax()]
+    parts = [(parameters[k], float(weights[k])) for k in np.flatnonzero(weights).tolist()]
     if len(parts) == 1:
         return single.format(_noun(parts[0][0]))
-    tissues = enumerated([parameter.tissue for parameter, _ in parts])
-    if _are_alike(parts):
-        return alike.format(tissues)
-    if _are_opposite(parts):
-        return single.format(f"ratio of the shear moduli of {tissues}")
-    return other.format(_sum(parts))
-
-
-def _are_alike(parts: Parts) -> bool:
-    weights = [weight for _, weight in parts]
-    return all(parameter.is_modulus for parameter, _ in parts) and max(weights) - min(weights) < _ALIKE
-
-
-def _are_opposite(parts: Parts) -> bool:
-    moduli = all(parameter.is_modulus for parameter, _ in parts)
-    return moduli and len(parts) == 2 and abs(parts[0][1] + parts[1][1]) < _ALIKE
-
-
-def _sum(parts: Parts) -> str:
-    return " ".join(f"{weight:+.2g} [{parameter.name}]" for parameter, weight in parts)
+    if all(parameter.is_modulus for parameter, _ in parts):
+        tissues = enumerated([parameter.tissue for parameter, _ in parts])
+        if max(weight for _, weight in parts) - min(weight for _, weight in parts) < _ALIKE:
+            return alike.format(tissues)
+        if len(parts) == 2 and abs(parts[0][1] + parts[1][1]) < _ALIKE:
+            return single.format(f"ratio of the shear moduli of {tissues}")
+    return other.format(" ".join(f"{weight:+.2g} [{parameter.name}]" for parameter, weight in parts))
 
 
 def _noun(parameter: Parameter) -> str:

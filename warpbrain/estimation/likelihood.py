@@ -1,10 +1,10 @@
 """How likely residuals are: the noise of `warpbrain.inference`, its scale and its gross errors found by the fit itself.
 
-The n numbers of all recordings, one after the other, have the covariance `kappa^2 R(w)`: independent noise and what
-neighbours share, a factor that nobody knows exactly, and points whose noise is many times larger
-(`inference.noise`, `inference.gross_errors`). About a fit everything is linear, with columns of one standard deviation
-of all that is estimated: `w` and `kappa` are those that are most probable with these integrated out, and so is a
-standard deviation that was not declared. The fit goes on with them until they stay as they are.
+The n numbers of all recordings have the covariance `kappa^2 R(w)`: independent noise and what neighbours share, a
+factor that nobody knows exactly, and points whose noise is many times larger (`inference.noise`,
+`inference.gross_errors`). About a fit everything is linear, with columns of one standard deviation of all that is
+estimated: `w` and `kappa` are those that are most probable with these integrated out, and so is a standard deviation
+that was not declared. The fit goes on with them until they stay as they are.
 
 Far from the estimate most of a residual is no noise yet. There each recording's noise is taken to be independent and as
 large as its residuals are, but no less than declared.
@@ -19,8 +19,8 @@ from functools import cached_property
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats, Ints
-from warpbrain.estimation.observations import Observations, Residuals
+from warpbrain.arrays import Bools, Floats
+from warpbrain.estimation.observations import Sensors
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import Outliers, with_gross_errors
@@ -33,131 +33,44 @@ LEAST_SIGMA = 1e-9
 _ROUNDS, _SETTLED = 6, 0.02
 
 
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """The numbers of all recordings, one after the other.
+def _beginnings(rows: Sensors) -> tuple[Floats, list[Bools], list[Bools]]:
+    """Standard deviation (n,) of each row, where none is declared relative to the others of the recording.
 
-    Attributes
-    ----------
-    positions, directions : (n, 3) array
-        As of `noise_covariance`.
-    sigma : (n,) array
-        Declared; where it is to be estimated, relative to the others of the recording.
-    recordings : (n,) int array
-        Number of the recording.
-    declared : (m,) bool array
-        Of which recordings the noise is known.
-    points : tuple of int arrays
-        Rows of each point that may be a gross error, those of a recording together; forces have none.
-    times : (n,) array, optional
-        When [s]; all at the end unless given.
-    over_element : (n, 3) array, optional
-        As of `noise_covariance`; zero unless given.
-    unresolved : float
-        Part of it that the mesh does not show.
+    And the rows (n,) of each recording that declares it, and of each that does not.
     """
-
-    positions: Floats
-    directions: Floats
-    sigma: Floats
-    recordings: Ints
-    declared: Bools
-    points: tuple[Ints, ...]
-    times: Floats | None = None
-    over_element: Floats | None = None
-    unresolved: float = 0.0
-
-    @classmethod
-    def of(cls, observations: Observations, parts: tuple[Residuals, ...]) -> Rows:
-        """Those of residuals at a state: surfaces are looked at along their normals there."""
-        positions, sigma, points, times, first = [], [], [], [], 0
-        for recording in observations.recordings:
-            count = len(recording.rows)
-            where = recording.positions if len(recording.positions) else np.full((count, 3), np.nan)
-            positions.append(np.repeat(where, recording.size, axis=0))
-            deviation = 1.0 / np.sqrt(recording.weights) if recording.sigma is None else recording.sigma
-            sigma.append(np.repeat(deviation, recording.size))
-            times.append(np.repeat(recording.times, recording.size))
-            numbers = first + np.arange(count * recording.size).reshape(count, recording.size)
-            points += list(numbers) if recording.unit == "m" else []
-            first += count * recording.size
-        sizes = [part.values.size for part in parts]
-        return cls(
-            np.concatenate(positions),
-            np.concatenate([part.directions.reshape(-1, 3) for part in parts]),
-            np.concatenate(sigma),
-            np.repeat(np.arange(len(parts)), sizes),
-            np.array([recording.sigma is not None for recording in observations.recordings]),
-            tuple(points),
-            np.concatenate(times),
-            np.concatenate([recording.over_element.reshape(-1, 3) for recording in observations.recordings]),
-        )
-
-    def covariance(self, sigma: Floats) -> Floats:
-        """Of the noise at a scale of 1, (n, n), with standard deviations (n,)."""
-        times = np.full(len(sigma), np.inf) if self.times is None else self.times
-        beyond = None if self.over_element is None else self.unresolved * self.over_element
-        return noise_covariance(self.positions, self.directions, times, sigma, beyond)
-
-
-@dataclass(frozen=True, eq=False)
-class IndependentNoise:
-    """Independent noise with standard deviations (n,), for the way to the estimate."""
-
-    sigma: Floats
-
-    @classmethod
-    def as_large_as(cls, rows: Rows, residual: Floats) -> IndependentNoise:
-        """As large as the residuals (n,) of each recording are, but no less than declared."""
-        sigma = rows.sigma.copy()
-        for number, declared in enumerate(rows.declared.tolist()):
-            members = rows.recordings == number
-            sigma[members] *= max(
-                root_mean_square(residual[members] / sigma[members]), 1.0 if declared else LEAST_SIGMA
-            )
-        return cls(sigma)
-
-    def negative_log(self, residual: Floats) -> float:
-        """`-ln p` of residuals (n,)."""
-        return float(np.sum(np.log(self.sigma) + 0.5 * self.standardised(residual) ** 2))
-
-    def standardised(self, numbers: Floats) -> Floats:
-        """Numbers (n, ...) in units of the noise."""
-        return np.asarray((numbers.T / self.sigma).T)
+    undeclared = np.isnan(rows.sigma)
+    members = [rows.recordings == number for number in np.unique(rows.recordings)]
+    sigma = np.where(undeclared, 1.0 / np.sqrt(rows.weights), rows.sigma)
+    return sigma, [m for m in members if not undeclared[m].any()], [m for m in members if undeclared[m].any()]
 
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """What the noise of residuals is, with everything that is estimated integrated out.
+    """What the noise of residuals is, with everything that is estimated integrated out."""
 
-    Attributes
-    ----------
-    rows : Rows
-    sigma : (n,) array
-        Standard deviation of the independent part of each number, at a scale of 1.
-    scale : float
-        Factor on all of it.
-    inflation : (g,) array
-        How many times larger the noise of each point is: 1 of a sound one, more of a gross error.
-    outliers : Outliers or None
-        What was believed of them; None: there are none.
-    """
-
-    rows: Rows
-    sigma: Floats
-    scale: float
-    inflation: Floats
-    outliers: Outliers | None
+    rows: Sensors
+    sigma: Floats  # (n,), of the independent part of each number, at a scale of 1
+    scale: float  # factor on all of it
+    inflation: Floats  # (g,), how many times larger the noise of each point is: 1, or more of a gross error
+    outliers: Outliers | None  # what was believed of them; None: there are none
+    unresolved: float = 0.0  # part of the change over an element that the mesh does not show
 
     @property
     def gross(self) -> Bools:
-        """Which points (g,) are gross errors."""
+        """Points that are gross errors, shape (g,)."""
         return self.inflation > 1.0
 
     @cached_property
+    def _covariance(self) -> Floats:
+        """Of the noise at a scale of 1 (n, n), without gross errors."""
+        rows = self.rows
+        beyond = self.unresolved * rows.over_element
+        return noise_covariance(rows.positions, rows.directions, rows.times, self.sigma, beyond)
+
+    @cached_property
     def factor(self) -> Floats:
-        """Lower triangular factor (n, n) of the covariance at a scale of 1, gross errors in it."""
-        covariance = self.rows.covariance(self.sigma)
+        """Lower factor (n, n) of the covariance at a scale of 1, with gross errors in it."""
+        covariance = self._covariance.copy()
         for number in np.flatnonzero(self.gross).tolist():
             numbers = self.rows.points[number]
             covariance[np.ix_(numbers, numbers)] *= self.inflation[number] ** 2
@@ -175,150 +88,128 @@ class Noise:
             log_density += float(self.outliers.log_probabilities[kinds].sum())
         return log_density
 
+    @cached_property
+    def _model(self) -> GaussianModel:
+        return GaussianModel(self.factor, np.zeros((len(self.rows), 0)), self.scale)
+
     def negative_log(self, residual: Floats) -> float:
         """`-ln p` of residuals (n,), with that of the noise itself."""
-        n = len(residual)
-        volume = float(np.log(np.diag(self.factor)).sum()) + n * math.log(math.sqrt(2.0 * math.pi) * self.scale)
-        return 0.5 * float(np.sum(self.standardised(residual) ** 2)) + volume - self.log_prior
+        return -float(self._model.log_density(residual)) - self.log_prior
 
     def standardised(self, numbers: Floats) -> Floats:
         """Numbers (n, ...) in coordinates in which noise is independent and of unit variance."""
-        from scipy.linalg import solve_triangular
-
-        return np.asarray(solve_triangular(self.factor, numbers, lower=True, check_finite=False) / self.scale)
-
-    def of_recording(self, number: int, shape: tuple[int, ...]) -> tuple[Floats, Floats, Bools]:
-        """Of a recording of n rows of d numbers, without gross errors.
-
-        Returns
-        -------
-        sigma : (n,) array
-            Standard deviation of the independent part of one component.
-        deviation : (n, d) array
-            With what neighbours share.
-        gross : (n,) bool array
-            Rows that are gross errors.
-        """
-        members = self.rows.recordings == number
-        gross = [wrong for rows, wrong in zip(self.rows.points, self.gross.tolist(), strict=True) if members[rows[0]]]
-        return (
-            self.scale * self.sigma[members].reshape(shape)[:, 0],
-            self._deviation[members].reshape(shape),
-            np.array(gross or np.zeros(shape[0]), dtype=bool),
-        )
+        return self._model.whitened(numbers)
 
     @cached_property
-    def _deviation(self) -> Floats:
+    def deviation(self) -> Floats:
         """Of each number (n,), with what neighbours share and without gross errors."""
-        return self.scale * np.sqrt(np.diag(self.rows.covariance(self.sigma)))
+        return self.scale * np.sqrt(np.diag(self._covariance))
 
     def is_near(self, other: Noise) -> bool:
         """Whether another one has the same gross errors and nearly the same size."""
         sizes = np.abs(np.log(self.scale * self.sigma / (other.scale * other.sigma)))
         return bool(np.array_equal(self.inflation, other.inflation) and sizes.max() <= _SETTLED)
 
+    def log_evidence(self, expected: Floats, columns: Floats) -> float:
+        """`ln p` of residuals (n,) with columns (n, k) integrated out, and of the noise itself."""
+        return float(self._model.with_columns(columns).log_density(expected)) + self.log_prior
 
-@dataclass(frozen=True)
-class Likelihood:
-    """What is believed of noise.
+    def with_gross_errors(self, expected: Floats, columns: Floats) -> Noise:
+        """The same with the most probable gross errors; arguments as of `log_evidence`."""
+        if self.outliers is None or not self.rows.points:
+            return self
+        sound = replace(self, inflation=np.ones_like(self.inflation))
+        model = sound._model.with_columns(columns)
+        return replace(self, inflation=with_gross_errors(model, expected, self.rows.points, self.outliers).inflation)
 
-    Parameters
-    ----------
-    outliers : Outliers or None
-        None: nothing is a gross error.
-    """
+    def with_likely_scale(self, expected: Floats, columns: Floats) -> Noise:
+        """The same with the most probable factor on it."""
+        low, *_, high = sorted(scales()[0].tolist())
+        model = self._model.of_noise(columns)
+        return replace(self, scale=_likely_scale(model, expected, low, high, log_scale_density))
 
-    outliers: Outliers | None = field(default_factory=outliers)
-
-    def noise(self, rows: Rows, left: Floats, expected: Floats, columns: Floats) -> Noise:
-        """The most probable noise about a fit.
-
-        Parameters
-        ----------
-        rows : Rows
-        left : (n,) array
-            What the fit leaves.
-        expected : (n,) array
-            Residuals in the middle of the prior, by the linear model about the fit.
-        columns : (n, k) array
-            What one standard deviation of each number that is estimated changes.
-        """
-        sound = np.ones(len(rows.points))
-        sigma = rows.sigma.copy()
-        for number in np.flatnonzero(~rows.declared).tolist():
-            members = rows.recordings == number
-            # few of them are gross errors
-            sigma[members] *= max(1.4826 * float(np.median(np.abs(left[members] / sigma[members]))), LEAST_SIGMA)
-        candidates = [
-            self._settled(Noise(rows, sigma, scale, sound, self.outliers), expected, columns)
-            for scale in self._starts(rows, sigma, expected, columns)
-        ]
-        found = max(candidates, key=lambda noise: _log_evidence(noise, expected, columns))
-        if rows.over_element is None or not rows.over_element.any() or self.outliers is None:
-            return found
-        for part in beliefs("mesh.unresolved")[1:].tolist():
-            other = self._settled(replace(found, rows=replace(rows, unresolved=part)), expected, columns)
-            if _log_evidence(other, expected, columns) < _log_evidence(found, expected, columns):
-                break
-            found = other
-        return found
-
-    def _starts(self, rows: Rows, sigma: Floats, expected: Floats, columns: Floats) -> tuple[float, ...]:
-        """Scales to begin with: gross errors first, and all points sound first."""
-        if self.outliers is None:
-            return (1.0,)
-        sound = Noise(rows, sigma, 1.0, np.ones(len(rows.points)), self.outliers)
-        return 1.0, _likely_scale(sound, expected, columns)
-
-    def _settled(self, noise: Noise, expected: Floats, columns: Floats) -> Noise:
-        """Gross errors, undeclared noise and scale in turn until they stay."""
-        for _ in range(_ROUNDS):
-            last = noise
-            if self.outliers is not None and len(noise.rows.points):
-                sound = replace(noise, inflation=np.ones_like(noise.inflation))
-                model = GaussianModel(sound.factor, columns, noise.scale)
-                with_errors = with_gross_errors(model, expected, noise.rows.points, self.outliers)
-                noise = replace(noise, inflation=with_errors.inflation)
-            for number in np.flatnonzero(~noise.rows.declared).tolist():
-                noise = _with_likely_sigma(noise, number, expected, columns)
-            if noise.rows.declared.any():
-                noise = replace(noise, scale=_likely_scale(noise, expected, columns))
-            if noise.is_near(last):
-                break
-        return noise
+    def with_likely_sigma(self, members: Bools, expected: Floats, columns: Floats) -> Noise:
+        """The same with another size of a recording (n,) that declares none: the likeliest of its own rows."""
+        model = self._model.of_noise(columns).rows(members)
+        size = _likely_scale(model, expected[members], math.exp(-2.0), math.exp(2.0))
+        likely = np.maximum(size / self.scale * self.sigma, LEAST_SIGMA)
+        return replace(self, sigma=np.where(members, likely, self.sigma))
 
 
-def _log_evidence(noise: Noise, expected: Floats, columns: Floats) -> float:
-    return float(GaussianModel(noise.factor, columns, noise.scale).log_density(expected)) + noise.log_prior
+class IndependentNoise(Noise):
+    """Independent noise, sound and of a scale of 1, for the way to the estimate."""
+
+    @classmethod
+    def as_large_as(cls, rows: Sensors) -> IndependentNoise:
+        """As large as the residuals of each recording are, but no less than declared."""
+        sigma, declared, undeclared = _beginnings(rows)
+        for each, least in ((declared, 1.0), (undeclared, LEAST_SIGMA)):
+            for members in each:
+                sigma[members] *= max(root_mean_square(rows.residual[members] / sigma[members]), least)
+        return cls(rows, sigma, 1.0, np.ones(len(rows.points)), None)
+
+    def negative_log(self, residual: Floats) -> float:
+        """`-ln p` of residuals (n,), up to a constant."""
+        return float(np.sum(np.log(self.sigma) + 0.5 * self.standardised(residual) ** 2))
+
+    def standardised(self, numbers: Floats) -> Floats:
+        """Numbers (n, ...) in units of the noise."""
+        return np.asarray((numbers.T / self.sigma).T)
 
 
-def _likely_scale(noise: Noise, expected: Floats, columns: Floats) -> float:
-    """The most probable scale with the gross errors that there are."""
-    model = GaussianModel(noise.factor, columns)
+def _likely_scale(
+    model: GaussianModel, rows: Floats, low: float, high: float, log_prior: Callable[[Floats], Floats] = np.zeros_like
+) -> float:
+    """The most probable factor on the noise of rows (n,), between two."""
+    from scipy.optimize import minimize_scalar
 
     def negative(log_scale: float) -> float:
         scale = math.exp(log_scale)
-        return -float(model.with_scale(scale).log_density(expected)) - float(log_scale_density(np.array(scale)))
+        return -float(model.with_scale(scale).log_density(rows)) - float(log_prior(np.array(scale)))
 
-    values, _ = scales()
-    return math.exp(_least(negative, math.log(values.min()), math.log(values.max())))
-
-
-def _with_likely_sigma(noise: Noise, number: int, expected: Floats, columns: Floats) -> Noise:
-    """The noise with another size of that of a recording which declares none: the likeliest of its own rows."""
-    members = noise.rows.recordings == number
-    model = GaussianModel(noise.factor, columns).rows(members)
-
-    def negative(log_size: float) -> float:
-        return -float(model.with_scale(math.exp(log_size)).log_density(expected[members]))
-
-    size = math.exp(_least(negative, -2.0, 2.0)) / noise.scale
-    sigma = noise.sigma.copy()
-    sigma[members] = np.maximum(size * sigma[members], LEAST_SIGMA)
-    return replace(noise, sigma=sigma)
+    bounds = math.log(low), math.log(high)
+    return math.exp(minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-4}).x)
 
 
-def _least(function: Callable[[float], float], low: float, high: float) -> float:
-    from scipy.optimize import minimize_scalar
+@dataclass(frozen=True)
+class Likelihood:
+    """What is believed of noise; `outliers`: of gross errors, None if nothing is one."""
 
-    return float(minimize_scalar(function, bounds=(low, high), method="bounded", options={"xatol": 1e-4}).x)
+    outliers: Outliers | None = field(default_factory=outliers)
+
+    def noise(self, rows: Sensors, left: Floats, expected: Floats, columns: Floats) -> Noise:
+        """The most probable noise about a fit, which leaves residuals `left` (n,).
+
+        In the middle of the prior they are `expected` (n,), by the linear model about the fit, and one standard
+        deviation of each number that is estimated changes them by `columns` (n, k).
+        """
+        sigma, declared, undeclared = _beginnings(rows)
+        for members in undeclared:
+            # few of them are gross errors
+            sigma[members] *= max(1.4826 * float(np.median(np.abs(left[members] / sigma[members]))), LEAST_SIGMA)
+
+        def settled(noise: Noise) -> Noise:
+            """Gross errors, undeclared noise and scale in turn until they stay."""
+            for _ in range(_ROUNDS):
+                last = noise
+                noise = noise.with_gross_errors(expected, columns)
+                for members in undeclared:
+                    noise = noise.with_likely_sigma(members, expected, columns)
+                if declared:
+                    noise = noise.with_likely_scale(expected, columns)
+                if noise.is_near(last):
+                    break
+            return noise
+
+        start = Noise(rows, sigma, 1.0, np.ones(len(rows.points)), self.outliers)
+        # gross errors first, and all points sound first
+        starts = [start] if self.outliers is None else [start, start.with_likely_scale(expected, columns)]
+        found = max((settled(one) for one in starts), key=lambda noise: noise.log_evidence(expected, columns))
+        if not rows.over_element.any() or self.outliers is None:
+            return found
+        for part in beliefs("mesh.unresolved")[1:].tolist():
+            other = settled(replace(found, unresolved=part))
+            if other.log_evidence(expected, columns) < found.log_evidence(expected, columns):
+                break
+            found = other
+        return found

@@ -1,21 +1,21 @@
-"""Recordings of a case beside a state: residuals, and how they change with it.
+"""Recordings of a case beside its states, as rows: residuals, and how they change.
 
 A residual is what was recorded less what was computed, each row at its time (`warpbrain.cases.moments`), less what was
 computed at the time from which it is counted. Recordings whose role is ``"fit"`` are one thing, those to ``"check"``
-with another: no function here looks at both.
+another: no function here looks at both.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Floats, Ints
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.cases.enough import too_few_for_noise
@@ -37,111 +37,118 @@ _KEPT = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Residuals:
-    """Residuals of one recording at a state, with d components a row.
+class Sensors:
+    """The n numbers that were recorded, at a state."""
 
-    Attributes
-    ----------
-    values : (n, d) array
-        Of points 3 components [m]; of a surface the signed distance [m]; of a force those recorded [N].
-    rigid : (n, d, 6) array
-        Derivatives of the values by a rigid motion of what was recorded (`registration`), with another sign.
-    directions : (n, d, 3) array
-        Along which lengths are; zero of forces.
-    by_displacement, by_reactions : (n d, 3 N) SciPy CSR
-        Derivatives of what was computed by displacement and reactions at its time; with another sign, by those at the
-        time of the reference.
-    after, before : (n,) int array
-        Numbers of the states (`Moments`) that each row is compared with, and counted from; -1: from rest.
-    """
+    residual: Floats  # what was recorded less what was computed [m] or [N]; of surfaces the signed distance
+    computed: Floats  # of surfaces the displacement along their normals
+    by_displacement: Any  # SciPy CSR (n, 3 N), of what was computed by the displacement at its time
+    by_reactions: Any  # the same by the reactions
+    rigid: Floats  # (n, 6), of what was recorded by a rigid motion of it (`registration`)
+    sigma: Floats  # declared standard deviation of the noise; NaN where it is to be estimated
+    positions: Floats  # (n, 3), where [m]; NaN of forces
+    directions: Floats  # (n, 3), in which direction a displacement was recorded; zero of forces
+    over_element: Floats  # (n, 3), `change_over_element` along each axis [m]; zero of all but points
+    groups: Ints  # number of the point, or of the row of a recording, increasing
+    recordings: Ints  # number of the recording
+    times: Floats  # when [s]; infinite of the end
+    names: tuple[str, ...]  # of the recordings
+    after: Ints  # number of the time of the state that each is compared with
+    before: Ints  # the same, counted from; -1: from rest
+    references: Floats  # when that state was [s]; 0: rest
+    #: How many times what changes the last state alike at all times changes a row: less where a state is smaller.
+    share: Floats | float = 1.0
+    #: Of rows whose noise is to be estimated: its variance is the recording's over this.
+    weights: Floats | float = 1.0
 
-    values: Floats
-    rigid: Floats
-    directions: Floats
-    by_displacement: Any
-    by_reactions: Any
-    after: Ints
-    before: Ints
+    def __len__(self) -> int:
+        return len(self.residual)
 
-    def derivative(self, du: Floats, dR: Floats) -> Floats:
-        """From derivatives of displacement and reactions (p, s N, 3) in s states to those of the values (n, d, p)."""
-        count, size, components = len(du), self.by_displacement.shape[1], self.values.shape[1]
+    @property
+    def is_displacement(self) -> Bools:
+        """Which rows are lengths, not forces."""
+        return np.asarray(self.directions.any(axis=1))
+
+    @property
+    def of_surfaces(self) -> Bools:
+        """Which rows are of points of a surface: each of these has one number, along the normal."""
+        return np.asarray(self.is_displacement & (np.bincount(self.groups)[self.groups] == 1))
+
+    @property
+    def is_counted_from_rest(self) -> bool:
+        """Whether all rows are."""
+        return bool((self.before < 0).all())
+
+    @cached_property
+    def points(self) -> tuple[Ints, ...]:
+        """Rows of each point, which may be a gross error; forces have none."""
+        rows = np.flatnonzero(self.is_displacement)
+        ends = np.flatnonzero(np.diff(self.groups[rows])) + 1
+        return tuple(np.split(rows, ends)) if len(rows) else ()
+
+    def of_rows(self, rows: Ints | Bools, time: float | None = None) -> Sensors:
+        """Some of the rows (k,), or (n,) bool; with `time` [s] as if recorded then, and counted from rest."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        some = replace(self, **{k: v[rows] for k, v in values.items() if k != "names" and not np.isscalar(v)})
+        if time is None:
+            return some
+        at, first = np.full(len(some), time), np.zeros(len(some), dtype=np.int64)
+        return replace(some, times=at, after=first, before=first - 1, references=np.zeros(len(some)), share=1.0)
+
+    def answer(self, du: Floats, dR: Floats) -> Floats:
+        """Change (n,) of what is computed by changes of displacement and reactions (N, 3) at its time alone."""
+        return np.asarray(self.by_displacement @ du.ravel() + self.by_reactions @ dR.ravel())
+
+    def answers_in_time(self, du: Floats, dR: Floats) -> Floats:
+        """The same (n, p) of changes (p, s N, 3) of s states, one after the other, from which rows are counted, too."""
+        count, size = len(du), self.by_displacement.shape[1]
         u, R = du.reshape(count, -1, size), dR.reshape(count, -1, size)
-        total = np.zeros((self.values.size, count))
+        total = np.zeros((self.by_displacement.shape[0], count))
         for number in range(u.shape[1]):
             share = (self.after == number) * 1.0 - (self.before == number)
             if share.any():
                 change = np.asarray(self.by_displacement @ u[:, number].T + self.by_reactions @ R[:, number].T)
-                total -= np.repeat(share, components)[:, None] * change
-        return total.reshape(*self.values.shape, count)
+                total += share[:, None] * change
+        return total
+
+
+#: From a displacement and reactions (N, 3), a centre (3,) and a rigid motion (6,): residuals (n d,), `rigid` (n d, 6),
+#: and derivatives (n d, 3 N) of what was computed.
+_At = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats, Any, Any]]
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """One recording.
-
-    Attributes
-    ----------
-    name, kind, unit : str
-    rows : (n,) int array
-        Rows of the recording that count; the first of those that are copies of each other.
-    sigma : (n,) array or None
-        Standard deviation of one component of each row; None: to be estimated.
-    weights : (n,) array
-        Where sigma is estimated, the variance of a row is its square over this; else it is in `sigma` already.
-    size : int
-        Components of a row.
-    positions : (k, 3) array
-        What a wrong registration moves [m]; empty for forces.
-    edges : (n,) array
-        Mean length of the edges of the element in which each point is [m]; zero of all but points.
-    over_element : (n, size, 3) array
-        Of `change_over_element`; zero of all but points.
-    times, references : (n,) array
-        When each row was recorded, and the time from which it is counted [s]: infinity is the end, 0 is rest.
-    at : callable
-        From displacement and reactions (s N, 3) in s states, one after the other, the centre of a rigid motion (3,) and
-        that motion (6,) to `Residuals`.
-    """
+    """The n rows of one recording that count and are compared with one state."""
 
     name: str
     kind: str
     unit: str
-    rows: Ints
-    sigma: Floats | None
-    weights: Floats
-    size: int
-    positions: Floats
-    edges: Floats
-    over_element: Floats
-    times: Floats
-    references: Floats
-    at: Callable[[Floats, Floats, Floats, Floats], Residuals]
+    rows: Ints  # their numbers in the recording; the first of those that are copies of each other
+    sigma: Floats | None  # standard deviation (n,) of one component; None: to be estimated
+    weights: Floats  # where sigma is estimated, the variance of a row is its square over this; else it is in it already
+    size: int  # components of a row
+    positions: Floats  # (n, 3), what a wrong registration moves [m]; NaN of forces
+    edges: Floats  # (n,), mean length of the edges of the element in which each is [m]; zero of all but points
+    over_element: Floats  # (n, size, 3)
+    times: Floats  # (n,), when [s]
+    reference: float  # the time from which they are counted [s]; 0: rest
+    after: int  # numbers of the states that they are compared with, and counted from; -1: from rest (`Moments`)
+    before: int
+    at: _At
 
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Recordings of a case of one role.
+    """Recordings of a case of one role."""
 
-    Attributes
-    ----------
-    recordings : tuple of Observation
-    remarks : tuple of str
-        Recordings that say nothing of tissue, and why.
-    """
-
-    recordings: tuple[Observation, ...]
-    remarks: tuple[str, ...]
+    recordings: tuple[Observation, ...]  # those of one name follow each other
+    remarks: tuple[str, ...]  # recordings that say nothing of tissue, and why
+    nodes: int  # of the simulated mesh
 
     @classmethod
     def to_fit(cls, case: Case, moments: Moments | None = None) -> Observations:
-        """The recordings that a case is fitted to.
-
-        Parameters
-        ----------
-        case : Case
-        moments : Moments, optional
-            States that there are; those of all times at which something was recorded unless given.
+        """The recordings that a case is fitted to; at states of all times of recordings unless `moments` are given.
 
         Raises
         ------
@@ -176,61 +183,81 @@ class Observations:
                 remarks.append(
                     f"recording '{recording.name}' says nothing of tissue: the force of '{recording.boundary}' is given"
                 )
-                continue
-            if recording.reference is not None and recording.reference not in moments.times:
+            elif recording.reference is not None and recording.reference not in moments.times:
                 remarks.append(
                     f"recording '{recording.name}' is counted from {recording.reference:g} s, and tissue that goes on "
                     "by itself is looked at in the end alone"
                 )
-                continue
-            each.append((recording, _observation(case, recording, moments)))
-        return cls(_with_changes(each), tuple(remarks))
+            else:
+                each += [(recording, one) for one in _observations(case, recording, moments)]
+        return cls(_with_changes(each), tuple(remarks), len(case.remaining[0].points))
 
-    @property
+    @cached_property
     def centre(self) -> Floats:
         """Mean of all positions that were recorded [m], zero if there are none."""
-        positions = np.concatenate([observation.positions for observation in self.recordings])
+        positions = np.concatenate([one.positions for one in self.recordings])
+        positions = positions[np.isfinite(positions).all(axis=1)]
         return positions.mean(axis=0) if len(positions) else np.zeros(3)
 
-    def at(
-        self, u: Floats, reactions: Floats, centre: Floats | None = None, motion: Floats | None = None
-    ) -> tuple[Residuals, ...]:
-        """Residuals of each recording at a state.
+    def at(self, u: Floats, reactions: Floats, centre: Floats | None = None, motion: Floats | None = None) -> Sensors:
+        """All rows at a state.
 
         Parameters
         ----------
-        u : (s N, 3) array
-            Displacement [m] in s states, one after the other.
-        reactions : (s N, 3) array
-            Of the constrained components [N].
+        u, reactions : (s N, 3) array
+            Displacement [m], and forces of the constrained components [N], in s states, one after the other.
         centre : (3,) array, optional
             Of a rigid motion [m]; that of these recordings by default.
         motion : (6,) array, optional
             By which what was recorded was moved, see `registration`; by nothing by default.
         """
+        from scipy.sparse import vstack
+
         about = self.centre if centre is None else centre
         by = np.zeros(6) if motion is None else motion
-        return tuple(observation.at(u, reactions, about, by) for observation in self.recordings)
+        # the state from which is counted, -1, is zero
+        rest = np.zeros((1, self.nodes, 3))
+        U, R = (np.concatenate([field.reshape(-1, self.nodes, 3), rest]) for field in (u, reactions))
+        parts = [
+            one.at(U[one.after] - U[one.before], R[one.after] - R[one.before], about, by) for one in self.recordings
+        ]
+        residual, rigid = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+        by_u, by_R = (vstack([part[k] for part in parts]).tocsr() for k in (2, 3))
+        rows = Sensors(residual, residual, by_u, by_R, rigid, directions=rigid[:, :3].copy(), **self._rows)
+        return replace(rows, computed=rows.answers_in_time(u[None], reactions[None])[:, 0])
+
+    @cached_property
+    def _rows(self) -> dict[str, Any]:
+        """What of the rows is the same at all states."""
+        found = self.recordings
+
+        def each(values: Sequence[Floats | Ints]) -> Any:
+            return np.concatenate([np.repeat(v, one.size, axis=0) for v, one in zip(values, found, strict=True)])
+
+        names = tuple(dict.fromkeys(one.name for one in found))
+        groups = np.split(np.arange(sum(len(one.rows) for one in found)), np.cumsum([len(one.rows) for one in found]))
+        return {
+            "sigma": each([np.full(len(one.rows), np.nan) if one.sigma is None else one.sigma for one in found]),
+            "positions": each([one.positions for one in found]),
+            "over_element": np.concatenate([one.over_element.reshape(-1, 3) for one in found]),
+            "groups": each(groups[:-1]),
+            "recordings": each([np.full(len(one.rows), names.index(one.name)) for one in found]),
+            "times": each([one.times for one in found]),
+            "names": names,
+            "after": each([np.full(len(one.rows), one.after) for one in found]),
+            "before": each([np.full(len(one.rows), one.before) for one in found]),
+            "references": each([np.full(len(one.rows), one.reference) for one in found]),
+            "weights": each([one.weights for one in found]),
+        }
 
 
-#: From a displacement and reactions (N, 3), a centre and a motion: what `Residuals` begins with, of some rows.
-_At = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats, Floats, Any, Any]]
+#: Rows, weights, size, positions and edges as of `Observation`, and `at`.
+_Made = tuple[Ints, Floats, int, Floats, Floats, _At]
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """Rows of a recording that are compared with one state."""
-
-    rows: Ints
-    weights: Floats
-    size: int
-    positions: Floats
-    edges: Floats
-    at: _At
-
-
-def _observation(case: Case, recording: Recording, moments: Moments) -> Observation:
-    makers: dict[type[Recording], tuple[str, Callable[[Case, Any, Ints], _Part]]] = {
+def _observations(case: Case, recording: Recording, moments: Moments) -> Iterator[Observation]:
+    """Of each state that rows of a recording are compared with."""
+    makers: dict[type[Recording], tuple[str, Callable[[Case, Any, Ints], _Made]]] = {
         PointsRecording: ("m", _points),
         SurfaceRecording: ("m", _surface),
         ForceRecording: ("N", _force),
@@ -249,74 +276,39 @@ def _observation(case: Case, recording: Recording, moments: Moments) -> Observat
         raise InputError(f"recording '{recording.name}': {reason}")
     states = np.array([moments.number(time) for time in times[rows].tolist()])
     start = -1 if recording.reference is None else moments.number(recording.reference)
-    numbers = np.unique(states).tolist()
-    parts = [make(case, recording, rows[states == number]) for number in numbers]
-    rows = np.concatenate([part.rows for part in parts])
-    weights = np.concatenate([part.weights for part in parts])
-    after = np.repeat(numbers, [len(part.rows) for part in parts])
-    before = np.full(len(rows), start)
-
-    def at(u: Floats, reactions: Floats, centre: Floats, motion: Floats) -> Residuals:
-        from scipy.sparse import vstack
-
-        size = len(case.remaining[0].points)
-        fields = np.stack([u.reshape(-1, size, 3), reactions.reshape(-1, size, 3)])
-        blocks = []
-        for number, part in zip(numbers, parts, strict=True):
-            moved = fields[:, number] if start < 0 else fields[:, number] - fields[:, start]
-            blocks.append(part.at(moved[0], moved[1], centre, motion))
-        values, rigid, directions = (np.concatenate([block[k] for block in blocks]) for k in range(3))
-        by_displacement, by_reactions = (
-            blocks[0][k] if len(blocks) == 1 else vstack([block[k] for block in blocks]).tocsr() for k in (3, 4)
-        )
-        return Residuals(values, rigid, directions, by_displacement, by_reactions, after, before)
-
-    return Observation(
-        recording.name,
-        recording.kind,
-        unit,
-        rows,
-        _sigma(recording, rows, weights),
-        weights,
-        parts[0].size,
-        np.concatenate([part.positions for part in parts]),
-        np.concatenate([part.edges for part in parts]),
-        np.zeros((len(rows), parts[0].size, 3)),
-        times[rows],
-        np.full(len(rows), recording.reference or 0.0),
-        at,
-    )
+    for number in np.unique(states).tolist():
+        own, weights, size, positions, edges, at = make(case, recording, rows[states == number])
+        sigma, change = _sigma(recording, own, weights), np.zeros((len(own), size, 3))
+        about = sigma, weights, size, positions, edges, change, times[own], recording.reference or 0.0
+        yield Observation(recording.name, recording.kind, unit, own, *about, number, start, at)
 
 
-def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Part:
+def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Made:
     from scipy.sparse import csr_matrix
 
-    mesh = case.remaining[0]
     rows, weights = distinct_rows(recording, rows)
     if not (np.isfinite(weights) & (weights >= 0.0)).all():
         raise InputError(f"recording '{recording.name}': a weight is negative or no number")
     rows, weights = rows[weights > 0.0], weights[weights > 0.0]
-    matrix, by_displacement, edges = _located(mesh, recording.points[rows].astype(np.float64).tobytes())
+    points = recording.points[rows].astype(np.float64)
+    matrix, by_displacement, edges = _located(case.remaining[0], points.tobytes())
     nothing = csr_matrix(by_displacement.shape)
-    positions = recording.points[rows] + recording.displacement[rows]
+    positions = points + recording.displacement[rows]
 
-    directions = np.tile(np.eye(3), (len(rows), 1, 1))
-
-    def at(u: Floats, _reactions: Floats, centre: Floats, motion: Floats) -> tuple[Floats, Floats, Floats, Any, Any]:
-        displacement = moved_back(positions, motion, centre) - recording.points[rows]
+    def at(u: Floats, _reactions: Floats, centre: Floats, motion: Floats) -> tuple[Floats, Floats, Any, Any]:
+        residual = moved_back(positions, motion, centre) - points - matrix @ u
         rigid = -moved_back_columns(positions, motion, centre)
-        return displacement - matrix @ u, rigid, directions, by_displacement, nothing
+        return residual.ravel(), rigid.reshape(-1, 6), by_displacement, nothing
 
-    return _Part(rows, weights, 3, positions, edges, at)
+    return rows, weights, 3, positions, edges, at
 
 
 @lru_cache(maxsize=_KEPT)
 def _located(mesh: TetMesh, points: bytes) -> tuple[Any, Any, Floats]:
     """From values at nodes to those at points, given as bytes of (n, 3) [m]: SciPy CSR (n, N) and (3 n, 3 N).
 
-    With them the mean length of the edges of each point's element (n,) [m].
-
-    Recordings that are taken to have been moved are of the same points of the body each time.
+    With them the mean length of the edges of each point's element (n,) [m]. Kept, because recordings that are taken to
+    have been moved are of the same points of the body each time.
     """
     from scipy.sparse import eye, kron
 
@@ -325,7 +317,7 @@ def _located(mesh: TetMesh, points: bytes) -> tuple[Any, Any, Floats]:
     return matrix, kron(matrix, eye(3), format="csr"), location.edge
 
 
-def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Part:
+def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Made:
     from scipy.sparse import csr_matrix
 
     mesh = case.remaining[0]
@@ -334,10 +326,9 @@ def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Part:
     size = float(np.ptp(mesh.points, axis=0).max())
     shape = (len(rows), 3 * len(mesh.points))
 
-    def at(u: Floats, _reactions: Floats, centre: Floats, motion: Floats) -> tuple[Floats, Floats, Floats, Any, Any]:
+    def at(u: Floats, _reactions: Floats, centre: Floats, motion: Floats) -> tuple[Floats, Floats, Any, Any]:
         moved, points = mesh.points + u, moved_back(positions, motion, centre)
         closest = closest_points(points, moved, faces)
-        nodes, weights = faces[closest.face], closest.weights
         # by a face's normal the side would depend on which of the faces at an edge is found, and that on rounding
         normals = feature_normals(moved, faces)[0][closest.face, closest.features]
         offset = points - closest.position
@@ -347,20 +338,18 @@ def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Part:
         directions = np.where(
             apart[:, None], side[:, None] * offset / np.where(apart, closest.distance, 1.0)[:, None], normals
         )
-
         # the closest point moves along the surface too, which does not change its distance to first order
-        shares = weights[:, :, None] * directions[:, None, :]
-        columns = 3 * nodes[:, :, None] + np.arange(3)
+        shares = closest.weights[:, :, None] * directions[:, None, :]
+        columns = 3 * faces[closest.face][:, :, None] + np.arange(3)
         by_displacement = csr_matrix((shares.ravel(), (np.repeat(np.arange(len(rows)), 9), columns.ravel())), shape)
-        rigid = -np.einsum("nj,njk->nk", directions, moved_back_columns(positions, motion, centre))[:, None, :]
-        values = (side * closest.distance)[:, None]
-        return values, rigid, directions[:, None, :], by_displacement, csr_matrix(shape)
+        rigid = -np.einsum("nj,njk->nk", directions, moved_back_columns(positions, motion, centre))
+        return side * closest.distance, rigid, by_displacement, csr_matrix(shape)
 
-    return _Part(rows, np.ones(len(rows)), 1, positions, np.zeros(len(rows)), at)
+    return rows, np.ones(len(rows)), 1, positions, np.zeros(len(rows)), at
 
 
-def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Part:
-    from scipy.sparse import csr_matrix
+def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Made:
+    from scipy.sparse import csr_matrix, kron
 
     nodes = case.remaining[0].node_sets[case.boundary(recording.boundary).nodes]
     recorded = np.isfinite(recording.force[rows]).all(axis=0)
@@ -368,20 +357,16 @@ def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Part:
     if size == 0:
         raise InputError(f"recording '{recording.name}' has no component of the force, only the torque")
     force = recording.force[rows][:, recorded]
-
-    members, components = np.flatnonzero(nodes), np.flatnonzero(recorded)
-    which = np.tile(np.repeat(np.arange(size), len(members)), len(rows)) + size * np.repeat(
-        np.arange(len(rows)), size * len(members)
-    )
-    columns = np.tile((3 * members + components[:, None]).ravel(), len(rows))
-    by_reactions = csr_matrix((np.ones(len(columns)), (which, columns)), (size * len(rows), 3 * len(nodes)))
+    sums = np.zeros((size, len(nodes), 3))
+    sums[np.arange(size)[:, None], np.flatnonzero(nodes), np.flatnonzero(recorded)[:, None]] = 1.0
+    by_reactions = kron(np.ones((len(rows), 1)), csr_matrix(sums.reshape(size, -1)), format="csr")
     nothing = csr_matrix(by_reactions.shape)
 
-    def at(_u: Floats, reactions: Floats, _centre: Floats, _motion: Floats) -> tuple[Floats, Floats, Floats, Any, Any]:
-        values = force - reactions[nodes].sum(axis=0)[recorded]
-        return values, np.zeros((len(rows), size, 6)), np.zeros((len(rows), size, 3)), nothing, by_reactions
+    def at(_u: Floats, reactions: Floats, _centre: Floats, _motion: Floats) -> tuple[Floats, Floats, Any, Any]:
+        residual = force - reactions[nodes].sum(axis=0)[recorded]
+        return residual.ravel(), np.zeros((residual.size, 6)), nothing, by_reactions
 
-    return _Part(rows, np.ones(len(rows)), size, np.empty((0, 3)), np.zeros(len(rows)), at)
+    return rows, np.ones(len(rows)), size, np.full((len(rows), 3), np.nan), np.zeros(len(rows)), at
 
 
 def _with_changes(each: Sequence[tuple[Recording, Observation]]) -> tuple[Observation, ...]:
@@ -389,29 +374,20 @@ def _with_changes(each: Sequence[tuple[Recording, Observation]]) -> tuple[Observ
 
     Points of one time are neighbours in whatever file they are, if they were declared to be recorded alike.
     """
-    alike: dict[tuple[Any, ...], list[int]] = {}
+    alike: dict[tuple[Any, ...], list[tuple[int, int]]] = {}
     for number, (recording, observation) in enumerate(each):
         if isinstance(recording, PointsRecording):
             own = number if recording.sigma is None or recording.sigmas is not None else None
-            for time in np.unique(observation.times).tolist():
-                alike.setdefault((time, recording.reference, recording.sigma, own), []).append(number)
+            for row, time in enumerate(observation.times.tolist()):
+                alike.setdefault((time, recording.reference, recording.sigma, own), []).append((number, row))
     changes = [observation.over_element.copy() for _, observation in each]
-    for (time, *_), numbers in alike.items():
-        rows = [np.flatnonzero(each[k][1].times == time) for k in numbers]
-        points, moved = (
-            np.concatenate(
-                [getattr(each[k][0], name)[each[k][1].rows[those]] for k, those in zip(numbers, rows, strict=True)]
-            )
-            for name in ("points", "displacement")
-        )
-        edges = np.concatenate([each[k][1].edges[those] for k, those in zip(numbers, rows, strict=True)])
-        found = change_over_element(points, moved, edges)
-        parts = np.split(found, np.cumsum([len(own) for own in rows])[:-1])
-        for k, those, part in zip(numbers, rows, parts, strict=True):
-            changes[k][those] = part
-    return tuple(
-        replace(observation, over_element=change) for (_, observation), change in zip(each, changes, strict=True)
-    )
+    for members in alike.values():
+        rows = [(each[number][0], each[number][1].rows[row]) for number, row in members]
+        points, moved = (np.array([getattr(one, name)[k] for one, k in rows]) for name in ("points", "displacement"))
+        edges = np.array([each[number][1].edges[row] for number, row in members])
+        for (number, row), change in zip(members, change_over_element(points, moved, edges), strict=True):
+            changes[number][row] = change
+    return tuple(replace(one, over_element=change) for (_, one), change in zip(each, changes, strict=True))
 
 
 def _sigma(recording: Recording, rows: Ints, weights: Floats) -> Floats | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from warpbrain.errors import InputError
-from warpbrain.estimation.discretisation import Discretisation
+from warpbrain.estimation.finer_mesh import Discretisation
 from warpbrain.estimation.likelihood import Likelihood
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
-from warpbrain.gp.coordinates import Coordinate, coordinates, from_coordinates, to_coordinates
+from warpbrain.gp.coordinates import Coordinate, coordinates, laws_from, to_coordinates
 from warpbrain.physics.laws import Law, NeoHookean
 from warpbrain.physics.laws.stability import require_stable
 from warpbrain.physics.mechanism import Substituting
@@ -25,14 +25,7 @@ _REACH = {"ln(mu0 / Pa)": 1.0, "C2 / (C1 + C2)": 0.5, "alpha": 4.0}
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of `theta`.
-
-    Attributes
-    ----------
-    tissue : str
-    coordinate : Coordinate
-        What it is of the tissue's law; see `warpbrain.gp.coordinates`.
-    """
+    """One number of `theta`: a coordinate of a tissue's law (`warpbrain.gp.coordinates`)."""
 
     tissue: str
     coordinate: Coordinate
@@ -53,32 +46,20 @@ class Parameters:
     """What `theta` means in a case.
 
     Tissues that name one group of the generative model are one tissue: they share their parameters.
-
-    Attributes
-    ----------
-    labels : tuple of tuples of int
-        For each tissue its labels in the simulated mesh, increasing.
-    tissues, groups, laws_of, formulations : tuple of str
-        Name of each, group of the generative model (may be empty), law and formulation.
-    poisson : float
-        Ratio at rest, which is kept: that of the case, or what a mechanism says that it is.
     """
 
-    labels: tuple[tuple[int, ...], ...]
-    tissues: tuple[str, ...]
-    groups: tuple[str, ...]
+    labels: tuple[tuple[int, ...], ...]  # of each tissue in the simulated mesh, increasing
+    tissues: tuple[str, ...]  # names
+    groups: tuple[str, ...]  # of the generative model; may be empty
     laws_of: tuple[str, ...]
     formulations: tuple[str, ...]
-    poisson: float
+    poisson: float  # ratio at rest, which is kept: that of the case, or what a mechanism says that it is
 
     @classmethod
     def of(cls, case: Case) -> Parameters:
         """The parameters of a case's tissues; those that were resected whole have none.
 
-        Raises
-        ------
-        InputError
-            If tissues of one group have different laws or formulations, or a mechanism says what law tissues have.
+        `InputError` if tissues of one group have different laws or formulations, or a mechanism says what law it is.
         """
         members: dict[str, list[int]] = {}
         for label in case.remaining[0].labels:
@@ -138,13 +119,7 @@ class Parameters:
         return np.array([parameter.is_modulus for parameter in self])
 
     def theta_of(self, laws: Sequence[Law]) -> Floats:
-        """The vector (p,) of the law of each tissue.
-
-        Raises
-        ------
-        InputError
-            If a tissue has another law than in the case, or an Ogden law of several terms.
-        """
+        """The vector (p,) of the law of each tissue; `InputError` if it is not as in the case, or of several terms."""
         found: list[float] = []
         for law, tissue, name in zip(laws, self.tissues, self.laws_of, strict=True):
             if law.name != name:
@@ -153,22 +128,11 @@ class Parameters:
         return np.array(found)
 
     def laws(self, theta: ArrayLike) -> tuple[Law, ...]:
-        """The law of each tissue.
-
-        Raises
-        ------
-        InputError
-            If `theta` is not as long as there are parameters, or not finite.
-        """
+        """The law of each tissue; `InputError` if `theta` is not as long as there are parameters, or not finite."""
         point = np.asarray(theta, dtype=np.float64)
         if point.shape != (len(self),) or not np.isfinite(point).all():
             raise InputError(f"theta = {point.tolist()}: expected {len(self)} numbers: {', '.join(self.names)}")
-        laws, at = [], 0
-        for name in self.laws_of:
-            size = len(coordinates(name))
-            laws.append(from_coordinates(name, point[at : at + size].tolist()))
-            at += size
-        return tuple(laws)
+        return laws_from(self.laws_of, point.tolist())
 
     def materials(self, theta: ArrayLike) -> dict[int, Material]:
         """Materials by tissue label; `InputError` as from `laws`."""

@@ -10,15 +10,14 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
-from warpbrain.estimation.chain import Chain
-from warpbrain.estimation.discretisation import DiscretisationError
+from warpbrain.estimation.finer_mesh import DiscretisationError
+from warpbrain.estimation.fit import Estimate, probabilities
 from warpbrain.estimation.identifiability import Identifiability, identifiability
-from warpbrain.estimation.importance import Importance
-from warpbrain.estimation.modes import Estimate, probabilities
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.prediction import OverallErrors, Prediction, predictions
+from warpbrain.estimation.sampling import Chain, Importance
 from warpbrain.gp.prior import Prior
 from warpbrain.shown import Shown
 
@@ -32,13 +31,10 @@ class Marginal:
     parameter : Parameter
     estimate : float
         The most probable value.
-    mean, deviation : float
-        Of the posterior.
-    interval : (float, float)
-        95 % of the posterior lie between, as much below as above.
-    prior_mean, prior_deviation : float
-    prior_interval : (float, float)
-        95 % of the prior.
+    mean, deviation, prior_mean, prior_deviation : float
+        Of posterior and prior.
+    interval, prior_interval : (float, float)
+        95 % of the posterior and of the prior lie between, as much below as above.
     """
 
     parameter: Parameter
@@ -142,8 +138,10 @@ class Posterior(Shown):
 
     def probability_below(self, theta: Floats) -> Floats:
         """Of each parameter, shape (p,), that it is less than that of a vector (p,)."""
+        from scipy.special import ndtr
+
         if self.chain is None:
-            return self.best.laplace.probability_below(theta)
+            return np.asarray(ndtr((theta - self.theta) / self.best.laplace.standard_deviations))
         return np.asarray(np.mean(self.chain.theta < theta, axis=0))
 
     @cached_property
@@ -151,20 +149,12 @@ class Posterior(Shown):
         """Each parameter."""
         prior = np.percentile(self.prior.theta, [2.5, 97.5], axis=0).T
         mean = self.theta if self.chain is None else self.chain.theta.mean(axis=0)
-        interval = self.interval(0.95)
-        deviations = np.sqrt(np.diag(self.covariance))
+        deviations, of_prior = (np.sqrt(np.diag(C)) for C in (self.covariance, self.prior.covariance))
+        columns = self.theta, mean, deviations, self.interval(0.95), self.prior.mean, of_prior, prior
+        each = zip(self.parameters, *(column.tolist() for column in columns), strict=True)
         return tuple(
-            Marginal(
-                parameter,
-                float(self.theta[k]),
-                float(mean[k]),
-                float(deviations[k]),
-                (float(interval[k, 0]), float(interval[k, 1])),
-                float(self.prior.mean[k]),
-                float(np.sqrt(self.prior.covariance[k, k])),
-                (float(prior[k, 0]), float(prior[k, 1])),
-            )
-            for k, parameter in enumerate(self.parameters)
+            Marginal(one, top, middle, sd, (low, high), prior_mean, prior_sd, (least, most))
+            for one, top, middle, sd, (low, high), prior_mean, prior_sd, (least, most) in each
         )
 
     @cached_property
@@ -191,13 +181,10 @@ class Posterior(Shown):
     @cached_property
     def predictions(self) -> tuple[Prediction, ...]:
         """Recordings that were fitted, then those that check; these are looked at here for the first time."""
-        fitted = self.best.problem.observations
-        both = (("fit", fitted), ("check", Observations.to_check(self.case, self.best.problem.forward.moments)))
-        return tuple(
-            one
-            for role, observations in both
-            for one in predictions(self.case, self.best, role, observations, self.joint_covariance)
-        )
+        problem, about = self.best.problem, (self.case, self.best)
+        unseen = Observations.to_check(self.case, problem.forward.moments)
+        both = (("fit", problem.observations), ("check", unseen))
+        return tuple(one for pair in both for one in predictions(*about, *pair, self.joint_covariance))
 
     @property
     def overall_errors(self) -> tuple[OverallErrors, ...]:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
-from warpbrain.estimation.likelihood import Noise, Rows
-from warpbrain.estimation.modes import Estimate
-from warpbrain.estimation.observations import Observation, Observations, Residuals
+from warpbrain.estimation.fit import Estimate
+from warpbrain.estimation.likelihood import Noise
+from warpbrain.estimation.observations import Observations, Sensors
 from warpbrain.estimation.registration import realigned
-from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import with_gross_errors
 from warpbrain.recordings.agreement import by_unit
 from warpbrain.recordings.comparison import Comparison
 from warpbrain.simulation.mesh_error import Found
@@ -96,80 +94,65 @@ class OverallErrors:
     def of(cls, each: Sequence[Prediction]) -> tuple[OverallErrors, ...]:
         """Of each role that has any."""
         found = []
-        for role in dict.fromkeys(one.role for one in each):
+        for role in dict.fromkeys(one.role for one in each if one.unit == "m"):
             lengths = [one for one in each if one.role == role and one.unit == "m"]
-            if lengths:
-                before = by_unit((one.unit, one.run.residuals_before) for one in lengths)["m"]
-                after = by_unit((one.unit, one.fitted.residuals_after) for one in lengths)["m"]
-                of_run = by_unit((one.unit, one.run.residuals_after) for one in lengths)["m"]
-                found.append(cls(role, sum(one.fitted.count for one in lengths), before, after, of_run))
+            residuals = (
+                [one.run.residuals_before for one in lengths],
+                [one.fitted.residuals_after for one in lengths],
+                [one.run.residuals_after for one in lengths],
+            )
+            errors = (by_unit(("m", one) for one in values)["m"] for values in residuals)
+            found.append(cls(role, sum(one.fitted.count for one in lengths), *errors))
         return tuple(found)
 
 
 def predictions(
     case: Case, estimate: Estimate, role: str, observations: Observations, joint: Floats
 ) -> tuple[Prediction, ...]:
-    """Recordings of one role beside an estimate.
+    """Recordings of one role, ``"fit"`` or ``"check"``, beside an estimate.
 
-    Parameters
-    ----------
-    case : Case
-    estimate : Estimate
-    role : {"fit", "check"}
-    observations : Observations
-        Of that role.
-    joint : (p + q, p + q) array
-        Covariance of parameters and nuisances.
+    `joint` (p + q, p + q) is the covariance of parameters and nuisances.
     """
+    if not observations.recordings:
+        return ()
     problem, point, derivatives = estimate.problem, estimate.point, estimate.linearised
     centre, motion = problem.observations.centre, problem.nuisances.motion(point.nuisances)
     rest = np.zeros_like(point.state.u)
     seen = problem.nuisances.observed(point.state, point.nuisances)
-    before, parts = observations.at(rest, rest, centre), observations.at(*seen, centre, motion)
+    before, after = observations.at(rest, rest, centre), observations.at(*seen, centre, motion)
     moments = problem.forward.moments
     run = compared(case, point.state.u, point.state.reactions, moments)
     fitted = compared(realigned(case, motion, centre), *seen, moments)
+    jacobian = problem.nuisances.jacobian(after, point.state.theta, point.nuisances, derivatives.du, derivatives.dR)
+    deviations = np.sqrt(np.einsum("np,pq,nq->n", jacobian, joint, jacobian))
     found = []
-    for number, (observation, first, part) in enumerate(zip(observations.recordings, before, parts, strict=True)):
-        jacobian = problem.nuisances.jacobian(
-            part, point.state.theta, point.nuisances, (derivatives.du, derivatives.dR)
-        )
-        deviation = np.sqrt(np.einsum("ndp,pq,ndq->nd", jacobian, joint, jacobian))
-        noise, own = point.known_noise, number
+    for number, name in enumerate(after.names):
+        members = np.flatnonzero(after.recordings == number)
+        parts = [one for one in observations.recordings if one.name == name]
+        rows, first = np.concatenate([one.rows for one in parts]), parts[0]
+        shape = len(rows), first.size
+        seen_rows, noise = after.of_rows(members), point.noise
         if role != "fit":
-            noise, own = _unseen(observation, part, jacobian, joint, noise), 0
-        known = role == "fit" or observation.sigma is not None
-        sigma, of_noise, gross = noise.of_recording(own, part.values.shape)
-        found.append(
-            Prediction(
-                observation.name,
-                observation.kind,
-                role,
-                observation.unit,
-                observation.rows,
-                first.values,
-                part.values,
-                sigma if known else None,
-                deviation,
-                gross,
-                coverage(part.values, np.hypot(deviation, of_noise), gross) if known else None,
-                run[observation.name],
-                fitted[observation.name],
-            )
-        )
+            noise = _unseen(seen_rows, jacobian[members], joint, noise)
+        own = members if role == "fit" else members - members[0]
+        known = role == "fit" or first.sigma is not None
+        gross = noise.gross[[k for k, at in enumerate(noise.rows.points) if own[0] <= at[0] <= own[-1]]]
+        gross = gross if len(gross) else np.zeros(len(rows), dtype=bool)
+        residual, deviation = seen_rows.residual.reshape(shape), deviations[members].reshape(shape)
+        within = coverage(residual, np.hypot(deviation, noise.deviation[own].reshape(shape)), gross) if known else None
+        sigma = (noise.scale * noise.sigma)[own].reshape(shape)[:, 0] if known else None
+        about = name, first.kind, role, first.unit, rows, before.residual[members].reshape(shape), residual
+        found.append(Prediction(*about, sigma, deviation, gross, within, run[name], fitted[name]))
     return tuple(found)
 
 
-def _unseen(observation: Observation, part: Residuals, jacobian: Floats, joint: Floats, fitted: Noise) -> Noise:
+def _unseen(rows: Sensors, jacobian: Floats, joint: Floats, fitted: Noise) -> Noise:
     """The noise of a recording that was not fitted, its gross errors beside what the estimate knows of it."""
-    rows = replace(Rows.of(Observations((observation,), ()), (part,)), unresolved=fitted.rows.unresolved)
-    noise = Noise(rows, rows.sigma, fitted.scale, np.ones(len(rows.points)), fitted.outliers)
-    if observation.sigma is None or fitted.outliers is None:
+    sigma = np.where(np.isnan(rows.sigma), 1.0 / np.sqrt(rows.weights), rows.sigma)
+    noise = Noise(rows, sigma, fitted.scale, np.ones(len(rows.points)), fitted.outliers, fitted.unresolved)
+    if np.isnan(rows.sigma).any():
         return noise
-    columns = jacobian.reshape(-1, jacobian.shape[2]) @ np.linalg.cholesky(joint)
-    model = GaussianModel(noise.factor, columns, noise.scale)
-    found = with_gross_errors(model, part.values.ravel(), rows.points, fitted.outliers)
-    return replace(noise, inflation=found.inflation)
+    return noise.with_gross_errors(rows.residual, jacobian @ np.linalg.cholesky(joint))
 
 
 def compared(case: Case, u: Floats, reactions: Floats, moments: Moments) -> Mapping[str, Comparison]:

@@ -1,4 +1,9 @@
-"""Likelihood times prior of a case's parameters, at a point and to first order about it."""
+"""Likelihood times prior of a case's parameters, at a point and to first order about it.
+
+Beside the tissue nuisances are estimated: what acts on the recordings and is no property of it, the error of the mesh
+(`finer_mesh`), 37 numbers, and a rigid error of registration, six. Both have normal distributions beforehand and are
+integrated out of what is said of the tissue.
+"""
 
 from __future__ import annotations
 
@@ -8,47 +13,89 @@ from functools import cached_property
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.estimation.finer_mesh import NAMES as DISCRETISATION_NAMES
+from warpbrain.estimation.finer_mesh import Discretisation, DiscretisationError
 from warpbrain.estimation.forward import Forward, State
 from warpbrain.estimation.gaussian import Gaussian
-from warpbrain.estimation.likelihood import IndependentNoise, Likelihood, Noise, Rows
-from warpbrain.estimation.nuisances import Nuisances
-from warpbrain.estimation.observations import Observations, Residuals
+from warpbrain.estimation.likelihood import IndependentNoise, Likelihood, Noise
+from warpbrain.estimation.observations import Observations, Sensors
 from warpbrain.estimation.parameters import Parameters
-from warpbrain.estimation.prior_modes import PriorMode
+from warpbrain.estimation.prior import PriorMode
+from warpbrain.estimation.registration import NAMES as REGISTRATION_NAMES
+from warpbrain.inference.least_squares import minimise
+from warpbrain.recordings.registration import Registration
+
+#: Nuisances are at their best when the next step is shorter than this [standard deviations].
+_AT_BEST = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Nuisances:
+    """The nuisances of an estimation; a vector of q numbers holds those that there are, in this order."""
+
+    discretisation: Discretisation | None = None  # with `error`; without them states are taken for exact
+    error: DiscretisationError | None = None
+    registration: Registration | None = None  # without it positions are taken as they were recorded
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """With units."""
+        first = DISCRETISATION_NAMES if self.error is not None else ()
+        return first + (REGISTRATION_NAMES if self.registration is not None else ())
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @cached_property
+    def prior(self) -> Gaussian:
+        """Before anything was observed."""
+        means, deviations = [np.zeros(0)], [np.zeros(0)]
+        if self.error is not None and self.discretisation is not None:
+            means.append(self.discretisation.means)
+            deviations.append(self.discretisation.deviations)
+        if self.registration is not None:
+            means.append(np.zeros(6))
+            deviations.append(self.registration.deviations)
+        return Gaussian(np.concatenate(means), np.diag(np.concatenate(deviations) ** 2))
+
+    def observed(self, state: State, values: Floats) -> tuple[Floats, Floats]:
+        """Displacement and reactions (n, 3) without the error of the mesh."""
+        if self.error is None:
+            return state.u, state.reactions
+        u, reactions = self.error.at(state.theta, values[: len(DISCRETISATION_NAMES)])
+        return state.u + u, state.reactions + reactions
+
+    def motion(self, values: Floats) -> Floats:
+        """Rigid motion (6,) of what was recorded."""
+        return np.zeros(6) if self.registration is None else values[-6:]
+
+    def columns(self, rows: Sensors, theta: Floats, values: Floats) -> Floats:
+        """Derivatives (n, q) of the residuals of rows by the nuisances."""
+        blocks = [np.zeros((len(rows), 0))]
+        if self.error is not None:
+            blocks.append(-rows.answers_in_time(*self.error.by_values(theta, values[: len(DISCRETISATION_NAMES)])))
+        if self.registration is not None:
+            blocks.append(-rows.rigid)
+        return np.concatenate(blocks, axis=1)
+
+    def jacobian(self, rows: Sensors, theta: Floats, values: Floats, du: Floats, dR: Floats) -> Floats:
+        """Derivatives (n, p + q) of residuals by `theta`, from those of the state (p, n, 3), and by the nuisances."""
+        if self.error is not None:
+            more_du, more_dR = self.error.by_theta(values[: len(DISCRETISATION_NAMES)])
+            du, dR = du + more_du, dR + more_dR
+        return np.concatenate([-rows.answers_in_time(du, dR), self.columns(rows, theta, values)], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Parameters with everything that is known there.
-
-    Attributes
-    ----------
-    state : State
-    nuisances : (q,) array
-    parts : tuple of Residuals
-        With a rigid motion of what was recorded taken off.
-    residual : (n,) array
-        All of them, one after the other.
-    noise : Noise or IndependentNoise
-    misfit : float
-        `-ln` of the likelihood and of the nuisances' density.
-    objective : float
-        With that of the prior.
-    """
+    """Parameters with everything that is known there."""
 
     state: State
-    nuisances: Floats
-    parts: tuple[Residuals, ...]
-    residual: Floats
-    noise: Noise | IndependentNoise
-    misfit: float
-    objective: float
-
-    @property
-    def known_noise(self) -> Noise:
-        """The noise of an estimate, where it is always known."""
-        assert isinstance(self.noise, Noise)
-        return self.noise
+    nuisances: Floats  # (q,)
+    rows: Sensors  # with a rigid motion of what was recorded taken off
+    noise: Noise
+    misfit: float  # `-ln` of the likelihood and of the nuisances' density
+    objective: float  # with that of the prior
 
     @property
     def coordinates(self) -> Floats:
@@ -58,41 +105,19 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """Derivatives of the objective at a point by `theta` and the nuisances, p + q numbers.
+    """Derivatives of the objective at a point by `theta` and the nuisances, p + q numbers."""
 
-    Attributes
-    ----------
-    jacobian : (n, p + q) array
-        Of the residuals.
-    gradient : (p + q,) array
-    information : (p + q, p + q) array
-        Of the data alone.
-    hessian : (p + q, p + q) array
-        Of the objective, to first order in the residuals: positive definite.
-    du, dR : (p, N, 3) array
-        Derivatives of the displacement [m] and of the reactions [N].
-    """
-
-    jacobian: Floats
-    gradient: Floats
-    information: Floats
-    hessian: Floats
-    du: Floats
-    dR: Floats
+    jacobian: Floats  # (n, p + q), of the residuals
+    gradient: Floats  # (p + q,)
+    information: Floats  # (p + q, p + q), of the data alone
+    hessian: Floats  # of the objective, to first order in the residuals: positive definite
+    du: Floats  # (p, N, 3), of the displacement [m] by `theta`
+    dR: Floats  # (p, N, 3), of the reactions [N]
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is estimated from what.
-
-    Attributes
-    ----------
-    forward : Forward
-    observations : Observations
-    mode : PriorMode
-    likelihood : Likelihood
-    nuisances : Nuisances
-    """
+    """What is estimated from what."""
 
     forward: Forward
     observations: Observations
@@ -113,82 +138,50 @@ class Problem:
         both = self.mode.gaussian, self.nuisances.prior
         return Gaussian(np.concatenate([one.mean for one in both]), block_diag(*(one.covariance for one in both)))
 
-    def at(self, state: State, nuisances: Floats, noise: Noise | IndependentNoise | None = None) -> Point:
+    def at(self, state: State, nuisances: Floats, noise: Noise | None = None) -> Point:
         """The objective at a state; noise that is as large as the residuals are, unless it is known."""
-        motion = self.nuisances.motion(nuisances)
-        parts = self.observations.at(*self.nuisances.observed(state, nuisances), motion=motion)
-        residual = np.concatenate([part.values.ravel() for part in parts])
-        known = IndependentNoise.as_large_as(Rows.of(self.observations, parts), residual) if noise is None else noise
-        misfit = known.negative_log(residual) + self.nuisances.prior.negative_log(nuisances)
-        objective = misfit + self.mode.gaussian.negative_log(state.theta)
-        return Point(state, nuisances, parts, residual, known, misfit, objective)
+        seen = self.nuisances.observed(state, nuisances)
+        rows = self.observations.at(*seen, motion=self.nuisances.motion(nuisances))
+        known = IndependentNoise.as_large_as(rows) if noise is None else noise
+        misfit = known.negative_log(rows.residual) + self.nuisances.prior.negative_log(nuisances)
+        return Point(state, nuisances, rows, known, misfit, misfit + self.mode.gaussian.negative_log(state.theta))
 
     def linearise(self, point: Point, derivatives: tuple[Floats, Floats] | None = None) -> Linearised:
-        """Derivatives at a point.
-
-        Parameters
-        ----------
-        point : Point
-        derivatives : pair of (p, N, 3) arrays, optional
-            Of displacement and reactions there, if they are known.
-
-        Raises
-        ------
-        SolveError
-            If its equilibrium is unstable.
-        """
-        if derivatives is None:
-            found = self.forward.differentiate(point.state)
-            derivatives = found.u, found.reactions
-        jacobian = self._jacobian(point, derivatives)
-        gradient, information = _weighted(point, jacobian)
-        gradient += self.prior.gradient(point.coordinates)
-        return Linearised(jacobian, gradient, information, information + self.prior.precision, *derivatives)
+        """Derivatives at a point, from those of its state, or `SolveError` if that is unstable."""
+        du, dR = self.forward.differentiate(point.state) if derivatives is None else derivatives
+        jacobian = self.nuisances.jacobian(point.rows, point.state.theta, point.nuisances, du, dR)
+        J, r = point.noise.standardised(jacobian), point.noise.standardised(point.rows.residual)
+        gradient = J.T @ r + self.prior.gradient(point.coordinates)
+        return Linearised(jacobian, gradient, J.T @ J, J.T @ J + self.prior.precision, du, dR)
 
     def with_likely_noise(self, point: Point, linearised: Linearised) -> Point:
         """The point with the most probable noise, everything that is estimated integrated out about it."""
-        columns = linearised.jacobian @ self.prior.factor
-        expected = point.residual + linearised.jacobian @ (self.prior.mean - point.coordinates)
-        rows = Rows.of(self.observations, point.parts)
-        return self.at(point.state, point.nuisances, self.likelihood.noise(rows, point.residual, expected, columns))
+        columns, residual = linearised.jacobian @ self.prior.factor, point.rows.residual
+        expected = residual + linearised.jacobian @ (self.prior.mean - point.coordinates)
+        noise = self.likelihood.noise(point.rows, residual, expected, columns)
+        return self.at(point.state, point.nuisances, noise)
 
     def without_nuisances(self, state: State, start: Floats, noise: Noise) -> tuple[float, Point]:
         """`-ln` of the likelihood of a state with the nuisances integrated out (Laplace), and their best values.
 
         No equilibrium is solved: nuisances act on what is observed of the state.
         """
-        point = self.at(state, start, noise)
+        prior, point = self.nuisances.prior, self.at(state, start, noise)
         if len(self.nuisances) == 0:
             return point.misfit, point
-        for _ in range(20):
-            gradient, hessian = self._by_nuisances(point)
-            step = -np.linalg.solve(hessian, gradient)
-            decrement = float(-gradient @ step)
-            trial = self.at(state, point.nuisances + step, noise)
-            while trial.misfit > point.misfit and decrement > 1e-6:
-                step, decrement = 0.5 * step, 0.25 * decrement
-                trial = self.at(state, point.nuisances + step, noise)
-            point = trial if trial.misfit <= point.misfit else point
-            if decrement <= 1e-6:
-                break
-        _, hessian = self._by_nuisances(point)
-        return point.misfit + 0.5 * float(np.linalg.slogdet(hessian)[1]), point
+        size = prior.standard_deviations
 
-    def _by_nuisances(self, point: Point) -> tuple[Floats, Floats]:
-        gradient, hessian = _weighted(point, self._jacobian(point, None))
-        gradient += self.nuisances.prior.gradient(point.nuisances)
-        return gradient, hessian + self.nuisances.prior.precision
+        def rows(z: Floats) -> Floats:
+            nonlocal point
+            point = self.at(state, prior.mean + size * z, noise)
+            return np.concatenate([noise.standardised(point.rows.residual), z])
 
-    def _jacobian(self, point: Point, derivatives: tuple[Floats, Floats] | None) -> Floats:
-        """Derivatives (n, k) of the residuals, as `Nuisances.jacobian`."""
-        blocks = [
-            self.nuisances.jacobian(part, point.state.theta, point.nuisances, derivatives) for part in point.parts
-        ]
-        return np.concatenate([block.reshape(-1, block.shape[2]) for block in blocks])
+        def columns(z: Floats) -> Floats:
+            at = self.nuisances.columns(point.rows, state.theta, prior.mean + size * z)
+            return np.concatenate([noise.standardised(at * size), np.eye(len(z))])
 
-
-def _weighted(point: Point, jacobian: Floats) -> tuple[Floats, Floats]:
-    """Gradient (k,) of `-ln p` and its Hessian (k, k) to first order in the residuals."""
-    both = point.noise.standardised(np.column_stack([jacobian, point.residual]))
-    J, r = both[:, :-1], both[:, -1]
-    return J.T @ r, J.T @ J
+        z, _ = minimise(rows, columns, (start - prior.mean) / size, _AT_BEST)
+        rows(z)
+        W = columns(z)
+        log_volume = np.linalg.slogdet(W.T @ W)[1] - 2.0 * np.log(size).sum()
+        return point.misfit + 0.5 * float(log_volume), point

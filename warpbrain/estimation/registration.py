@@ -1,12 +1,8 @@
 """A rigid error of registration: what was recorded may lie turned and shifted against the anatomy.
 
-One motion is common to all recorded positions of a case,
-
-    x -> R(omega) (x - c) + c + t
-
-with `c` their mean and `R` the rotation by the angle `|omega|` about `omega`. It is no property of the tissue: it is
-estimated along with the tissue's parameters, and integrated out of what is said of them. Turns are finite: 5 degrees at
-80 mm is 0.3 mm more than its first order.
+One motion is common to all recorded positions of a case, `x -> R(omega) (x - c) + c + t`, with `c` their mean and `R`
+the rotation by the angle `|omega|` about `omega`. It is no property of the tissue: it is estimated along with it, and
+integrated out of what is said of it. Turns are finite: 5 degrees at 80 mm is 0.3 mm more than its first order.
 """
 
 from __future__ import annotations
@@ -60,13 +56,7 @@ def rigid_columns(positions: Floats, centre: Floats) -> Floats:
 def realigned(case: Case, motion: Floats, centre: Floats) -> Case:
     """The case as if its recordings had not been moved, so that points of a surface are compared with the right faces.
 
-    Parameters
-    ----------
-    case : Case
-    motion : (6,) array
-        Shift [m] and turn [rad].
-    centre : (3,) array
-        Of the turn [m].
+    `motion` (6,) is shift [m] and turn [rad] about `centre` (3,) [m].
     """
     if not motion.any():
         return case

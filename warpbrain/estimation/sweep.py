@@ -33,19 +33,10 @@ VALUES: Steps = tuple(np.linspace(-2.0, 2.0, 17).tolist())
 
 @dataclass(frozen=True)
 class SweepPoint:
-    """One equilibrium of a sweep.
+    """One equilibrium of a sweep: `k` of each tissue, and the parameters of the laws of these curves.
 
-    Attributes
-    ----------
-    k : tuple of float
-        Of each tissue.
-    theta : tuple of float
-        Parameters of the laws of these curves.
-    error : float or None
-        Root mean square distance at the recordings that are fitted [m] (of forces [N], if only forces were recorded);
-        None if there is no equilibrium.
-    reason : str
-        Why there is none.
+    `error` is the root mean square distance at the recordings that are fitted [m] (of forces [N], if only forces were
+    recorded); None if there is no equilibrium, for this `reason`.
     """
 
     k: Steps
@@ -56,15 +47,7 @@ class SweepPoint:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A finished sweep.
-
-    Attributes
-    ----------
-    parameters : Parameters
-    unit : {"m", "N"}
-        Of the errors.
-    points : tuple of SweepPoint
-    """
+    """A finished sweep; `unit` of its errors is m or N."""
 
     parameters: Parameters
     unit: str
@@ -75,12 +58,9 @@ class Sweep:
         """Of the least error; `SolveError` if no point has an equilibrium."""
         solved = [point for point in self.points if point.error is not None]
         if not solved:
-            raise SolveError(f"the sweep found no equilibrium at any of {len(self.points)} points: {self._reason}")
+            reason = self.points[0].reason if self.points else "it has none"
+            raise SolveError(f"the sweep found no equilibrium at any of {len(self.points)} points: {reason}")
         return min(solved, key=lambda point: point.error or 0.0)
-
-    @property
-    def _reason(self) -> str:
-        return self.points[0].reason if self.points else "it has none"
 
 
 def sweep(
@@ -91,25 +71,10 @@ def sweep(
     device: str | None = None,
     on_point: Callable[[SweepPoint], None] | None = None,
 ) -> Sweep:
-    """Sweep the curves of a generative model.
+    """Sweep the curves of a generative model over values of `k`; the case's laws say what kind each tissue has.
 
-    Parameters
-    ----------
-    case : Case
-        Its laws say what kind of law each tissue has.
-    model : Process
-    values : sequence of float
-        Of `k`.
-    known : mapping, optional
-        Points of an interrupted sweep by their `k`, which are not computed again.
-    device : str, optional
-    on_point : callable, optional
-        Called with each new point.
-
-    Raises
-    ------
-    InputError
-        If there is nothing to compare with, or a tissue has no group, or one that the model has seen no study of.
+    Points of an interrupted sweep that are known by their `k` are not computed again; each new one is told.
+    `InputError` if there is nothing to compare with, or a tissue has no group that the model has seen a study of.
     """
     moments = Moments.recorded(case)
     observations = Observations.to_fit(case, moments)

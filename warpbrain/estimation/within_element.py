@@ -3,10 +3,8 @@
 A wall that was cut out of elements is a staircase, and a linear element has one gradient. Where displacement changes
 much from place to place the mesh has a recorded point beside where it is, by a part of the edge of its element, and its
 displacement is wrong by that part of the change over an edge (errors in variables, by effective variances: Orear, Am.
-J. Phys. 50 (1982) 912). A finer mesh with the same wall does not show this error. It is local, and as large as what
-acts there; taken for noise alone it would look like a second force beside the first.
-
-The change is that of what was recorded, so that it is the same whatever is thought to act.
+J. Phys. 50 (1982) 912). A finer mesh with the same wall does not show this error; taken for noise alone it would look
+like a second force beside the first. The change is that of what was recorded: the same whatever is thought to act.
 """
 
 from __future__ import annotations
@@ -24,6 +22,9 @@ _ROUNDS, _LEAST = 6, 1e-3
 def change_over_element(points: Floats, displacement: Floats, edges: Floats) -> Floats:
     """Change of recorded displacement over an edge of the element in which each point is.
 
+    Gradients over each point and its neighbours are by least absolute deviations: a gross error is no gradient of its
+    neighbours, and what changes faster than tissue can is not tissue.
+
     Parameters
     ----------
     points, displacement : (n, 3) array
@@ -36,19 +37,11 @@ def change_over_element(points: Floats, displacement: Floats, edges: Floats) -> 
     (n, 3, 3) array
         Of each component of the displacement, along each axis [m]; zero of points that are too few to tell.
     """
+    from scipy.spatial import cKDTree
+
     neighbours = min(round(belief("mesh.neighbours")), len(points) - 1)
     if neighbours < 3:
         return np.zeros((len(points), 3, 3))
-    return edges[:, None, None] * _gradients(points, displacement, neighbours)
-
-
-def _gradients(points: Floats, displacement: Floats, neighbours: int) -> Floats:
-    """Gradients (n, 3, 3) of displacement over each point and its neighbours, by least absolute deviations.
-
-    A gross error is no gradient of its neighbours, and what changes faster than tissue can is not tissue.
-    """
-    from scipy.spatial import cKDTree
-
     near = cKDTree(points).query(points, neighbours + 1)[1]
     weights = np.ones((*near.shape, 1))
     least = _LEAST * float(np.median(np.linalg.norm(displacement, axis=1)))
@@ -63,4 +56,5 @@ def _gradients(points: Floats, displacement: Floats, neighbours: int) -> Floats:
         weights = 1.0 / np.maximum(left, least + np.finfo(float).tiny)
     steepest = belief("mesh.steepest")
     sizes = np.linalg.norm(gradients, ord=2, axis=(1, 2), keepdims=True)
-    return np.asarray((gradients * np.minimum(1.0, steepest / np.maximum(sizes, steepest))).transpose(0, 2, 1))
+    gradients *= np.minimum(1.0, steepest / np.maximum(sizes, steepest))
+    return np.asarray(edges[:, None, None] * gradients.transpose(0, 2, 1))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from warpbrain.errors import InputError
@@ -89,3 +90,12 @@ def from_coordinates(law: str, values: Sequence[float]) -> Law:
     if law == "mooney-rivlin":
         return MooneyRivlin(0.5 * modulus * (1.0 - values[1]), 0.5 * modulus * values[1])
     return Ogden((2.0 * modulus / values[1],), (values[1],))
+
+
+def laws_from(names: Sequence[str], values: Sequence[float]) -> tuple[Law, ...]:
+    """Laws by their names, of the coordinates of all of them, one after the other."""
+    ends = list(accumulate(len(coordinates(name)) for name in names))
+    return tuple(
+        from_coordinates(name, values[end - len(coordinates(name)) : end])
+        for name, end in zip(names, ends, strict=True)
+    )

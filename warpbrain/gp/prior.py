@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.gp.coordinates import Coordinate, coordinates, from_coordinates, to_coordinates
+from warpbrain.gp.coordinates import Coordinate, coordinates, laws_from, to_coordinates
 from warpbrain.gp.density import FoldedDensity
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import DrawnLaws, draw_many
@@ -172,12 +172,7 @@ class Prior:
             If it is not as long as there are parameters, or is of no law.
         """
         [point] = self._points(theta)
-        laws, at = [], 0
-        for name in self.laws_of:
-            size = len(coordinates(name))
-            laws.append(from_coordinates(name, point[at : at + size].tolist()))
-            at += size
-        return tuple(laws)
+        return laws_from(self.laws_of, point.tolist())
 
     def _points(self, theta: ArrayLike) -> Floats:
         points = np.atleast_2d(np.asarray(theta, dtype=np.float64))

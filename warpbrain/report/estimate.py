@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.estimation.laplace import Laplace
+from warpbrain.estimation.fit import Laplace
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
-from warpbrain.estimation.prediction import INTERVALS, OverallErrors, Prediction
+from warpbrain.estimation.prediction import INTERVALS, Prediction
 from warpbrain.estimation.registration import registration_of
+from warpbrain.estimation.sampling import Chain
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.fingerprints import fingerprints
@@ -26,8 +27,8 @@ _UNEXPLAINED = 0.3
 def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissue | None = None) -> dict[str, Any]:
     """Everything that is known of an estimate, with units in keys or beside the values; docs/estimation.md."""
     prior, parameters, case, options = posterior.prior, posterior.parameters, posterior.case, posterior.options
-    said = posterior.identifiability
-    gauss_newton = posterior.best
+    said, check, chain, best = posterior.identifiability, posterior.importance, posterior.chain, posterior.best
+    noise = best.point.noise
     return {
         "case": {"name": case.name, "title": case.title, "origin": case.origin, "assumptions": list(case.assumptions)},
         "inputs_sha256": fingerprints(case),
@@ -38,7 +39,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
             "weakly_informed": list(said.weakly_informed),
             "hidden": list(said.hidden),
             "scale_is_hidden": said.scale_is_hidden,
-            "directions": _directions(posterior.best.laplace),
+            "directions": _directions(best.laplace),
         },
         "parameters": [_describe(marginal, posterior) for marginal in posterior.marginals],
         "nothing_else": None if averaged is None else _describe_nothing_else(averaged),
@@ -46,27 +47,38 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
         "covariance": {"names": list(parameters.names), "matrix": posterior.covariance},
         "method": posterior.method,
         "check_of_laplace": {
-            "draws": len(posterior.importance.theta),
-            "pareto_k": posterior.importance.smoothed.k,
-            "effective_draws": posterior.importance.smoothed.effective,
-            "unstable_laws": posterior.importance.unstable,
-            "without_equilibrium": posterior.importance.failed,
-            "mean": posterior.importance.mean,
-            "standard_deviation": posterior.importance.standard_deviations,
+            "draws": len(check.theta),
+            "pareto_k": check.smoothed.k,
+            "effective_draws": check.smoothed.effective,
+            "unstable_laws": check.unstable,
+            "without_equilibrium": check.failed,
+            "mean": check.mean,
+            "standard_deviation": check.standard_deviations,
             "doubts": list(posterior.doubts),
         },
-        "chain": _describe_chain(posterior),
+        "chain": None if chain is None else _describe_chain(chain),
         "modes": [
-            {
-                "theta": mode.theta,
-                "probability": probability,
-                "share_of_prior": mode.problem.mode.share,
-            }
+            {"theta": mode.theta, "probability": probability, "share_of_prior": mode.problem.mode.share}
             for mode, probability in zip(posterior.modes, posterior.mode_probabilities, strict=True)
         ],
         "predictions": [_describe_prediction(prediction) for prediction in posterior.predictions],
-        "all_recordings": [_describe_overall(overall) for overall in posterior.overall_errors],
-        "likelihood": _describe_likelihood(posterior),
+        "all_recordings": [
+            {
+                "role": one.role,
+                "count": one.count,
+                "root_mean_square_before_mm": MILLIMETRES * one.before,
+                "root_mean_square_after_mm": MILLIMETRES * one.after,
+                "root_mean_square_of_run_mm": MILLIMETRES * one.of_run,
+            }
+            for one in posterior.overall_errors
+        ],
+        "likelihood": {
+            "density": "normal, shared by neighbours" + ("" if noise.outliers is None else ", with gross errors"),
+            "degrees_of_freedom": None,
+            "noise_scale": noise.scale,
+            "gross_share": 0.0 if noise.outliers is None else noise.outliers.probability,
+            "gross_times": [] if noise.outliers is None else noise.outliers.inflations[1:],
+        },
         "discretisation": describe_discretisation(posterior),
         "registration": describe_registration(posterior),
         "prior": {
@@ -80,10 +92,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
             "rejection_rate": prior.rejection_rate,
             "distance_from_gaussian": prior.distances,
         },
-        "gauss_newton": {
-            "converged": gauss_newton.converged,
-            "history": [vars(step) for step in gauss_newton.history],
-        },
+        "gauss_newton": {"converged": best.converged, "history": [vars(step) for step in best.history]},
         "remarks": remarks_of(posterior),
         "equilibria": dict(posterior.solves),
         "seconds": dict(posterior.seconds),
@@ -165,15 +174,9 @@ def _directions(laplace: Laplace) -> list[dict[str, Any]]:
     ]
 
 
-def _describe_chain(posterior: Posterior) -> dict[str, Any] | None:
-    if posterior.chain is None:
-        return None
-    return {
-        "draws": len(posterior.chain.theta),
-        "equilibria": posterior.chain.solves,
-        "accepted": posterior.chain.accepted,
-        "effective_draws": posterior.chain.effective,
-    }
+def _describe_chain(chain: Chain) -> dict[str, Any]:
+    drawn = {"draws": len(chain.theta), "equilibria": chain.solves}
+    return {**drawn, "accepted": chain.accepted, "effective_draws": chain.effective}
 
 
 def _describe_prediction(prediction: Prediction) -> dict[str, Any]:
@@ -204,28 +207,6 @@ def noise_of(prediction: Prediction) -> float | None:
         return None
     size = prediction.after.shape[1]
     return SHOWN[prediction.unit][0] * math.sqrt(size * float(np.mean(prediction.sigma**2)))
-
-
-def _describe_overall(overall: OverallErrors) -> dict[str, Any]:
-    return {
-        "role": overall.role,
-        "count": overall.count,
-        "root_mean_square_before_mm": MILLIMETRES * overall.before,
-        "root_mean_square_after_mm": MILLIMETRES * overall.after,
-        "root_mean_square_of_run_mm": MILLIMETRES * overall.of_run,
-    }
-
-
-def _describe_likelihood(posterior: Posterior) -> dict[str, Any]:
-    noise = posterior.best.point.known_noise
-    believed = noise.outliers
-    return {
-        "density": "normal, shared by neighbours" + ("" if believed is None else ", with gross errors"),
-        "degrees_of_freedom": None,
-        "noise_scale": noise.scale,
-        "gross_share": 0.0 if believed is None else believed.probability,
-        "gross_times": [] if believed is None else believed.inflations[1:],
-    }
 
 
 def describe_discretisation(posterior: Posterior) -> dict[str, Any] | None:

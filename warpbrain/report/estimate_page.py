@@ -143,7 +143,7 @@ def _causes(said: Mapping[str, Any]) -> str:
     if nothing is None:
         return "<p>It was not asked what else may act.</p>"
     causes = [
-        [text(one["name"]), percent(one["probability"])] for one in nothing["causes"] if one["probability"] >= 0.01
+        [text(one["name"]), percent(one["probability"])] for one in nothing["causes"] if one["probability"] >= _LIKELY
     ]
     tissue = [
         [

@@ -111,7 +111,7 @@ def _check_lines(posterior: Posterior) -> list[str]:
             f"  chain of {chain.solves} equilibria, {100 * chain.accepted:.0f} % accepted, worth "
             f"{chain.effective.min():.0f} independent draws"
         )
-    lines.append(f"  noise: {posterior.best.point.known_noise.scale:.2f} times as large as declared")
+    lines.append(f"  noise: {posterior.best.point.noise.scale:.2f} times as large as declared")
     mesh, registration = describe_discretisation(posterior), describe_registration(posterior)
     if mesh is not None:
         lines.append(

@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.estimation.discretisation import Discretisation
-from warpbrain.estimation.finer_mesh import ROUGH, Difference, FinerMesh
+from warpbrain.estimation.finer_mesh import ROUGH, Difference, Discretisation, FinerMesh
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.physics.proposal import Proposal
 from warpbrain.simulation.model import Material

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.estimation.discretisation import Discretisation
+from warpbrain.estimation.finer_mesh import Discretisation
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.registration import registration_of
 from warpbrain.inference.beliefs import belief, beliefs

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.estimation.likelihood import Likelihood, Rows
+from warpbrain.estimation.likelihood import Likelihood
 from warpbrain.recordings.agreement import root_mean_square
-from warpbrain.worlds.body.sensors import Sensors, rows_of_points
+from warpbrain.worlds.body.sensors import Sensors
 
 
 def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Floats) -> Floats:
@@ -27,21 +29,13 @@ def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Float
         return sensors.sigma
     lengths = sensors.is_displacement
     size = root_mean_square(residual[lengths]) if lengths.any() else 0.0
-    recordings = np.unique(sensors.recordings)
-    rows = Rows(
-        sensors.positions,
-        sensors.directions,
-        np.where(undeclared, 1.0 / np.sqrt(sensors.weights), sensors.sigma),
-        np.searchsorted(recordings, sensors.recordings),
-        np.array([not undeclared[sensors.recordings == number].any() for number in recordings.tolist()]),
-        tuple(rows for group in rows_of_points(sensors) for rows in group),
-        sensors.times,
-    )
     columns = np.column_stack([nuisances, max(size, 1e-9) * field])
     # a smooth fit as rough as the residuals are: what it leaves is where the search begins
     typical = max(float(np.median(np.abs(residual))), 1e-12)
     W = columns / typical
     left = residual - columns @ np.linalg.solve(np.eye(W.shape[1]) + W.T @ W, W.T @ (residual / typical))
-    found = Likelihood().noise(rows, left, residual, columns)
+    # what the mesh does not resolve is found with each set of causes
+    resolved = replace(sensors, over_element=np.zeros_like(sensors.over_element))
+    found = Likelihood().noise(resolved, left, residual, columns)
     # a factor on noise of which none is declared is its size
-    return found.sigma if rows.declared.any() else found.scale * found.sigma
+    return found.scale * found.sigma if undeclared.all() else found.sigma

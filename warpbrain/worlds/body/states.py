@@ -34,7 +34,7 @@ from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.consolidation import bound_term, consolidation
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.sensors import Sensors, sensors_at
+from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.stiffness_field import StiffnessField, stiffness_modes
 from warpbrain.worlds.body.surfaces import with_free_surfaces
 
@@ -343,7 +343,7 @@ class States:
             u = [each + share * expected.u for each, share in zip(u, shares, strict=True)]
             pairs = zip(reactions, of_reactions, strict=True)
             reactions = [each + share * expected.reactions for each, share in pairs]
-        sensors = sensors_at(self.observations, np.concatenate(u), np.concatenate(reactions), self.centre)
+        sensors = self.observations.at(np.concatenate(u), np.concatenate(reactions), self.centre)
         if len({id(instant.system) for instant in instants}) == 1 and sensors.is_counted_from_rest:
             return sensors
         return replace(sensors, share=shares[sensors.after] - np.where(sensors.before < 0, 0.0, shares[sensors.before]))

@@ -6,10 +6,9 @@ import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.declared_prior import declared, declared_deviations
 from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.parameters import Parameters
-from warpbrain.estimation.prior_modes import prior_modes, prior_of
+from warpbrain.estimation.prior import declared, declared_deviations, prior_modes, prior_of
 
 
 def tissue_prior(case: Case, parameters: Parameters) -> Gaussian:
