@@ -39,7 +39,7 @@ def test_a_test_across_the_tissue_is_one_of_turned_fibres():
     turned = replace(case, mechanisms=(replace(fibres, direction=(0.0, 0.0, 1.0)),))
     reference = Rig(turned, "cpu", options=EXACT).run(recorded("stretch", STRETCH), steps=3)
     np.testing.assert_allclose(result.response, reference.response, rtol=1e-9, atol=1e-9)
-    found = HomogeneousMaterial.of_case(case, (), along.turn).axial(result.imposed, None)
+    found = HomogeneousMaterial.of_case(case, (), along.turn).stress("axial", result.imposed, None)
     np.testing.assert_allclose(found, result.response, rtol=1e-5, atol=0.01)
 
 
@@ -48,7 +48,7 @@ def rods_with_fibres():
     case, rng, found = case_of(ROD), np.random.default_rng(4), []
     for name, axis in (("along", (1.0, 0.0, 0.0)), ("across", (0.0, 1.0, 0.0)), ("through", (0.0, 0.0, 1.0))):
         test = replace(recorded("stretch", STRETCH), axis=axis, name=name)
-        stress = HomogeneousMaterial.of_case(case, (fibres,), test.turn).axial(STRETCH, None)
+        stress = HomogeneousMaterial.of_case(case, (fibres,), test.turn).stress("axial", STRETCH, None)
         noise = 0.01 * np.abs(stress).max() * rng.normal(size=len(STRETCH))
         found.append(replace(test, response=stress + noise))
     return found
