@@ -115,9 +115,11 @@ def map_figure(anatomy: Anatomy) -> str:
     from matplotlib.patches import Circle
 
     threshold, where = anatomy.threshold, anatomy.said["map"]
+    extent = np.ptp(anatomy.mesh.points, axis=0)
+    tallest = max(float(extent[view.plane[1]] / extent[view.plane[0]]) for view in VIEWS)
 
     def draw(narrow: bool) -> Any:
-        figure, axes = panels(narrow, 3.6, 3)
+        figure, axes = panels(narrow, 1.3 + 2.7 * tallest, 3)
         tint: Any = None
         for panel, view in zip(axes, VIEWS, strict=True):
             section = anatomy.draw(panel, view)

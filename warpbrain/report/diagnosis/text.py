@@ -100,7 +100,7 @@ def _causes(said: Mapping[str, Any]) -> Iterator[str]:
             f"{name} {value['value']:.3g} ± {value['sd']:.2g} {value['unit']}".rstrip()
             for name, value in list(one["estimate"].items())[:3]
         )
-        d = f"{one['detectability']:8.1f}" if one["physics"] else " " * 8
+        d = f"{one['detectability']:8.1f}" if one["physics"] and one["detectability"] is not None else " " * 8
         numbers = f"{percent(one['probability']):>11} {one['log_evidence']:14.1f} {d}   {held}"
         yield f"  {one['mechanism']:<18} {numbers}      {estimate}".rstrip()
     rejected = [one for one in said["ranking"] if one["log_evidence"] is None]

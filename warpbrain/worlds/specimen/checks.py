@@ -52,17 +52,7 @@ class _Predicted:
 
 
 class Checker:
-    """Checks fits of one diagnosis.
-
-    Parameters
-    ----------
-    sets : Sets
-    protocol : Protocol
-        All recorded rows.
-    draws : int
-        Of rows in which nothing is left.
-    random : Generator
-    """
+    """Checks fits of one diagnosis by all recorded rows, with some draws of rows in which nothing is left."""
 
     def __init__(self, sets: Sets, protocol: Protocol, draws: int, random: np.random.Generator) -> None:
         self.sets, self.protocol, self._draws, self._random = sets, protocol, draws, random
@@ -81,7 +71,8 @@ class Checker:
     def of(self, fit: Fit) -> CheckResults:
         """Everything about a fit; of the base only its errors."""
         base = self.sets.base
-        scores, stresses = {}, {}
+        scores: dict[str, Score] = {}
+        stresses: dict[str, Floats] = {}
         for name, one in (("refitted", base), ("explained", fit))[: 1 if fit is base else 2]:
             predicted = self._predicted(one)
             stresses |= {name: predicted.stress, f"heldout {name}": predicted.held}
@@ -100,7 +91,7 @@ class Checker:
         if id(fit) not in self._predictions:
             # what has no name is known at thinned rows alone, and explains nothing of others
             assumed, z = fit.only(lambda effect: effect.kind is not Kind.UNKNOWN)
-            everywhere, z = fit.forward.of(self.protocol), np.concatenate([fit.z[: len(fit.forward)], z])
+            everywhere, z = fit.forward.of(protocol=self.protocol), np.concatenate([fit.z[: len(fit.forward)], z])
             whole = everywhere.stress(assumed, z)
             predicted, log_density = held_out(fit, self.folds)
             # of thinned rows it is known by how much it differs from the fit: smoothly
@@ -180,12 +171,7 @@ def _blocks(protocol: Protocol) -> Ints:
 def held_out(fit: Fit, folds: Folds) -> tuple[Floats, float]:
     """What a fit says of each fold's rows given the others: its causes fitted to these, and linear about that.
 
-    Returns
-    -------
-    stress : (n,) array
-        Predicted [Pa]; NaN where nothing was held out.
-    log_density : float
-        Of all folds.
+    Returns the predicted stress (n,) [Pa], NaN where nothing was held out, and the log density of all folds.
     """
     rows = fit.rows
     predicted, total = np.full(len(rows), np.nan), 0.0

@@ -134,7 +134,7 @@ class DiagnosingSpecimen:
             measurements = _next(ordered, base)
         with self.seconds.of("explained"):
             explained = _explained_case(best) if names else None
-        declared = forward.of(protocol).stress((), np.zeros(len(forward)))
+        declared = forward.of(protocol=protocol).stress((), np.zeros(len(forward)))
         ranking = _ranking(sets, ordered, checker)
         nothing = sets.nothing.hypothesis.log_evidence
         shows = None
@@ -237,7 +237,7 @@ def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[Ranked, ..
     found = []
     for effect in sets.effects:
         alone = sets.by_names.get(frozenset({effect.name}))
-        change, d = None, 0.0
+        change = d = None
         if alone is not None and alone.fit is not None:
             change = checker.heldout_rms(alone.fit) - checker.heldout_rms(base)
             moved = (alone.fit.stress - base.stress)[base.rows]

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,36 +56,22 @@ class Action:
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """One of the ways in which a cause may act, with k coefficients.
+    """One of the ways in which a cause may act, with k coefficients."""
 
-    Attributes
-    ----------
-    act : callable
-        From coefficients (k,) and the case without the cause to what it does.
-    mean, sd : (k,) array
-        Of the coefficients at the largest size that is plausible; normal.
-    nothing : (k,) array
-        Where it does nothing.
-    trials : tuple of (m, k) arrays
-        Coefficients whose effects, less what nothing does, are the columns of a place: one array a place.
-    values : callable
-        From coefficients to the numbers that users know.
-    one_sign : bool
-        Whether only sizes of the sign of the trials do anything.
-    region : str
-        In which way it acts, in words.
-    added : callable, optional
-        Of what only adds stress, from a protocol to the stress (n, k) of a unit of each coefficient.
-    """
-
+    #: From coefficients (k,) and the case without the cause to what it does.
     act: Callable[[Floats, Forward], Action]
+    #: Of the coefficients (k,) at the largest size that is plausible, normal; and where they do nothing.
     mean: Floats
     sd: Floats
     nothing: Floats
+    #: Coefficients (m, k) whose effects, less what nothing does, are the columns of a place: one array a place.
     trials: tuple[Floats, ...]
+    #: From coefficients to the numbers that users know.
     values: Callable[[Floats], tuple[float, ...]]
+    #: Whether only sizes of the sign of the trials do anything; in which way it acts, in words.
     one_sign: bool = False
     region: str = ""
+    #: Of what only adds stress, from a protocol to the stress (n, k) of a unit of each coefficient.
     added: Callable[[Protocol], Floats] | None = None
 
     @classmethod
@@ -119,18 +106,8 @@ class Variant:
 class Effect:
     """A cause with all its variants.
 
-    Attributes
-    ----------
-    name : str
-    kind : Kind
-    sentence : str
-    variants : tuple of Variant
-    names, units : tuple of str
-        Of what `Variant.values` says.
-    runs : bool
-        Whether `warpbrain run` can simulate it.
-    by_sign : (str, str) or None
-        Its sentence where its number is negative, and where it is positive, if these differ.
+    `names` and `units` are of what `Variant.values` says; `runs`, whether `warpbrain run` can simulate it; `by_sign`,
+    its sentence where its number is negative, and where it is positive, if these differ.
     """
 
     name: str
@@ -307,5 +284,9 @@ def unknown(protocol: Protocol) -> Effect:
         columns = smooth_patterns(protocol, reach)
         columns = columns[:, np.any(columns[protocol.fitted] != 0.0, axis=0)]
         size = belief("specimen.largest_unknown")
-        variants.append(Variant.of_many(size, columns.shape[1], added=lambda _, columns=columns: columns))
-    return Effect(UNKNOWN, Kind.UNKNOWN, "", tuple(variants))
+        variants.append(Variant.of_many(size, columns.shape[1], added=partial(_fixed, columns)))
+    return Effect(UNKNOWN, Kind.UNKNOWN, "Something acts that has no name.", tuple(variants))
+
+
+def _fixed(columns: Floats, protocol: Protocol) -> Floats:
+    return columns

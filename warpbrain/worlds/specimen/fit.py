@@ -31,24 +31,10 @@ _SAME = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Causes at their most probable coefficients.
+    """Causes at their most probable coefficients `z` (k,), in standard deviations, after some of the `rows` (n,).
 
-    Attributes
-    ----------
-    forward : Forward
-    assumed : tuple of Component
-    rows : (n,) bool array
-        That were fitted.
-    z : (k,) array
-        In standard deviations.
-    stress : (n,) array
-        At all rows of the protocol, fitted or not [Pa].
-    columns : (n, k) array
-        Change with each coefficient.
-    scale : float
-        Of the noise.
-    log_density : float
-        Of the fitted rows at this scale, with the scale's log probability.
+    `stress` (n,) [Pa] and its change `columns` (n, k) with each coefficient are of all rows of the protocol, fitted or
+    not; `log_density` is of the fitted ones at this `scale` of the noise, with the scale's log probability.
     """
 
     forward: Forward
@@ -100,21 +86,9 @@ class Fit:
 
 
 def fit(forward: Forward, assumed: tuple[Component, ...], z: Floats, scale: float = 1.0) -> Fit | None:
-    """Fit causes to all rows that may be fitted, with the noise and the glued ends of what is arrived at.
+    """Fit causes to all rows that may be fitted, from coefficients (k,) and a scale of the noise; None if none stands.
 
-    Parameters
-    ----------
-    forward : Forward
-    assumed : tuple of Component
-    z : (k,) array
-        Where it begins.
-    scale : float
-        Of the noise to begin with.
-
-    Returns
-    -------
-    Fit or None
-        None if none stands.
+    The noise and the glued ends are those of what is arrived at.
     """
     found = None
     for _ in range(_SETTLING):

@@ -60,28 +60,12 @@ class Component:
 
 
 class Forward:
-    """Stresses of causes of one case at the rows of a protocol; its length is the number of nuisances.
+    """Stresses of causes of one case at the rows of a protocol; its length is the number of nuisances, of `names`.
 
-    Parameters
-    ----------
-    case : Case
-    protocol : Protocol
-    ends : GluedEnds
-    glued : bool
-        Whether glued ends are computed; otherwise the state is taken for homogeneous.
-    law : HomogeneousMaterial, optional
-        Whose factor of glued ends is taken; the declared one if not given.
-    shape_of_law : bool
-        Whether the shape of the law and ends are among the nuisances: `run` has none but the case's.
-
-    Attributes
-    ----------
-    factor : (n,) array
-        Of glued ends: 1 where they are lubricated.
-    names : tuple of str
-        Of the nuisances.
-    logarithmic, scaled, added : (n, k) arrays
-        What they change: the logarithm of all stress; the simulated stress before it is scaled; and after [Pa].
+    With `glued` the `factor` (n,) of glued ends is that of a law, the declared one if none is given; otherwise the
+    state is taken for homogeneous. Without `shape_of_law` nuisances are those of a run, whose law and ends are the
+    case's. They change the logarithm of all stress (`logarithmic` (n, k)), the simulated stress before it is scaled
+    (`scaled`), or what is `added` after that [Pa].
     """
 
     def __init__(
@@ -94,25 +78,23 @@ class Forward:
         shape_of_law: bool = True,
     ) -> None:
         self.case, self.protocol, self.glued, self._ends = case, protocol, glued, ends
-        self._declared, self._shape_of_law = HomogeneousMaterial.of_case(case, ()), shape_of_law
+        self._declared = HomogeneousMaterial.of_case(case, ())
         self.law = law or self._declared
+        self._arguments = {"case": case, "protocol": protocol, "ends": ends, "glued": glued, "law": self.law,
+                           "shape_of_law": shape_of_law}  # fmt: skip
         self.factor = ends.factor(self.law, protocol) if glued else np.ones(len(protocol))
         self._responses: dict[str, Floats] = {}
         [tissue] = case.tissues.values()
         self.mu = tissue.known_law.shear_modulus
-        self._set_nuisances()
+        self._set_nuisances(shape_of_law)
 
     def __len__(self) -> int:
         return len(self.names)
 
     def of(
-        self,
-        protocol: Protocol | None = None,
-        law: HomogeneousMaterial | None = None,
-        shape_of_law: bool | None = None,
+        self, protocol: Protocol | None = None, law: HomogeneousMaterial | None = None, shape: bool = True
     ) -> Forward:
         """The same at the rows of another protocol, with glued ends of another law, or without the shape of the law."""
-        shape = self._shape_of_law if shape_of_law is None else shape_of_law
         return Forward(self.case, protocol or self.protocol, self._ends, self.glued, law or self.law, shape)
 
     @cached_property
@@ -125,8 +107,8 @@ class Forward:
         """Factor (n, n) of the noise."""
         return noise_factor(self.protocol)
 
-    def _set_nuisances(self) -> None:
-        protocol, shape = self.protocol, self._shape_of_law
+    def _set_nuisances(self, shape: bool) -> None:
+        protocol = self.protocol
         logs, names = [belief("specimen.modulus") * np.ones(len(protocol))], ["modulus"]
         if len(protocol.specimens) > 1:
             logs += list(belief("specimen.specimens") * specimen_rows(protocol).T)
@@ -167,15 +149,7 @@ class Forward:
         return HomogeneousMaterial.of_case(self.case, self.mechanisms(assumed, z))
 
     def stress(self, assumed: Sequence[Component], z: Floats) -> Floats:
-        """Nominal stress (n,) at all rows [Pa].
-
-        Raises
-        ------
-        InputError
-            If coefficients make no sense to a mechanism.
-        NoStateError
-            If there is no state.
-        """
+        """Nominal stress (n,) at all rows [Pa]; raises `InputError` of coefficients without sense, or `NoStateError`."""
         return self.stress_of(self.actions(assumed, z), z)
 
     def actions(self, assumed: Sequence[Component], z: Floats) -> list[Action]:

@@ -30,15 +30,7 @@ _QUANTITIES = {"axial": ("stretch", "stress"), "shear": ("displacement", "force"
 
 
 class GluedEnds:
-    """Factors of a specimen with its ends glued, for any law.
-
-    Parameters
-    ----------
-    case : Case
-    protocol : Protocol
-        All recorded rows.
-    device : str, optional
-    """
+    """Factors of a specimen with its ends glued, for any law, over the strains of all recorded rows."""
 
     def __init__(self, case: Case, protocol: Protocol, device: str | None = None) -> None:
         self._specimen = replace(specimen_of(case), grips="glued")

@@ -37,15 +37,7 @@ _OTHERS = {
 def effects_of(
     case: Case, protocol: Protocol, wanted: Sequence[str] | None = None
 ) -> tuple[tuple[Effect, ...], dict[str, str]]:
-    """Causes that are looked for, the unknown last, and why others are not.
-
-    Parameters
-    ----------
-    case : Case
-    protocol : Protocol
-        At whose rows an unknown is known.
-    wanted : sequence of str, optional
-        Names; all if absent.
+    """Causes that are looked for, the unknown last, and why others are not; all unless some are wanted by name.
 
     Raises
     ------

@@ -28,8 +28,8 @@ class Ranked:
         Of the cause alone against nothing.
     probability : float
         That it acts, whatever else does.
-    detectability : float
-        `d` of the effect that was fitted: its length in standard deviations of noise and nuisances.
+    detectability : float or None
+        `d` of the effect, fitted alone: its length in standard deviations of noise and nuisances.
     change : float or None
         Of the held-out error of all rows [Pa] with it alone; negative is better. None where it was not fitted.
     values : tuple of Value
@@ -41,7 +41,7 @@ class Ranked:
     kind: Kind
     log_evidence: float
     probability: float
-    detectability: float
+    detectability: float | None
     change: float | None
     values: tuple[Value, ...]
     region: str

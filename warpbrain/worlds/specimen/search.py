@@ -40,15 +40,9 @@ def _log_odds(kind: Kind) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """All causes that a fit does not have, to first order about it.
+    """All causes that a fit does not have, to first order about it, with columns at the fitted rows.
 
-    Attributes
-    ----------
-    fit : Fit
-    causes : tuple of Cause
-        With columns at the fitted rows.
-    components : tuple of tuples of Component
-        Of each place of each cause, at its largest size.
+    `components` are of each place of each cause, at its largest size.
     """
 
     fit: Fit
@@ -111,20 +105,11 @@ def _columns(fit: Fit, one: Component) -> Floats | None:
 
 @dataclass(frozen=True, eq=False)
 class CauseSet:
-    """A set of causes.
+    """A set of causes, and the linear model from which it was proposed; its evidence is Laplace's once it was fitted.
 
-    Attributes
-    ----------
-    hypothesis : Hypothesis
-        Its evidence is Laplace's once it was fitted.
-    linear : Linear
-        From which it was proposed.
-    spread : float
-        What other places and sizes than the best add to the log evidence, with the weight of the best; of the causes of
-        the linear model's own fit, and once fitted of all.
-    of_scale : float
-        The same of other scales of the noise, where no cause is added.
-    fit : Fit or None
+    `spread` is what other places and sizes than the best add to the log evidence, with the weight of the best: of the
+    causes of the linear model's own fit, and once fitted of all. `of_scale` is the same of other scales of the noise,
+    where no cause is added.
     """
 
     hypothesis: Hypothesis
@@ -140,15 +125,7 @@ class CauseSet:
 
 
 class Sets:
-    """All sets that were proposed.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-    base : Fit
-        Without any cause.
-    listener : Listener
-    """
+    """All sets of some effects that were proposed, by the names of their causes; `base` is the fit without any."""
 
     def __init__(self, effects: Sequence[Effect], base: Fit, listener: Listener) -> None:
         self.effects, self.base, self._listener = tuple(effects), base, listener
