@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
+from typing import Any
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class Forward:
         self.case, self.protocol, self.glued, self._ends = case, protocol, glued, ends
         self._declared = HomogeneousMaterial.of_case(case, ())
         self.law = law or self._declared
-        self._arguments = {"case": case, "protocol": protocol, "ends": ends, "glued": glued, "law": self.law,
+        self._arguments: dict[str, Any] = {"case": case, "protocol": protocol, "ends": ends, "glued": glued, "law": self.law,
                            "shape_of_law": shape_of_law}  # fmt: skip
         self.factor = ends.factor(self.law, protocol) if glued else np.ones(len(protocol))
         self._responses: dict[str, Floats] = {}
@@ -91,11 +92,9 @@ class Forward:
     def __len__(self) -> int:
         return len(self.names)
 
-    def of(
-        self, protocol: Protocol | None = None, law: HomogeneousMaterial | None = None, shape: bool = True
-    ) -> Forward:
-        """The same at the rows of another protocol, with glued ends of another law, or without the shape of the law."""
-        return Forward(self.case, protocol or self.protocol, self._ends, self.glued, law or self.law, shape)
+    def of(self, **changed: Any) -> Forward:
+        """The same with another `protocol`, `law` or `shape_of_law`."""
+        return Forward(**self._arguments | changed)
 
     @cached_property
     def sticking(self) -> Floats:
@@ -149,7 +148,7 @@ class Forward:
         return HomogeneousMaterial.of_case(self.case, self.mechanisms(assumed, z))
 
     def stress(self, assumed: Sequence[Component], z: Floats) -> Floats:
-        """Nominal stress (n,) at all rows [Pa]; raises `InputError` of coefficients without sense, or `NoStateError`."""
+        """Nominal stress (n,) at all rows [Pa]; raises `InputError` if a mechanism cannot be, or `NoStateError`."""
         return self.stress_of(self.actions(assumed, z), z)
 
     def actions(self, assumed: Sequence[Component], z: Floats) -> list[Action]:

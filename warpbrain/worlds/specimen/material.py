@@ -91,22 +91,11 @@ class HomogeneousMaterial:
         return material
 
     def stress(self, mode: str, strain: Floats, time: Floats | None) -> Floats:
-        """Nominal stress (n,) [Pa] of states one after the other.
+        """Nominal stress (n,) [Pa] of states one after the other; without times [s] nothing relaxes.
 
-        Parameters
-        ----------
-        mode : str
-            ``"axial"``, with free lateral faces, ``"confined"``, as wide as at rest, or ``"biaxial"``, stretched alike
-            along x and y; ``"shear"`` or ``"torsion"``.
-        strain : (n,) array
-            Stretch; shear, of torsion at the rim, where the stress is the torque over `int r dA`.
-        time : (n,) array or None
-            [s]; without times nothing relaxes.
-
-        Raises
-        ------
-        NoStateError
-            If free faces find no equilibrium.
+        The mode is ``"axial"``, with free lateral faces, ``"confined"``, as wide as at rest, ``"biaxial"``, stretched
+        alike along x and y, ``"shear"``, or ``"torsion"``, of which the strain is the shear at the rim and the stress
+        the torque over `int r dA`. Raises `NoStateError` if free faces find no equilibrium.
         """
         if mode == "shear":
             return self._shear(strain, time)

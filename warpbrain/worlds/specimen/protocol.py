@@ -34,46 +34,30 @@ REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0, "confined": 1.0, "biaxial": 
 
 @dataclass(frozen=True, eq=False)
 class Test:
-    """One test at n rows.
-
-    Attributes
-    ----------
-    name, mode, specimen : str
-    fitted : bool
-        Whether its role is to be fitted.
-    rows : (n,) int array
-        Of its recording.
-    strain, stress : (n,) array
-        Stretch or shear, and nominal stress [Pa].
-    time : (n,) array or None
-        [s]
-    strain_path : (n,) array
-        Absolute changes of strain so far, summed, over the largest strain.
-    sigma : float
-        Of a reading [Pa]: as declared, or as rough as the record is.
-    unit : float
-        Pascals of one unit of the recording's response.
-    peak, reach : float
-        Largest stress [Pa] and distance of a strain from rest of the whole record.
-    turn : (3, 3) array
-        From directions of the tissue to those of the machine.
-    """
+    """One test at n rows."""
 
     # not a test of pytest's
     __test__ = False
     name: str
     mode: str
     specimen: str
+    #: Whether its role is to be fitted.
     fitted: bool
+    #: Of its recording (n,).
     rows: Ints
+    #: Stretch or shear (n,), nominal stress (n,) [Pa], and time (n,) [s].
     strain: Floats
     stress: Floats
     time: Floats | None
+    #: Absolute changes of strain so far (n,), summed, over the largest strain.
     strain_path: Floats
+    #: Noise of a reading [Pa]: as declared, or as rough as the record is; pascals of one unit of what was recorded.
     sigma: float
     unit: float
+    #: Largest stress [Pa] and distance of a strain from rest of the whole record.
     peak: float
     reach: float
+    #: From directions of the tissue to those of the machine (3, 3).
     turn: Floats
 
     @property
