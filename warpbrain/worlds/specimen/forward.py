@@ -81,8 +81,9 @@ class Forward:
         self.case, self.protocol, self.glued, self._ends = case, protocol, glued, ends
         self._declared = HomogeneousMaterial.of_case(case, ())
         self.law = law or self._declared
-        self._arguments: dict[str, Any] = {"case": case, "protocol": protocol, "ends": ends, "glued": glued, "law": self.law,
-                           "shape_of_law": shape_of_law}  # fmt: skip
+        self._arguments: dict[str, Any] = dict(  # noqa: C408
+            case=case, protocol=protocol, ends=ends, glued=glued, law=self.law, shape_of_law=shape_of_law
+        )
         self.factor = ends.factor(self.law, protocol) if glued else np.ones(len(protocol))
         self._responses: dict[str, Floats] = {}
         [tissue] = case.tissues.values()
