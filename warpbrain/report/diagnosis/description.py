@@ -120,11 +120,14 @@ def _of_body(found: Diagnosis) -> dict[str, Any]:
             "intervals": [{"seconds": [a, b], "probability": p} for a, b, p in onset.intervals],
             "sizes": None if onset.sizes is None else asdict(onset.sizes),
         },
-        "ranking": [_ranked(one, axis) for one in found.ranking]
+        "ranking": [
+            _cause(one.kind, one.rejected_because, says=effect_sentence(one, axis), physics=one.physics,
+                   heldout_rmse_change=one.heldout_rmse_change, where=_place(one), **_numbers(one))
+            for one in found.ranking
+        ]
         + [
-            _cause(kind, why)
-            | {"says": sentence_of_kind(kind), "physics": kind in mechanisms()}
-            | {"heldout_rmse_change": None, "where": None}
+            _cause(kind, why, says=sentence_of_kind(kind), physics=kind in mechanisms(), heldout_rmse_change=None,
+                   where=None)
             for kind, why in found.rejected.items()
         ],
         "smallest_detectable": {
@@ -141,25 +144,21 @@ def _of_body(found: Diagnosis) -> dict[str, Any]:
             "significant": where.significant,
         },
         "equilibria": found.base.states.solves,
-    }
+    }  # fmt: skip
 
 
-def _cause(name: str, why: str = "") -> dict[str, Any]:
+def _cause(name: str, why: str = "", **known: Any) -> dict[str, Any]:
     """A row of a ranking; of a cause that was not tried, and why, nothing else is known."""
-    nothing = {"mechanism": name, "physics": True, "log_evidence": None, "probability": 0.0, "detectability": None}
-    return nothing | {"estimate": {}, "region": "", "rejected_because": why}
+    nothing = {"mechanism": name, "says": "", "physics": True, "log_evidence": None, "probability": 0.0}
+    return nothing | {"detectability": None, "estimate": {}, "region": "", "rejected_because": why} | known
 
 
-def _ranked(one: Ranked, gravity_axis: tuple[float, float, float] | None) -> dict[str, Any]:
-    return _cause(one.kind, one.rejected_because) | {
-        "says": effect_sentence(one, gravity_axis),
-        "physics": one.physics,
+def _numbers(one: Ranked | of_specimen.Ranked) -> dict[str, Any]:
+    return {
         "log_evidence": one.log_evidence,
         "probability": one.probability,
-        "heldout_rmse_change": one.heldout_rmse_change,
         "detectability": one.detectability,
         "estimate": _values(one.values),
-        "where": _place(one),
         "region": one.region,
     }
 
@@ -201,7 +200,7 @@ def _of_specimen(found: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
         and {"test": where.test, "mode": where.mode, "segment": where.segment, "strain": where.strain},
         "when": {"seconds": where.time} if where is not None and where.time is not None else None,
         "ranking": [_ranked_of_specimen(one) for one in found.ranking]
-        + [_cause(name, why) | {"says": "", "heldout_rmse_change_pa": None} for name, why in found.rejected.items()],
+        + [_cause(name, why, heldout_rmse_change_pa=None) for name, why in found.rejected.items()],
         "combinations": [asdict(one) for one in found.combinations],
         "before_checks": _decision(found.by_posterior),
         "smallest_detectable": {name: _smallest(name, one) for name, one in found.smallest.items()},
@@ -233,14 +232,6 @@ def _of_specimen(found: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
 
 
 def _ranked_of_specimen(one: of_specimen.Ranked) -> dict[str, Any]:
-    stands = math.isfinite(one.log_evidence)
-    return _cause(one.name, "" if stands else "no fit with it stands") | {
-        "says": specimen_sentences.effect_sentence(one),
-        "physics": one.kind is Kind.PHYSICS,
-        "log_evidence": one.log_evidence if stands else None,
-        "probability": one.probability,
-        "heldout_rmse_change_pa": one.change,
-        "detectability": one.detectability,
-        "estimate": _values(one.values),
-        "region": one.region,
-    }
+    why = "" if math.isfinite(one.log_evidence) else "no fit with it stands"
+    words = {"says": specimen_sentences.effect_sentence(one), "physics": one.kind is Kind.PHYSICS}
+    return _cause(one.name, why, **words, heldout_rmse_change_pa=one.change, **_numbers(one))

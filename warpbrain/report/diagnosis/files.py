@@ -139,15 +139,23 @@ class Recorded:
         return self.lengths & (self["set_aside"] == 0)
 
     @property
+    def aside(self) -> list[tuple[str, int, str]]:
+        """Recording, number and place [mm] of each point that was set aside as a gross error."""
+        places = [", ".join(f"{value:.1f}" for value in row) for row in self._axes("{}_mm")]
+        points = zip(self["recording"].tolist(), self["point"].tolist(), places, self["set_aside"], strict=True)
+        return list(dict.fromkeys(point[:3] for point in points if point[3]))
+
+    def _axes(self, name: str) -> Floats:
+        return np.column_stack([self[name.format(axis)] for axis in "xyz"])
+
+    @property
     def vectors(self) -> Vectors:
         """The points of the last time of each recording."""
         times = np.where(np.isnan(self["time_s"]), np.inf, self["time_s"])
         ends = {name: times[self["recording"] == name].max() for name in np.unique(self["recording"])}
         rows = self.lengths & (times == [ends[name] for name in self["recording"]])
         points, first, which = np.unique(self["point"][rows], return_index=True, return_inverse=True)
-        where, along = (
-            np.column_stack([self[name.format(axis)][rows] for axis in "xyz"]) for name in ("{}_mm", "direction_{}")
-        )
+        where, along = (self._axes(name)[rows] for name in ("{}_mm", "direction_{}"))
         left = {}
         for state in self.states:
             left[state] = np.zeros((len(points), 3))

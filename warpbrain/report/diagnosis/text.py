@@ -1,4 +1,4 @@
-"""A diagnosis as lines of text, made from its JSON."""
+"""A diagnosis as lines of text and as rows of tables, made from its JSON."""
 
 from __future__ import annotations
 
@@ -15,27 +15,92 @@ from warpbrain.report.files import MILLIMETRES
 _WIDTH = 110
 #: Times at which a size that changes is said; sets of causes and measurements that are.
 _TIMES, _SETS, _NEXT = 5, 6, 5
+Said = Mapping[str, Any]
 
 
-def diagnosis_lines(said: Mapping[str, Any]) -> list[str]:
+def diagnosis_lines(said: Said) -> list[str]:
     """The verdict on top, then sets of causes, each cause, the fit and what to do next."""
-    return [*_verdict(said), "", *_sets(said), "", *_causes(said), "", *_fit(said), *_further(said)]
+    return [*_verdict(said), "", *_causes(said), "", *_fit(said), *_further(said)]
 
 
-def _wrapped(sentence: str, following: str = "  ") -> list[str]:
-    return textwrap.wrap(sentence, _WIDTH, initial_indent="  ", subsequent_indent=following)
+def unit_of(said: Said) -> tuple[str, float, str]:
+    """Of errors: how keys of `diagnosis.json` end, a factor to what is shown, and its unit."""
+    return ("m", MILLIMETRES, "mm") if "rmse_m" in said["fit"] else ("pa", 1.0, "Pa")
 
 
-def _verdict(said: Mapping[str, Any]) -> Iterator[str]:
-    yield f"VERDICT: {said['verdict']}"
-    yield from _wrapped(said["sentence"])
-    if said["where"] is not None:
-        yield f"  where: {where_in_words(said['where'])}"
-    if said["when"] is not None:
-        yield f"  when: {when_in_words(said['when'])}"
+def set_rows(said: Said) -> list[list[str]]:
+    """The most probable sets of causes: which, with what probability, and the log evidence against nothing."""
+    sets = said.get("combinations", said.get("hypotheses"))
+    # of a specimen it is against nothing already
+    nothing = 0.0 if "combinations" in said else next((s["log_evidence"] for s in sets if not s["causes"]), 0.0)
+    return [
+        [" and ".join(s["causes"]) or "nothing", percent(s["probability"]), f"{s['log_evidence'] - nothing:+.1f}"]
+        for s in sets[:_SETS]
+    ]
 
 
-def where_in_words(where: Mapping[str, Any]) -> str:
+def candidate_rows(said: Said) -> list[list[str]]:
+    """Every candidate that was tried, the most probable first: name, probability, log evidence, `d`, change of the
+    held-out error, what it says, and why it is behind."""
+    suffix, factor, unit = unit_of(said)
+    rows = []
+    for one in said["ranking"]:
+        if one["log_evidence"] is not None:
+            held = one["heldout_rmse_change" if suffix == "m" else "heldout_rmse_change_pa"]
+            d = one["detectability"] if one["physics"] else None
+            numbers = f"{one['log_evidence']:+.1f}", "" if d is None else f"{d:.1f}"
+            change = "" if held is None else f"{factor * held:+.3g} {unit}"
+            words = one["says"], one["rejected_because"]
+            rows.append([one["mechanism"], percent(one["probability"]), *numbers, change, *words])
+    return rows
+
+
+def rejected_rows(said: Said) -> list[list[str]]:
+    """What was not tried, and why."""
+    return [[one["mechanism"], one["rejected_because"]] for one in said["ranking"] if one["log_evidence"] is None]
+
+
+def fit_rows(said: Said) -> list[list[str]]:
+    """Errors of each state, at what was fitted, held out, and only checked; beside them what others would reach."""
+    (suffix, factor, _), fit = unit_of(said), said["fit"]
+
+    def cell(value: Any) -> str:
+        if isinstance(value, dict):
+            return ", ".join(f"{name} {cell(one)}" for name, one in value.items())
+        return "" if value is None else f"{factor * value:.4g}"
+
+    columns = [fit[f"{key}_{suffix}"] or {} for key in ("rmse", "heldout_rmse", "check_rmse")]
+    known = (state for state in STATES if columns[0][state] is not None)
+    rows = [[STATES[state], *(cell(column.get(state)) for column in columns)] for state in known]
+    if fit.get("ceiling_heldout_rmse_m") is not None:
+        rows.append(["any smooth force without a name", "", cell(fit["ceiling_heldout_rmse_m"]), ""])
+    if fit.get("placebo_heldout_rmse_m") is not None:
+        between = " to ".join(map(cell, fit["placebo_heldout_rmse_m"]))
+        rows.append(["nine of ten patterns that mean nothing, with as many parameters", "", between, ""])
+    if fit.get("noise_rmse_m") is not None:
+        rows.append(["what noise alone leaves", cell(fit["noise_rmse_m"]), "", ""])
+    return rows
+
+
+def smallest_rows(said: Said) -> list[list[str]]:
+    """What these data would have shown of each mechanism, and from which size half would be named."""
+    rows = []
+    for kind, one in said["smallest_detectable"].items():
+        named = one.get("named_from")
+        # of what is there or not there is no size
+        of_size = named is not None and one["unit"] != "of being there"
+        rows.append([kind, one["says"], f"{named:.2g} {one['unit']}" if of_size else ""])
+    return rows
+
+
+def placebo_sentences(said: Said) -> list[str]:
+    """How often patterns that mean nothing do as well as what was added."""
+    fit, words = said["fit"], "pattern that means nothing does as well with p ="
+    together = [] if fit.get("placebo_p") is None else [f"A {words} {fit['placebo_p']:.2g}."]
+    return together or [f"{one['mechanism']}: a {words} {one['placebo_p']:.2g}." for one in fit["confirmations"]]
+
+
+def where_in_words(where: Said) -> str:
     """Where a mismatch is largest: a place in a body, or a part of a test."""
     if "test" in where:
         low, high = where["strain"]
@@ -46,103 +111,69 @@ def where_in_words(where: Mapping[str, Any]) -> str:
     return f"({x:z.1f}, {y:z.1f}, {z:z.1f}) mm in RAS, {within}; p = {where['global_p']:.2g} looking everywhere"
 
 
-def when_in_words(when: Mapping[str, Any]) -> str:
+def when_in_words(when: Said) -> str:
     """When something set in, how surely, and how it came."""
     first, last = when["seconds"]
     if "course" not in when:
         # of a laboratory test it is the part of the record
         return f"{first:.3g} to {last:.3g} s"
-    if when.get("sizes") is not None:
-        return _sizes_in_words(when["sizes"])
+    if (sizes := when.get("sizes")) is not None:
+        # at the first and the last time, and at a few between
+        rows = list(zip(sizes["seconds"], sizes["values"], sizes["deviations"], strict=True))
+        chosen = [rows[k] for k in sorted({round(k * (len(rows) - 1) / (_TIMES - 1)) for k in range(_TIMES)})]
+        each = (f"{measured(value, sd, sizes['unit'])} at {time:.3g} s" for time, value, sd in chosen)
+        return f"it changes with time: {sizes['says']} {', '.join(each)}"
     between = f"by {last:.3g} s" if first == 0.0 else f"between {first:.3g} and {last:.3g} s"
     sure = "" if when["probability"] is None else f" (probability {percent(when['probability'])})"
     course = f", {when['course']}" if when["course"] else ""
     return f"it set in {between}{sure}{course}"
 
 
-def _sizes_in_words(sizes: Mapping[str, Any]) -> str:
-    """A size over time: at the first and the last time, and at a few between."""
-    rows = list(zip(sizes["seconds"], sizes["values"], sizes["deviations"], strict=True))
-    chosen = sorted({round(k * (len(rows) - 1) / (_TIMES - 1)) for k in range(_TIMES)})
-    each = (f"{measured(value, sd, sizes['unit'])} at {time:.3g} s" for time, value, sd in (rows[k] for k in chosen))
-    return f"it changes with time: {sizes['says']} {', '.join(each)}"
+def _wrapped(sentence: str, following: str = "  ") -> list[str]:
+    return textwrap.wrap(sentence, _WIDTH, initial_indent="  ", subsequent_indent=following)
 
 
-def sets_of(said: Mapping[str, Any]) -> list[tuple[str, str, float]]:
-    """The most probable sets of causes: which, with what probability, and the log evidence against nothing."""
-    sets = said["combinations"] if "combinations" in said else said["hypotheses"]
-    nothing = next((one["log_evidence"] for one in sets if not one["causes"]), None)
-    against = 0.0 if "combinations" in said else nothing
-    return [
-        (" and ".join(one["causes"]) or "nothing", percent(one["probability"]), one["log_evidence"] - against)
-        for one in sets[:_SETS]
-        if against is not None
-    ]
+def _verdict(said: Said) -> Iterator[str]:
+    yield f"VERDICT: {said['verdict']}"
+    yield from _wrapped(said["sentence"])
+    if said["where"] is not None:
+        yield f"  where: {where_in_words(said['where'])}"
+    if said["when"] is not None:
+        yield f"  when: {when_in_words(said['when'])}"
 
 
-def _sets(said: Mapping[str, Any]) -> Iterator[str]:
+def _causes(said: Said) -> Iterator[str]:
     yield f"  p = {said['p_value']:.2g} that nothing is missing; the most probable sets of causes:"
-    for causes, probability, evidence in sets_of(said):
-        yield f"    {causes:<60} {probability:>10}   log evidence {evidence:+8.1f}"
+    for causes, probability, evidence in set_rows(said):
+        yield f"    {causes:<60} {probability:>10}   log evidence {evidence:>8}"
     if said["p_left"] is not None:
         yield f"  p = {said['p_left']:.2g} that nothing is left beside the causes that the verdict is about"
+    yield from ["", "  candidate          probability   log evidence        d    held-out RMSE    estimate"]
+    values = {one["mechanism"]: list(one["estimate"].items())[:3] for one in said["ranking"]}
+    for name, probability, evidence, d, change, *_ in candidate_rows(said):
+        each = (f"{key} {v['value']:.3g} ± {v['sd']:.2g} {v['unit']}".rstrip() for key, v in values[name])
+        numbers = f"{probability:>11} {evidence:>14} {d:>8}   {change:>13}"
+        yield f"  {name:<18} {numbers}    {', '.join(each)}".rstrip()
+    if rejected := rejected_rows(said):
+        yield from ["", "  not tried:", *(f"    {name}: {why}" for name, why in rejected)]
 
 
-def _causes(said: Mapping[str, Any]) -> Iterator[str]:
-    suffix, factor, unit = unit_of(said)
-    yield "  candidate          probability   log evidence        d    held-out RMSE    estimate"
-    for one in said["ranking"]:
-        if one["log_evidence"] is None:
-            continue
-        change = one["heldout_rmse_change" if suffix == "m" else "heldout_rmse_change_pa"]
-        held = f"{factor * change:+8.3g} {unit}" if change is not None else " " * 11
-        estimate = ", ".join(
-            f"{name} {value['value']:.3g} ± {value['sd']:.2g} {value['unit']}".rstrip()
-            for name, value in list(one["estimate"].items())[:3]
-        )
-        d = f"{one['detectability']:8.1f}" if one["physics"] and one["detectability"] is not None else " " * 8
-        numbers = f"{percent(one['probability']):>11} {one['log_evidence']:14.1f} {d}   {held}"
-        yield f"  {one['mechanism']:<18} {numbers}      {estimate}".rstrip()
-    rejected = [one for one in said["ranking"] if one["log_evidence"] is None]
-    if rejected:
-        yield from ["", "  not tried:"]
-        yield from (f"    {one['mechanism']}: {one['rejected_because']}" for one in rejected)
+def _fit(said: Said) -> Iterator[str]:
+    rows = [[f"RMSE [{unit_of(said)[2]}]", "fitted", "held out", "check"], *fit_rows(said)]
+    width = max(len(row[0]) for row in rows)
+    for name, *errors in rows:
+        inside, outside, check = errors if any(row[3] for row in rows[1:]) else (*errors[:2], "")
+        yield f"  {name:<{width}} {inside:>8}   {outside:>14}   {check}".rstrip()
+    if improvement := said["fit"]["improvement"]:
+        part, low, high = (100.0 * value for value in (improvement["part"], *improvement["interval_95"]))
+        yield f"  held-out error falls by {part:.0f} % (95 %: {low:.0f} to {high:.0f} %)"
+    yield from (f"  {sentence}" for sentence in placebo_sentences(said))
+    for one in said["fit"]["confirmations"]:
+        held_out = f"of held-out rows {-one['heldout_log_density']:+.1f}"
+        yield f"  without {one['mechanism']}: log evidence {-one['log_evidence']:+.1f}, {held_out}"
 
 
-def unit_of(said: Mapping[str, Any]) -> tuple[str, float, str]:
-    """Of errors: how keys of `diagnosis.json` end, a factor to what is shown, and its unit."""
-    return ("m", MILLIMETRES, "mm") if "rmse_m" in said["fit"] else ("pa", 1.0, "Pa")
-
-
-def _fit(said: Mapping[str, Any]) -> Iterator[str]:
-    suffix, factor, unit = unit_of(said)
-    fit = said["fit"]
-    inside, outside, check = (fit[f"{key}_{suffix}"] or {} for key in ("rmse", "heldout_rmse", "check_rmse"))
-    yield f"  {f'RMSE [{unit}]':<28}   fitted   held out   {'check' if any(check.values()) else ''}".rstrip()
-    for key, name in STATES.items():
-        if inside[key] is not None:
-            held = " " * 8 if outside[key] is None else f"{factor * outside[key]:8.4g}"
-            seen = check.get(key)
-            tests = seen if isinstance(seen, dict) else {} if seen is None else {"": seen}
-            checks = ", ".join(f"{test} {factor * value:.4g}".strip() for test, value in tests.items())
-            yield f"  {name:<28} {factor * inside[key]:8.4g}   {held}   {checks}".rstrip()
-    if fit.get("ceiling_heldout_rmse_m") is not None:
-        yield f"  {'any smooth force (ceiling)':<28} {'':8}   {factor * fit['ceiling_heldout_rmse_m']:8.4g}"
-    if fit["improvement"] is not None:
-        low, high = fit["improvement"]["interval_95"]
-        yield (
-            f"  held-out error falls by {100 * fit['improvement']['part']:.0f} % (95 %: {100 * low:.0f} to "
-            f"{100 * high:.0f} %)"
-        )
-    for one in fit["confirmations"]:
-        yield (
-            f"  without {one['mechanism']}: log evidence {-one['log_evidence']:+.1f}, of held-out rows "
-            f"{-one['heldout_log_density']:+.1f}; a pattern that means nothing does as well with "
-            f"p = {one['placebo_p']:.2g}"
-        )
-
-
-def _further(said: Mapping[str, Any]) -> Iterator[str]:
+def _further(said: Said) -> Iterator[str]:
     if said["verdict"] != NOTHING and said["smallest_detectable"]:
         shown = "; ".join(f"{kind} {one['says']}" for kind, one in said["smallest_detectable"].items())
         yield from ["", *_wrapped(f"What these data would have shown: {shown}.", "    ")]
@@ -150,6 +181,4 @@ def _further(said: Mapping[str, Any]) -> Iterator[str]:
         yield from ["", "  what to measure next (expected log Bayes factor between the two most probable mechanisms):"]
         yield from (f"    {one['expected_nats']:8.1f}  {one['what']}" for one in said["next_measurement"][:_NEXT])
     if said.get("confusion"):
-        yield ""
-        for sentence in said["confusion"]["says"]:
-            yield from _wrapped(sentence, "    ")
+        yield from ["", *(line for sentence in said["confusion"]["says"] for line in _wrapped(sentence, "    "))]
