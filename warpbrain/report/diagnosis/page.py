@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup, escape
 
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
@@ -18,7 +17,7 @@ from warpbrain.report.diagnosis.anatomy import Anatomy, map_figure, residuals_fi
 from warpbrain.report.diagnosis.figures import agreement_figure, confusion_figure, curves_figure
 from warpbrain.report.diagnosis.files import Recorded
 from warpbrain.report.generative.page import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY
-from warpbrain.report.page.document import Section, document, header, write_document
+from warpbrain.report.page import document
 from warpbrain.report.page.tables import table
 from warpbrain.report.page.viewer import viewer
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
@@ -37,7 +36,7 @@ _BADGES = {
 
 def write_page(path: Path, found: Diagnosis | SpecimenDiagnosis, said: dict[str, Any]) -> None:
     """Write the page of a diagnosis; arguments as of `page_of`."""
-    write_document(path, page_of(found, said))
+    document.write_document(path, page_of(found, said))
 
 
 def page_of(found: Diagnosis | SpecimenDiagnosis, said: dict[str, Any]) -> str:
@@ -49,10 +48,10 @@ def page_of(found: Diagnosis | SpecimenDiagnosis, said: dict[str, Any]) -> str:
     said : dict
         Its `diagnosis.json`.
     """
-    sections: list[Section] = []
+    sections: list[document.Section] = []
 
-    def section(title: str, caller: Callable[[], Markup]) -> str:
-        sections.append(Section(title, str(caller()).strip()))
+    def section(title: str, caller: Callable[[], str]) -> str:
+        sections.append(document.Section(title, str(caller()).strip()))
         return ""
 
     environment = Environment(
@@ -64,21 +63,20 @@ def page_of(found: Diagnosis | SpecimenDiagnosis, said: dict[str, Any]) -> str:
     environment.get_template("page.html").render(
         section=section,
         said=said,
-        pictures=defaultdict(str, {name: Markup(one) for name, one in _pictures(found, said, recorded).items()}),
+        pictures=defaultdict(str, _pictures(found, said, recorded)),
         text=text,
         next=[[one["what"], f"{one['expected_nats']:.1f}"] for one in said["next_measurement"]],
-        hashes=[[name, Markup("<code>{}</code>").format(sha)] for name, sha in said["inputs_sha256"].items()],
         aside=[] if recorded is None else recorded.aside,
         chances={one["mechanism"]: one["probability"] for one in said["ranking"]},
     )
-    top = header(said["case"]["title"], said["verdict"], [said["sentence"]], _facts(said))
-    return document(f"{said['verdict']}: {said['case']['title']}", top, sections, _BADGES[said["verdict"]])
+    top = document.header(said["case"]["title"], said["verdict"], [said["sentence"]], _facts(said))
+    return document.document(f"{said['verdict']}: {said['case']['title']}", top, sections, _BADGES[said["verdict"]])
 
 
 def _table(rows: Iterable[Sequence[Any]], head: Sequence[str], numbers: Sequence[int] = (), caption: str = "") -> str:
-    """A table of cells whose words are no markup; nothing of none."""
-    cells = [[str(escape(cell)) for cell in row] for row in rows]
-    return Markup(table(head, cells, numbers, caption)) if cells else ""
+    """A table as HTML, in whose cells nothing is markup; nothing of none."""
+    cells = [[document.text(cell) for cell in row] for row in rows]
+    return table(head, cells, numbers, caption) if cells else ""
 
 
 def _pictures(found: Diagnosis | SpecimenDiagnosis, said: dict[str, Any], recorded: Recorded | None) -> dict[str, str]:
@@ -101,7 +99,7 @@ def _pictures(found: Diagnosis | SpecimenDiagnosis, said: dict[str, Any], record
 def _facts(said: dict[str, Any]) -> list[tuple[str, str]]:
     facts = [("p, nothing missing", f"{said['p_value']:.2g}")]
     if named := said["mechanisms"]:
-        facts.insert(0, ("mechanism", str(escape(" and ".join(one["mechanism"] for one in named)))))
+        facts.insert(0, ("mechanism", document.text(" and ".join(one["mechanism"] for one in named))))
         facts.append(("probability", " and ".join(percent(one["probability"]) for one in named)))
     suffix, factor, unit = text.unit_of(said)
     held = said["fit"][f"heldout_rmse_{suffix}"]
