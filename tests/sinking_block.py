@@ -9,7 +9,6 @@ from shapes import box
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.diagnosis.diagnose import Diagnosing
-from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.inference.decide import Decision
 from warpbrain.mesh import TetMesh, write_mesh
@@ -19,6 +18,7 @@ from warpbrain.recordings.location import locate
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
+from warpbrain.worlds.options import DiagnosisOptions
 
 #: What is looked for: few kinds take few seconds.
 OPTIONS = DiagnosisOptions(candidates=("gravity", "pressure", "swelling", "falx"), mesh_error=False)

@@ -26,7 +26,8 @@ from warpbrain.report.diagnosis.text import diagnosis_lines
 from warpbrain.report.files import write_summary
 from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.worlds.listener import Listener
-from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
+from warpbrain.worlds.options import DiagnosisOptions
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 Floats = NDArray[np.float64]
@@ -95,7 +96,7 @@ def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosi
     folder = out / case.name
     if not (folder / "case.toml").exists():
         write_case(folder, case)
-    options = SpecimenOptions(ends=ends)
+    options = DiagnosisOptions(ends=ends)
     start = time.perf_counter()
     found = DiagnosingSpecimen(
         read_case(folder),

@@ -11,9 +11,7 @@ from warpbrain.cli import output, warp
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
-    from warpbrain.diagnosis.options import DiagnosisOptions
     from warpbrain.terminal.record import Record
-    from warpbrain.worlds.specimen.diagnose import SpecimenOptions
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -51,8 +49,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from warpbrain.diagnosis.options import DiagnosisOptions
     from warpbrain.worlds.listener import Listener
+    from warpbrain.worlds.options import DiagnosisOptions
 
     kinds = None if options.candidates == "all" else tuple(options.candidates.split(","))
     asked = DiagnosisOptions(
@@ -89,7 +87,7 @@ def _run(options: argparse.Namespace) -> None:
         progress.clear()
         say(f"  {text}")
 
-    diagnosing = way.diagnosing(case, way.asked(asked), device, Listener(on_stage, progress.show))
+    diagnosing = way.diagnosing(case, asked, device, Listener(on_stage, progress.show))
     out = choose_folder(options.out, f"warpbrain-diagnose-{safe_name(case.name)}", options.overwrite)
     output.note_case(record, case, device)
     say(case.title)
@@ -97,7 +95,7 @@ def _run(options: argparse.Namespace) -> None:
         found = diagnosing.run()
     finally:
         progress.clear()
-    said = describe(found, way.asked(asked), device)
+    said = describe(found, asked, device)
     say("", *diagnosis_lines(said), sep="\n")
     with results_in(out, record, options.overwrite):
         for name, write in way.tables.items():
@@ -118,7 +116,6 @@ class _Way(NamedTuple):
     """How cases of one kind are diagnosed, and what is written of it beside what all have."""
 
     diagnosing: Callable[..., Any]
-    asked: Callable[[DiagnosisOptions], DiagnosisOptions | SpecimenOptions]
     tables: dict[str, Callable[[Path, Any], None]]
 
 
@@ -134,11 +131,11 @@ def _of_a_body() -> _Way:
         "points.csv": write_points,
         "covariance.npz": write_covariance,
     }
-    return _Way(Diagnosing, lambda options: options, tables)
+    return _Way(Diagnosing, tables)
 
 
 def _of_a_specimen() -> _Way:
     from warpbrain.report.diagnosis.files import write_curves
     from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 
-    return _Way(DiagnosingSpecimen, lambda options: options.of_specimen, {"curves.csv": write_curves})
+    return _Way(DiagnosingSpecimen, {"curves.csv": write_curves})

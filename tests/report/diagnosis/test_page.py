@@ -14,7 +14,8 @@ from warpbrain.cases.specimen import Specimen
 from warpbrain.inference.decide import VERDICTS
 from warpbrain.report.diagnosis.description import describe
 from warpbrain.report.diagnosis.page import page_of
-from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
+from warpbrain.worlds.options import DiagnosisOptions
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 
 
 def test_it_is_one_file_without_a_network(diagnosed):
@@ -67,7 +68,7 @@ def test_a_specimen_has_curves_in_the_place_of_an_anatomy():
     rod = replace(recorded("stretch", stretch), response=stress + noise, name="rod & <more>")
     pull = replace(rod, name="pull", role="check", response=stress)
     case = replace(case_of(Specimen("cylinder", (8e-3, 8e-3, 5e-3), "lubricated")), recordings=(rod, pull))
-    options = SpecimenOptions(candidates=("asymmetry",))
+    options = DiagnosisOptions(candidates=("asymmetry",))
     found = DiagnosingSpecimen(case, options, "cpu").run()
     said = describe(found, options, "cpu")
     page = page_of(found, said)

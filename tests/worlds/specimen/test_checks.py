@@ -9,8 +9,9 @@ from testing_machine import case_of
 
 from warpbrain.inference.confirm import Confirmation, after_checks
 from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decision
+from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import CheckResults, Folds, folds_of, grown_errors, held_out
-from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.effects import stiffening
 from warpbrain.worlds.specimen.fit import fit
 from warpbrain.worlds.specimen.forward import Component, Forward
@@ -59,7 +60,7 @@ def test_held_out_rows_are_the_conditional_of_the_model():
 
 def test_errors_are_of_all_recorded_rows():
     case = cycles(400.0, 40.0, 100.0, roles=("fit", "fit", "check"))
-    found = DiagnosingSpecimen(case, SpecimenOptions(candidates=("viscoelasticity",), draws=100), "cpu").run()
+    found = DiagnosingSpecimen(case, DiagnosisOptions(candidates=("viscoelasticity",), draws=100), "cpu").run()
     assert len(found.protocol) == 3 * 161
     assert len(found.protocol.thinned) < len(found.protocol)
     for name in ("refitted", "explained"):
@@ -73,7 +74,7 @@ def test_errors_are_of_all_recorded_rows():
 @pytest.mark.slow
 def test_a_viscosity_stays_where_more_tests_are_fitted():
     for durations in ((400.0, 40.0), (400.0, 40.0, 100.0, 200.0)):
-        options = SpecimenOptions(candidates=("viscoelasticity", "softening", "drift of the zero"), draws=100)
+        options = DiagnosisOptions(candidates=("viscoelasticity", "softening", "drift of the zero"), draws=100)
         found = DiagnosingSpecimen(cycles(*durations), options, "cpu").run()
         assert "viscoelasticity" in [one.name for one in found.named], durations
 

@@ -13,7 +13,8 @@ from warpbrain.errors import InputError
 from warpbrain.physics.mechanisms.fibres import Fibres
 from warpbrain.recordings.recording import turn_of
 from warpbrain.simulation.specimen import Rig
-from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
+from warpbrain.worlds.options import DiagnosisOptions
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.material import HomogeneousMaterial
 
 ROD = Specimen("cylinder", (8e-3, 8e-3, 5e-3), "lubricated")
@@ -59,7 +60,9 @@ def test_fibres_are_told_by_one_mode_along_and_across_them(tmp_path):
     write_case(tmp_path / "case", case)
     read = read_case(tmp_path / "case")
     assert [r.axis for r in read.recordings] == [r.axis for r in case.recordings]
-    options = SpecimenOptions(candidates=("fibres", "asymmetry", "stiffening", "second invariant", "drift of the zero"))
+    options = DiagnosisOptions(
+        candidates=("fibres", "asymmetry", "stiffening", "second invariant", "drift of the zero")
+    )
     found = DiagnosingSpecimen(read, options, "cpu").run()
     assert found.verdict == "named" and [one.name for one in found.named] == ["fibres"]
     assert found.named[0].region == "fibres along x"

@@ -8,7 +8,6 @@ from dataclasses import asdict
 from typing import Any
 
 from warpbrain.diagnosis.held_out import distance
-from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis, Ranked
 from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence, sentence_of_kind
 from warpbrain.inference.causes import Kind
@@ -19,25 +18,20 @@ from warpbrain.physics.values import Smallest, Value
 from warpbrain.report.files import plain
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine
+from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen import result as of_specimen
 from warpbrain.worlds.specimen import sentences as specimen_sentences
-from warpbrain.worlds.specimen.diagnose import SpecimenOptions
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 #: States of a case in the order in which they are shown, and their names for people.
 STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what is named"}
 
 
-def describe(
-    found: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions | SpecimenOptions, device: str
-) -> dict[str, Any]:
+def describe(found: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:
     """Everything that is known of a diagnosis, lengths in metres, stresses in Pa, other units beside the values."""
-    asked = asdict(options)
-    if isinstance(found, SpecimenDiagnosis):
-        particular = _of_specimen(found, options.alpha)
-    else:
-        particular = _of_body(found)
-        del asked["ends"]
+    other = ("mesh_error", "without_nuisances") if isinstance(found, SpecimenDiagnosis) else ("ends",)
+    asked = {name: value for name, value in asdict(options).items() if name not in other}
+    particular = _of_specimen(found, options.alpha) if isinstance(found, SpecimenDiagnosis) else _of_body(found)
     named, first = particular["mechanisms"], next(iter((*found.named, *found.ranking)), None)
     return plain(
         {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from warpbrain.seconds import Seconds
 from warpbrain.simulation.specimen import not_transmitted, specimen_of
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.listener import Listener
+from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import Checker, grown_errors, score
 from warpbrain.worlds.specimen.fit import Fit, fit
 from warpbrain.worlds.specimen.forward import Forward
@@ -35,31 +36,6 @@ _FEWEST, _TOLD = 15, 12
 Ordered = Sequence[tuple[CauseSet, float]]
 
 
-@dataclass(frozen=True)
-class SpecimenOptions:
-    """What is asked for.
-
-    Parameters
-    ----------
-    candidates : tuple of str or None
-        Causes to look for; None: all.
-    alpha : float
-        Probability of an alarm where nothing is missing, and below which a check fails.
-    seed : int
-        Of all draws.
-    draws : int
-        Of rows in which nothing is missing.
-    ends : bool
-        Whether glued ends are computed; otherwise states are taken for homogeneous, as test evaluations do.
-    """
-
-    candidates: tuple[str, ...] | None = None
-    alpha: float = 0.05
-    seed: int = 0
-    draws: int = 400
-    ends: bool = True
-
-
 class DiagnosingSpecimen:
     """Diagnoses the tests of one case.
 
@@ -67,7 +43,7 @@ class DiagnosingSpecimen:
     ----------
     case : Case
         With a specimen.
-    options : SpecimenOptions, optional
+    options : DiagnosisOptions, optional
     device : str, optional
         Of the finite elements that glued ends need.
     listener : Listener, optional
@@ -81,12 +57,12 @@ class DiagnosingSpecimen:
     def __init__(
         self,
         case: Case,
-        options: SpecimenOptions | None = None,
+        options: DiagnosisOptions | None = None,
         device: str | None = None,
         listener: Listener | None = None,
     ) -> None:
         self.case, self.device, self._listener = case, device, listener or Listener()
-        self.options = options or SpecimenOptions()
+        self.options = options or DiagnosisOptions()
         self.seconds = Seconds()
         recordings = [one for one in case.recordings if isinstance(one, TestRecording)]
         _check(case, recordings)

@@ -112,22 +112,32 @@ def _fit(forward: Forward, assumed: tuple[Component, ...], z: Floats, scale: flo
     from scipy.optimize import least_squares
 
     observed = forward.protocol.observed
-    noise = GaussianModel(forward.noise[np.ix_(rows, rows)], np.zeros((np.count_nonzero(rows), 0)), scale)
+    # what only adds stress is linear: it is integrated out while all else is searched for
+    adds, added = forward.adding(assumed)
+    noise = GaussianModel(forward.noise[np.ix_(rows, rows)], added[rows], scale)
+
+    def whole(at: Floats) -> Floats:
+        z = np.zeros(len(adds))
+        z[~adds] = at
+        return z
 
     def residuals(at: Floats) -> Floats:
         try:
             with np.errstate(all="ignore"):
-                return np.concatenate([noise.whitened((observed - forward.stress(assumed, at))[rows]), at])
+                left = observed - forward.stress(assumed, whole(at))
+                return np.concatenate([noise.standardised(left[rows]), at])
         except CANNOT_BE:
             # the step is shortened
             return np.full(np.count_nonzero(rows) + len(at), np.nan)
 
     def slopes(at: Floats) -> Floats:
         with np.errstate(all="ignore"):
-            tangent = forward.tangent(assumed, at, forward.stress(assumed, at))
-        return np.concatenate([-noise.whitened(tangent[rows]), np.eye(len(at))])
+            tangent = forward.tangent(assumed, whole(at), forward.stress(assumed, whole(at)))
+        return np.concatenate([-noise.standardised(tangent[rows][:, ~adds]), np.eye(len(at))])
 
-    z = least_squares(residuals, z, slopes, ftol=_DONE, xtol=_DONE, gtol=None, max_nfev=_STEPS).x
+    at = least_squares(residuals, z[~adds], slopes, ftol=_DONE, xtol=_DONE, gtol=None, max_nfev=_STEPS).x
+    z = whole(at)
+    z[adds] = noise.coefficients((observed - forward.stress(assumed, z))[rows])[0]
     stress = forward.stress(assumed, z)
     columns = forward.tangent(assumed, z, stress)
     residual = (observed - stress + columns @ z)[rows]

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
 from warpbrain.physics.mechanism import Mechanism
@@ -167,16 +167,24 @@ class Forward:
     def tangent(self, assumed: Sequence[Component], z: Floats, stress: Floats) -> Floats:
         """Change (n, k) of the stress with each coefficient: differences for causes that do not only add stress."""
         scale, _, added = self._nuisances(self.actions(assumed, z), z)
-        columns = [self.logarithmic * (stress - added)[:, None], self.scaled * scale[:, None], self.added]
-        first = len(self)
+        of_law = self.logarithmic * (stress - added)[:, None], self.scaled * scale[:, None]
+        adds, columns = self.adding(assumed)
+        found = np.empty((len(stress), len(z)))
+        found[:, : len(self) - self.added.shape[1]] = np.concatenate(of_law, axis=1)
+        found[:, adds] = columns
+        for number in np.flatnonzero(~adds[len(self) :]) + len(self):
+            moved = self.stress(assumed, z + _STEP * np.eye(len(z))[number])
+            found[:, number] = (moved - stress) / _STEP
+        return found
+
+    def adding(self, assumed: Sequence[Component]) -> tuple[Bools, Floats]:
+        """Which coefficients (k,) only add stress, and what one of each of these adds (n, a) [Pa]."""
+        adds, columns = [np.arange(len(self)) >= len(self) - self.added.shape[1]], [self.added]
         for one in assumed:
+            adds.append(np.full(len(one), one.variant.added is not None))
             if one.variant.added is not None:
                 columns.append(one.variant.added(self.protocol) * one.sd)
-            else:
-                for move in _STEP * np.eye(len(z))[first : first + len(one)]:
-                    columns.append(((self.stress(assumed, z + move) - stress) / _STEP)[:, None])
-            first += len(one)
-        return np.concatenate(columns, axis=1)
+        return np.concatenate(adds), np.concatenate(columns, axis=1)
 
     def _nuisances(self, actions: Sequence[Action], z: Floats) -> tuple[Floats, Floats, Floats]:
         """Factor (n,) on the simulated stress, coefficients of the law's shape, and all that is added (n,)."""
