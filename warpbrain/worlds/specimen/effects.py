@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -75,31 +75,18 @@ class Variant:
     added: Callable[[Protocol], Floats] | None = None
 
     @classmethod
-    def of_one(cls, act: Callable[[float, Forward], Action], sd: float, one_sign: bool, region: str = "") -> Variant:
-        """A variant with one coefficient that does nothing at 0 and is its own value."""
-        trials = tuple(np.array([[sign * sd]]) for sign in ((1.0,) if one_sign else (1.0, -1.0)))
-        zero = np.zeros(1)
-        return cls(
-            lambda c, f: act(float(c[0]), f), zero, np.array([sd]), zero, trials, lambda c: (float(c[0]),), one_sign,
-            region,
-        )  # fmt: skip
+    def of(
+        cls, act: Callable[[Floats, Forward], Action], sd: float, count: int = 1, signs: tuple[float, ...] = (1.0,),
+        **particular: Any,
+    ) -> Variant:  # fmt: skip
+        """A variant with coefficients of one size that do nothing at 0 and are what users know, tried with signs."""
+        zero, trials = np.zeros(count), tuple(sign * sd * np.eye(count) for sign in signs)
+        return cls(act, zero, np.full(count, sd), zero, trials, lambda c: tuple(c.tolist()), **particular)
 
     @classmethod
-    def of_many(
-        cls,
-        sd: float,
-        count: int,
-        act: Callable[[Floats, Forward], Action] | None = None,
-        added: Callable[[Protocol], Floats] | None = None,
-    ) -> Variant:
-        """A variant with coefficients that act side by side, each of one size; by what each adds, if not by `act`."""
-        if act is None:
-            assert added is not None
-            columns = added
-            act = lambda c, forward: Action(added=columns(forward.protocol) @ c)  # noqa: E731
-        zero = np.zeros(count)
-        trials = (sd * np.eye(count),)
-        return cls(act, zero, np.full(count, sd), zero, trials, lambda c: tuple(c.tolist()), added=added)
+    def of_added(cls, added: Callable[[Protocol], Floats], sd: float, count: int) -> Variant:
+        """A variant that only adds stress."""
+        return cls.of(lambda c, forward: Action(added=added(forward.protocol) @ c), sd, count, added=added)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,16 +123,13 @@ def softening(case: Case, protocol: Protocol) -> Effect:
     def cycles(protocol: Protocol, chain: Chain) -> Floats:
         return -np.expm1(-((_strain_path(protocol, chain) / belief("specimen.softening_way")) ** 2))
 
-    def acting(pattern: Callable[[Protocol, Chain], Floats]) -> Callable[[float, Forward], Action]:
-        def act(part: float, forward: Forward) -> Action:
-            each = [pattern(forward.protocol, chain) for chain in forward.protocol.chains]
-            return Action(factor=1.0 - np.clip(part, 0.0, 0.95) * np.concatenate(each))
-
-        return act
+    def act(pattern: Callable[[Protocol, Chain], Floats], c: Floats, forward: Forward) -> Action:
+        each = [pattern(forward.protocol, chain) for chain in forward.protocol.chains]
+        return Action(factor=1.0 - np.clip(c[0], 0.0, 0.95) * np.concatenate(each))
 
     ways = ((below, "below the largest strain so far"), (cycles, "with every cycle"))
     size = belief("specimen.largest_softening")
-    variants = tuple(Variant.of_one(acting(pattern), size, True, words) for pattern, words in ways)
+    variants = tuple(Variant.of(partial(act, way), size, one_sign=True, region=words) for way, words in ways)
     return Effect(
         "softening", Kind.PHYSICS, "Tissue is softer where it was deformed before.", variants, ("part",), ("",)
     )
@@ -193,13 +177,13 @@ def _excess(mode: str, l: Floats) -> Floats:
 def stiffening(case: Case, protocol: Protocol) -> Effect:
     """A factor on the response; a negative `k` softens."""
 
-    def act(k: float, forward: Forward) -> Action:
-        return Action(factor=np.exp(np.clip(k * invariant_rows(forward.protocol), -_MOST, _MOST)))
+    def act(c: Floats, forward: Forward) -> Action:
+        return Action(factor=np.exp(np.clip(c[0] * invariant_rows(forward.protocol), -_MOST, _MOST)))
 
     size = belief("specimen.largest_stiffening") / float(invariant_rows(protocol).max())
     words = "Tissue stiffens with strain {} than its law says, in all directions alike, by a factor exp(k (I1 - 3))."
     sentence, less, more = (words.format(how) for how in ("more or less", "less", "more"))
-    variants = (Variant.of_one(act, size, False),)
+    variants = (Variant.of(act, size, signs=(1.0, -1.0)),)
     return Effect("stiffening", Kind.PHYSICS, sentence, variants, ("k",), ("",), by_sign=(less, more))
 
 
@@ -208,7 +192,7 @@ def second_invariant(case: Case, protocol: Protocol) -> Effect:
     if not any(test.rest == 1.0 for test in protocol.tests if test.fitted):
         raise NotTestableError("needs an axial, confined or biaxial test: in shear both invariants are one")
     size = belief("specimen.largest_second_invariant")
-    variants = (Variant.of_one(lambda share, forward: Action(scaled=share * excess_rows(forward)), size, False),)
+    variants = (Variant.of(lambda c, forward: Action(scaled=c[0] * excess_rows(forward)), size, signs=(1.0, -1.0)),)
     sentence = "The law of the tissue depends on the second invariant."
     return Effect("second invariant", Kind.PHYSICS, sentence, variants, ("share",), ("",))
 
@@ -219,13 +203,13 @@ def friction(case: Case, protocol: Protocol) -> Effect:
         raise NotTestableError("needs an axial test")
     glued = specimen_of(case).grips == "glued"
 
-    def act(share: float, forward: Forward) -> Action:
+    def act(c: Floats, forward: Forward) -> Action:
         axial = forward.protocol.mask([k for k, test in enumerate(forward.protocol.tests) if test.mode == "axial"])
-        part = float(np.clip(share, 0.0, 1.0))
+        part = float(np.clip(c[0], 0.0, 1.0))
         sticks, whole = (1.0 - part, forward.factor) if glued else (part, 1.0)
         return Action(factor=np.where(axial, (1.0 + sticks * (forward.sticking - 1.0)) / whole, 1.0))
 
-    variants = (Variant.of_one(act, belief("specimen.largest_slip"), True),)
+    variants = (Variant.of(act, belief("specimen.largest_slip"), one_sign=True),)
     sentence = "The ends of the specimen slip." if glued else "The ends of the specimen stick to the platens."
     return Effect("end friction", Kind.NOT_PHYSICS, sentence, variants, ("share",), ("",))
 
@@ -250,7 +234,7 @@ def drift(case: Case, protocol: Protocol) -> Effect:
             columns.append(max(protocol.tests[k].peak for k in chain.tests) * of_chain)
         return np.concatenate(columns, axis=1)
 
-    variants = (Variant.of_many(belief("specimen.largest_drift"), len(names), added=shapes),)
+    variants = (Variant.of_added(shapes, belief("specimen.largest_drift"), len(names)),)
     units = ("of the largest stress",) * len(names)
     sentence = "The zero of the force drifts, or is wrong."
     return Effect("drift of the zero", Kind.NOT_PHYSICS, sentence, variants, names, units)
@@ -265,7 +249,7 @@ def unlike(case: Case, protocol: Protocol) -> Effect:
     def act(c: Floats, forward: Forward) -> Action:
         return Action(factor=np.exp(specimen_rows(forward.protocol) @ c))
 
-    variants = (Variant.of_many(belief("specimen.largest_unlike"), count, act),)
+    variants = (Variant.of(act, belief("specimen.largest_unlike"), count),)
     names = tuple(f"ln stiffness of {name or 'the unnamed'}" for name in protocol.specimens)
     sentence = "The specimens are not of one stiffness."
     return Effect("unlike specimens", Kind.NOT_PHYSICS, sentence, variants, names, ("",) * count)
@@ -284,7 +268,7 @@ def unknown(protocol: Protocol) -> Effect:
         columns = smooth_patterns(protocol, reach)
         columns = columns[:, np.any(columns[protocol.fitted] != 0.0, axis=0)]
         size = belief("specimen.largest_unknown")
-        variants.append(Variant.of_many(size, columns.shape[1], added=partial(_fixed, columns)))
+        variants.append(Variant.of_added(partial(_fixed, columns), size, columns.shape[1]))
     return Effect(UNKNOWN, Kind.UNKNOWN, "Something acts that has no name.", tuple(variants))
 
 
