@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -58,12 +58,18 @@ def describe(found: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions, de
     )
 
 
-def _decision(decision: Decision) -> dict[str, Any]:
-    return {"verdict": decision.verdict, "causes": decision.causes}
+def _picked(one: Any, *names: str, **renamed: str) -> Any:
+    """Attributes of an object as a dictionary, some by other names than their own; None of none."""
+    keys = {name: name for name in names} | renamed
+    return None if one is None else {key: getattr(one, name) for key, name in keys.items()}
+
+
+def _decision(decision: Decision) -> Any:
+    return _picked(decision, "verdict", "causes")
 
 
 def _values(values: Sequence[Value]) -> dict[str, Any]:
-    return {one.name: {"value": one.value, "sd": one.sd, "unit": one.unit} for one in values}
+    return {one.name: _picked(one, "value", "sd", "unit") for one in values}
 
 
 def _smallest(kind: str, one: Smallest) -> dict[str, Any]:
@@ -75,94 +81,69 @@ def _improvement(improvement: tuple[float, float, float] | None) -> dict[str, An
 
 
 def _of_body(found: Diagnosis) -> dict[str, Any]:
-    axis, where, onset, traits = found.case.gravity_axis, found.map, found.when, found.unknown
-    best = found.named[0] if found.named else None
-    place = best if best is not None and best.centre is not None else where if where.significant else None
-    probability = {"local_p": where.local_p, "global_p": where.global_p}
+    where, onset, best = found.map, found.when, found.named[0] if found.named else None
+    place = _place(best) or (_picked(where, centre_m="centre", radius_m="radius") if where.significant else None)
+    ranking = [
+        _cause(one.kind, _words(found, one), _picked(one, "physics", "heldout_rmse_change", "rejected_because"), one)
+        | {"where": _place(one)}
+        for one in found.ranking
+    ]
+    rejected = [
+        _cause(kind, sentence_of_kind(kind), {"physics": kind in mechanisms(), "rejected_because": why})
+        | {"where": None, "heldout_rmse_change": None}
+        for kind, why in found.rejected.items()
+    ]
+    named = [
+        {"mechanism": one.kind, "says": _words(found, one), "parameters": _values(one.values), "where": _place(one)}
+        | _picked(one, "probability", "region")
+        for one in found.named
+    ]
     return {
         "hypotheses": [asdict(one) | {"kinds": [kind.value for kind in one.kinds]} for one in found.combinations],
         "by_posterior": _decision(found.by_posterior),
-        "where": place and _ball(place) | {"region": best.region if best is not None else ""} | probability,
-        "mechanisms": [
-            {
-                "mechanism": one.kind,
-                "says": effect_sentence(one, axis),
-                "probability": one.probability,
-                "parameters": _values(one.values),
-                "where": _place(one),
-                "region": one.region,
-            }
-            for one in found.named
-        ],
-        "unknown": traits
-        and {
-            "net_force_n": traits.force,
-            "net_force_sd_n": traits.force_sd,
-            "net_moment_nm": traits.moment,
-            "net_moment_sd_nm": traits.moment_sd,
-            "from_outside": traits.outside,
-            "net_force_hidden": traits.hidden,
-            "turning": traits.turning,
-            "surface_over_depth_nats": traits.surface_nats,
-            "centre_m": traits.centre,
-        },
-        "when": onset
-        and {
+        "where": place and place | {"region": best.region if best is not None else ""}
+        | {"local_p": where.local_p, "global_p": where.global_p},
+        "mechanisms": named,
+        "unknown": _picked(
+            found.unknown, "turning", net_force_n="force", net_force_sd_n="force_sd", net_moment_nm="moment",
+            net_moment_sd_nm="moment_sd", from_outside="outside", net_force_hidden="hidden",
+            surface_over_depth_nats="surface_nats", centre_m="centre",
+        ),
+        "when": onset and {
             "seconds": [onset.first, onset.last],
             "probability": onset.probability,
             "course": onset.course,
             "intervals": [{"seconds": [a, b], "probability": p} for a, b, p in onset.intervals],
             "sizes": None if onset.sizes is None else asdict(onset.sizes),
         },
-        "ranking": [
-            _cause(one.kind, one.rejected_because, says=effect_sentence(one, axis), physics=one.physics,
-                   heldout_rmse_change=one.heldout_rmse_change, where=_place(one), **_numbers(one))
-            for one in found.ranking
-        ]
-        + [
-            _cause(kind, why, says=sentence_of_kind(kind), physics=kind in mechanisms(), heldout_rmse_change=None,
-                   where=None)
-            for kind, why in found.rejected.items()
-        ],
+        "ranking": ranking + rejected,
         "smallest_detectable": {
             kind: _smallest(kind, one) | {"named_from": one.named} for kind, one in found.smallest.items()
         },
         "confusion": {"says": confusion_sentences(found.confusion), "rows": found.confusion.rows},
         "fit": _fit(found),
-        "map": {
-            "threshold": where.threshold,
-            "largest": where.scores.max(),
-            "patch_m": where.length,
-            "blind_above_n": where.blind_above,
-            "places": len(where.sites),
-            "significant": where.significant,
-        },
+        "map": {"largest": where.scores.max(), "places": len(where.sites)}
+        | _picked(where, "threshold", "significant", patch_m="length", blind_above_n="blind_above"),
         "equilibria": found.base.states.solves,
     }  # fmt: skip
 
 
-def _cause(name: str, why: str = "", **known: Any) -> dict[str, Any]:
-    """A row of a ranking; of a cause that was not tried, and why, nothing else is known."""
-    nothing = {"mechanism": name, "says": "", "physics": True, "log_evidence": None, "probability": 0.0}
-    return nothing | {"detectability": None, "estimate": {}, "region": "", "rejected_because": why} | known
+def _words(found: Diagnosis, one: Ranked) -> str:
+    return effect_sentence(one, found.case.gravity_axis)
 
 
-def _numbers(one: Ranked | of_specimen.Ranked) -> dict[str, Any]:
-    return {
-        "log_evidence": one.log_evidence,
-        "probability": one.probability,
-        "detectability": one.detectability,
-        "estimate": _values(one.values),
-        "region": one.region,
-    }
+def _cause(
+    name: str, words: str, known: Mapping[str, Any], one: Ranked | of_specimen.Ranked | None = None
+) -> dict[str, Any]:
+    """A row of a ranking; of a cause that was not tried there are no numbers."""
+    numbers = _picked(one, "log_evidence", "probability", "detectability", "region")
+    nothing = {"log_evidence": None, "probability": 0.0, "detectability": None, "region": ""}
+    estimate = {} if one is None else _values(one.values)
+    return {"mechanism": name, "says": words, "estimate": estimate, **(numbers or nothing), **known}
 
 
-def _place(one: Ranked) -> dict[str, Any] | None:
-    return None if one.centre is None else _ball(one)
-
-
-def _ball(place: Any) -> dict[str, Any]:
-    return {"centre_m": place.centre, "radius_m": place.radius}
+def _place(one: Ranked | None) -> dict[str, Any] | None:
+    return None if one is None or one.centre is None else _picked(one, centre_m="centre", radius_m="radius")
 
 
 def _fit(found: Diagnosis) -> dict[str, Any]:
@@ -188,13 +169,20 @@ def _fit(found: Diagnosis) -> dict[str, Any]:
 
 def _of_specimen(found: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
     where, scores = found.where, {name: found.scores.get(name) for name in STATES}
+    rejected = [
+        _cause(name, "", {"physics": True, "rejected_because": why, "heldout_rmse_change_pa": None})
+        for name, why in found.rejected.items()
+    ]
+    confirmations = [
+        {"mechanism": one.name, "heldout_gain": _improvement(one.gain), "why_not": one.why_not(alpha)}
+        | _picked(one, "log_evidence", "heldout_log_density", "placebo_p")
+        for one in found.confirmations
+    ]
     return {
         "mechanisms": [_ranked_of_specimen(one) for one in found.named],
-        "where": where
-        and {"test": where.test, "mode": where.mode, "segment": where.segment, "strain": where.strain},
+        "where": _picked(where, "test", "mode", "segment", "strain"),
         "when": {"seconds": where.time} if where is not None and where.time is not None else None,
-        "ranking": [_ranked_of_specimen(one) for one in found.ranking]
-        + [_cause(name, why, heldout_rmse_change_pa=None) for name, why in found.rejected.items()],
+        "ranking": [_ranked_of_specimen(one) for one in found.ranking] + rejected,
         "combinations": [asdict(one) for one in found.combinations],
         "before_checks": _decision(found.by_posterior),
         "smallest_detectable": {name: _smallest(name, one) for name, one in found.smallest.items()},
@@ -205,27 +193,17 @@ def _of_specimen(found: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
             "rows": "all that were recorded",
             "held_out": "each test in turn" if found.by_test else "each quarter of the only test in turn",
             "improvement": _improvement(found.improvement),
-            "confirmations": [
-                {
-                    "mechanism": one.name,
-                    "log_evidence": one.log_evidence,
-                    "heldout_log_density": one.heldout_log_density,
-                    "heldout_gain": _improvement(one.gain),
-                    "placebo_p": one.placebo_p,
-                    "why_not": one.why_not(alpha),
-                }
-                for one in found.confirmations
-            ],
+            "confirmations": confirmations,
         },
         "tests": [
-            {"name": test.name, "mode": test.mode, "specimen": test.specimen, "role": "fit" if test.fitted else "check",
-             "rows": len(test.strain), "largest_stress_pa": test.peak, "pa_per_unit": test.unit}
+            {"role": "fit" if test.fitted else "check", "rows": len(test.strain)}
+            | _picked(test, "name", "mode", "specimen", largest_stress_pa="peak", pa_per_unit="unit")
             for test in found.protocol.tests
         ],
-    }  # fmt: skip
+    }
 
 
 def _ranked_of_specimen(one: of_specimen.Ranked) -> dict[str, Any]:
     why = "" if math.isfinite(one.log_evidence) else "no fit with it stands"
-    words = {"says": specimen_sentences.effect_sentence(one), "physics": one.kind is Kind.PHYSICS}
-    return _cause(one.name, why, **words, heldout_rmse_change_pa=one.change, **_numbers(one))
+    known = {"physics": one.kind is Kind.PHYSICS, "rejected_because": why, "heldout_rmse_change_pa": one.change}
+    return _cause(one.name, specimen_sentences.effect_sentence(one), known, one)
