@@ -12,16 +12,16 @@ from warpbrain.report.files import write_summary
 
 
 @pytest.fixture(scope="session")
-def said(small_diagnosis) -> dict:
+def summary(small_diagnosis) -> dict:
     return describe(small_diagnosis, OPTIONS, "cpu")
 
 
 @pytest.fixture(scope="session")
-def diagnosed(small_diagnosis, said, tmp_path_factory) -> Path:
+def diagnosed(small_diagnosis, summary, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("diagnosed")
     write_map(folder / "map.vtu", small_diagnosis)
     write_points(folder / "points.csv", small_diagnosis)
     write_covariance(folder / "covariance.npz", small_diagnosis)
-    write_summary(folder / "diagnosis.json", said)
-    write_page(folder / "report.html", small_diagnosis, said)
+    write_summary(folder / "diagnosis.json", summary)
+    write_page(folder / "report.html", small_diagnosis, summary)
     return folder

@@ -70,8 +70,8 @@ def test_a_specimen_has_curves_in_the_place_of_an_anatomy():
     case = replace(case_of(Specimen("cylinder", (8e-3, 8e-3, 5e-3), "lubricated")), recordings=(rod, pull))
     options = DiagnosisOptions(candidates=("asymmetry",))
     found = DiagnosingSpecimen(case, options, "cpu").run()
-    said = describe(found, options, "cpu")
-    page = page_of(found, said)
+    summary = describe(found, options, "cpu")
+    page = page_of(found, summary)
     body = words(page)
     assert "asymmetry: a pattern that means nothing does as well with p = " in body
     before, after = (f"{found.scores[state].heldout:.3g}" for state in ("refitted", "explained"))
@@ -86,11 +86,11 @@ def test_a_specimen_has_curves_in_the_place_of_an_anatomy():
     assert not re.search(r"\b(nan|None|inf)\b", body)
 
 
-def test_points_that_are_all_set_aside_have_no_figure(small_diagnosis, said, monkeypatch):
+def test_points_that_are_all_set_aside_have_no_figure(small_diagnosis, summary, monkeypatch):
     """Figures of nothing ended in an IndexError."""
     everything = property(lambda self: np.ones(len(self.base.residual), dtype=bool))
     monkeypatch.setattr(type(small_diagnosis), "gross", everything)
-    page = page_of(small_diagnosis, said)
+    page = page_of(small_diagnosis, summary)
     assert "What is left at each of" not in page
     assert "Before and after" in page
 

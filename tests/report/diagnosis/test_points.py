@@ -21,16 +21,16 @@ def rows(diagnosed):
 
 
 @pytest.mark.parametrize("state", ["declared", "refitted", "explained"])
-def test_errors_at_what_was_fitted(rows, said, state):
+def test_errors_at_what_was_fitted(rows, summary, state):
     # distances of tracked points, three rows each; none is left out
     errors = (rows["observed"] - rows[state])[rows["unit"] == "mm"]
-    assert np.sqrt(3.0 * np.mean(errors**2)) == pytest.approx(1000.0 * said["fit"]["rmse_m"][state], rel=1e-4)
+    assert np.sqrt(3.0 * np.mean(errors**2)) == pytest.approx(1000.0 * summary["fit"]["rmse_m"][state], rel=1e-4)
 
 
 @pytest.mark.parametrize("state", ["refitted", "explained"])
-def test_errors_at_what_was_held_out(rows, said, state):
+def test_errors_at_what_was_held_out(rows, summary, state):
     errors = rows[f"heldout_error_{state}"]
-    expected = 1000.0 * said["fit"]["heldout_rmse_m"][state]
+    expected = 1000.0 * summary["fit"]["heldout_rmse_m"][state]
     assert np.sqrt(3.0 * np.nanmean(errors**2)) == pytest.approx(expected, rel=1e-4)
 
 
@@ -47,8 +47,8 @@ def test_vectors_are_what_is_left_of_points(small_diagnosis):
     assert len(vectors.where) == len(recording.points)
 
 
-def test_map_says_where_the_data_are_blind(diagnosed, said):
+def test_map_says_where_the_data_are_blind(diagnosed, summary):
     fields = read_vtu(diagnosed / "map.vtu").point_data
-    above = 1000.0 * said["map"]["blind_above_n"]
+    above = 1000.0 * summary["map"]["blind_above_n"]
     np.testing.assert_array_equal(fields["blind"] == 1, fields["detectable_force"] > above)
-    np.testing.assert_array_equal(fields["significant"] == 1, fields["score"] > said["map"]["threshold"])
+    np.testing.assert_array_equal(fields["significant"] == 1, fields["score"] > summary["map"]["threshold"])

@@ -9,6 +9,7 @@ from testing_machine import case_of
 
 from warpbrain.inference.confirm import Confirmation, after_checks
 from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decision
+from warpbrain.physics.values import Value
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import CheckResults, Folds, folds_of, grown_errors, held_out
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
@@ -100,6 +101,14 @@ def test_what_stiffens_is_what_tissue_remembers_too():
     np.testing.assert_allclose(
         forward.stress(both, z), plain * np.exp(k * (strain**2 + 2.0 / strain - 3.0)), rtol=1e-12
     )
+
+
+def test_the_sentence_of_stiffening_has_the_sign_of_what_was_found():
+    case = cycles(40.0)
+    effect = stiffening(case, protocol_of(case.specimen, case.recordings))
+    for k, word in ((3.0, " more than"), (-3.0, " less than")):
+        assert word in effect.sentence_of((Value("k", k, 0.5, ""),))
+    assert "more or less" in effect.sentence_of(())
 
 
 def test_a_check_that_fails_is_said():

@@ -34,20 +34,20 @@ class Anatomy:
 
     Parameters
     ----------
-    found : Diagnosis
-    said : dict
+    diagnosis : Diagnosis
+    summary : dict
         Its `diagnosis.json`.
     """
 
-    def __init__(self, found: Diagnosis, said: dict[str, Any]) -> None:
-        self.mesh, self.said = found.base.at.system.model.mesh, said
-        self.fields = file_of_map(found).point_data
-        self.threshold = said["map"]["threshold"]
+    def __init__(self, diagnosis: Diagnosis, summary: dict[str, Any]) -> None:
+        self.mesh, self.summary = diagnosis.base.at.system.model.mesh, summary
+        self.fields = file_of_map(diagnosis).point_data
+        self.threshold = summary["map"]["threshold"]
 
     @cached_property
     def ball(self) -> tuple[Floats, float] | None:
         """Centre (3,) and radius of what was located [m]."""
-        where = self.said["where"]
+        where = self.summary["where"]
         return None if where is None else (np.array(where["centre_m"]), float(where["radius_m"]))
 
     @cached_property
@@ -114,7 +114,7 @@ def map_figure(anatomy: Anatomy) -> str:
     from matplotlib.collections import PolyCollection
     from matplotlib.patches import Circle
 
-    threshold, where = anatomy.threshold, anatomy.said["map"]
+    threshold, where = anatomy.threshold, anatomy.summary["map"]
     extent = np.ptp(anatomy.mesh.points, axis=0)
     tallest = max(float(extent[view.plane[1]] / extent[view.plane[0]]) for view in VIEWS)
 
@@ -161,7 +161,7 @@ def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> str:
     large = float(np.quantile(np.linalg.norm(first, axis=1), 0.95)) or 1e-3
     enlarged = _LONG * float(np.ptp(points, axis=0).max()) / large
     across, high = np.ptp(points[:, view.plane], axis=0)
-    errors = {state: length(anatomy.said["fit"]["rmse_m"][state]) for state in shown}
+    errors = {state: length(anatomy.summary["fit"]["rmse_m"][state]) for state in shown}
 
     def draw(narrow: bool) -> Any:
         figure, axes = panels(narrow, 0.9 + 2.8 * float(high / across), len(shown), width=3.0 * len(shown))
@@ -218,7 +218,7 @@ def view_of(anatomy: Anatomy, recorded: Recorded | None) -> View:
         ]
     score, force = anatomy.fields["score"], anatomy.fields["detectable_force"]
     moved = np.linalg.norm(anatomy.fields["displacement"], axis=1)
-    threshold, blind = anatomy.threshold, MILLIMETRES * anatomy.said["map"]["blind_above_n"]
+    threshold, blind = anatomy.threshold, MILLIMETRES * anatomy.summary["map"]["blind_above_n"]
     # only the surface is coloured
     on_it = np.unique(anatomy.mesh.boundary)
     # a few hidden places need a force beyond all others: they are as dark as what is blind twice over

@@ -27,31 +27,33 @@ from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what is named"}
 
 
-def describe(found: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:
+def describe(diagnosis: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:
     """Everything that is known of a diagnosis, lengths in metres, stresses in Pa, other units beside the values."""
-    other = ("mesh_error", "without_nuisances") if isinstance(found, SpecimenDiagnosis) else ("ends",)
+    other = ("mesh_error", "without_nuisances") if isinstance(diagnosis, SpecimenDiagnosis) else ("ends",)
     asked = {name: value for name, value in asdict(options).items() if name not in other}
-    particular = _of_specimen(found, options.alpha) if isinstance(found, SpecimenDiagnosis) else _of_body(found)
-    named, first = particular["mechanisms"], next(iter((*found.named, *found.ranking)), None)
+    particular = (
+        _of_specimen(diagnosis, options.alpha) if isinstance(diagnosis, SpecimenDiagnosis) else _of_body(diagnosis)
+    )
+    named, first = particular["mechanisms"], next(iter((*diagnosis.named, *diagnosis.ranking)), None)
     return plain(
         {
-            "verdict": found.verdict,
-            "sentence": found.sentence,
-            "p_value": found.p_value,
-            "p_left": found.p_left,
+            "verdict": diagnosis.verdict,
+            "sentence": diagnosis.sentence,
+            "p_value": diagnosis.p_value,
+            "p_left": diagnosis.p_left,
             "mechanism": named[0]["mechanism"] if named else None,
             "probability": first and first.probability,
-            "parameters": _values(found.named[0].values) if named else {},
-            "group": found.group,
-            "doubts": found.doubts,
+            "parameters": _values(diagnosis.named[0].values) if named else {},
+            "group": diagnosis.group,
+            "doubts": diagnosis.doubts,
             **particular,
-            "next_measurement": [asdict(one) for one in found.next_measurement],
-            "assumptions": found.assumptions,
-            "remarks": found.remarks,
-            "case": {"name": found.case.name, "title": found.case.title, "origin": found.case.origin},
-            "inputs_sha256": fingerprints(found.case),
+            "next_measurement": [asdict(one) for one in diagnosis.next_measurement],
+            "assumptions": diagnosis.assumptions,
+            "remarks": diagnosis.remarks,
+            "case": {"name": diagnosis.case.name, "title": diagnosis.case.title, "origin": diagnosis.case.origin},
+            "inputs_sha256": fingerprints(diagnosis.case),
             "options": asked | {"candidates": "all" if options.candidates is None else options.candidates},
-            "seconds": found.seconds,
+            "seconds": diagnosis.seconds,
             "device": device,
             "versions": machine(),
         }
@@ -80,32 +82,34 @@ def _improvement(improvement: tuple[float, float, float] | None) -> dict[str, An
     return None if improvement is None else {"part": improvement[0], "interval_95": improvement[1:]}
 
 
-def _of_body(found: Diagnosis) -> dict[str, Any]:
-    where, onset, best = found.map, found.when, found.named[0] if found.named else None
+def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
+    where, onset, best = diagnosis.map, diagnosis.when, diagnosis.named[0] if diagnosis.named else None
     place = _place(best) or (_picked(where, centre_m="centre", radius_m="radius") if where.significant else None)
     ranking = [
-        _cause(one.kind, _words(found, one), _picked(one, "physics", "heldout_rmse_change", "rejected_because"), one)
+        _cause(
+            one.kind, _words(diagnosis, one), _picked(one, "physics", "heldout_rmse_change", "rejected_because"), one
+        )
         | {"where": _place(one)}
-        for one in found.ranking
+        for one in diagnosis.ranking
     ]
     rejected = [
         _cause(kind, sentence_of_kind(kind), {"physics": kind in mechanisms(), "rejected_because": why})
         | {"where": None, "heldout_rmse_change": None}
-        for kind, why in found.rejected.items()
+        for kind, why in diagnosis.rejected.items()
     ]
     named = [
-        {"mechanism": one.kind, "says": _words(found, one), "parameters": _values(one.values), "where": _place(one)}
+        {"mechanism": one.kind, "says": _words(diagnosis, one), "parameters": _values(one.values), "where": _place(one)}
         | _picked(one, "probability", "region")
-        for one in found.named
+        for one in diagnosis.named
     ]
     return {
-        "hypotheses": [asdict(one) | {"kinds": [kind.value for kind in one.kinds]} for one in found.combinations],
-        "by_posterior": _decision(found.by_posterior),
+        "hypotheses": [asdict(one) | {"kinds": [kind.value for kind in one.kinds]} for one in diagnosis.combinations],
+        "by_posterior": _decision(diagnosis.by_posterior),
         "where": place and place | {"region": best.region if best is not None else ""}
         | {"local_p": where.local_p, "global_p": where.global_p},
         "mechanisms": named,
         "unknown": _picked(
-            found.unknown, "turning", net_force_n="force", net_force_sd_n="force_sd", net_moment_nm="moment",
+            diagnosis.unknown, "turning", net_force_n="force", net_force_sd_n="force_sd", net_moment_nm="moment",
             net_moment_sd_nm="moment_sd", from_outside="outside", net_force_hidden="hidden",
             surface_over_depth_nats="surface_nats", centre_m="centre",
         ),
@@ -118,18 +122,18 @@ def _of_body(found: Diagnosis) -> dict[str, Any]:
         },
         "ranking": ranking + rejected,
         "smallest_detectable": {
-            kind: _smallest(kind, one) | {"named_from": one.named} for kind, one in found.smallest.items()
+            kind: _smallest(kind, one) | {"named_from": one.named} for kind, one in diagnosis.smallest.items()
         },
-        "confusion": {"says": confusion_sentences(found.confusion), "rows": found.confusion.rows},
-        "fit": _fit(found),
+        "confusion": {"says": confusion_sentences(diagnosis.confusion), "rows": diagnosis.confusion.rows},
+        "fit": _fit(diagnosis),
         "map": {"largest": where.scores.max(), "places": len(where.sites)}
         | _picked(where, "threshold", "significant", patch_m="length", blind_above_n="blind_above"),
-        "equilibria": found.base.states.solves,
+        "equilibria": diagnosis.base.states.solves,
     }  # fmt: skip
 
 
-def _words(found: Diagnosis, one: Ranked) -> str:
-    return effect_sentence(one, found.case.gravity_axis)
+def _words(diagnosis: Diagnosis, one: Ranked) -> str:
+    return effect_sentence(one, diagnosis.case.gravity_axis)
 
 
 def _cause(
@@ -146,8 +150,8 @@ def _place(one: Ranked | None) -> dict[str, Any] | None:
     return None if one is None or one.centre is None else _picked(one, centre_m="centre", radius_m="radius")
 
 
-def _fit(found: Diagnosis) -> dict[str, Any]:
-    fit, noise, sensors = found.fit, found.base.noise, found.base.at.sensors
+def _fit(diagnosis: Diagnosis) -> dict[str, Any]:
+    fit, noise, sensors = diagnosis.fit, diagnosis.base.noise, diagnosis.base.at.sensors
     rows = {"declared": fit.declared, "refitted": fit.refitted, "explained": fit.explained}
     moved = sensors.is_displacement
     return {
@@ -162,43 +166,43 @@ def _fit(found: Diagnosis) -> dict[str, Any]:
         "placebo_heldout_rmse_m": fit.placebo,
         "confirmations": [
             {"mechanism" if key == "name" else key: value for key, value in asdict(one).items()}
-            for one in found.confirmations
+            for one in diagnosis.confirmations
         ],
     }
 
 
-def _of_specimen(found: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
-    where, scores = found.where, {name: found.scores.get(name) for name in STATES}
+def _of_specimen(diagnosis: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
+    where, scores = diagnosis.where, {name: diagnosis.scores.get(name) for name in STATES}
     rejected = [
         _cause(name, "", {"physics": True, "rejected_because": why, "heldout_rmse_change_pa": None})
-        for name, why in found.rejected.items()
+        for name, why in diagnosis.rejected.items()
     ]
     confirmations = [
         {"mechanism": one.name, "heldout_gain": _improvement(one.gain), "why_not": one.why_not(alpha)}
         | _picked(one, "log_evidence", "heldout_log_density", "placebo_p")
-        for one in found.confirmations
+        for one in diagnosis.confirmations
     ]
     return {
-        "mechanisms": [_ranked_of_specimen(one) for one in found.named],
+        "mechanisms": [_ranked_of_specimen(one) for one in diagnosis.named],
         "where": _picked(where, "test", "mode", "segment", "strain"),
         "when": {"seconds": where.time} if where is not None and where.time is not None else None,
-        "ranking": [_ranked_of_specimen(one) for one in found.ranking] + rejected,
-        "combinations": [asdict(one) for one in found.combinations],
-        "before_checks": _decision(found.by_posterior),
-        "smallest_detectable": {name: _smallest(name, one) for name, one in found.smallest.items()},
+        "ranking": [_ranked_of_specimen(one) for one in diagnosis.ranking] + rejected,
+        "combinations": [asdict(one) for one in diagnosis.combinations],
+        "before_checks": _decision(diagnosis.by_posterior),
+        "smallest_detectable": {name: _smallest(name, one) for name, one in diagnosis.smallest.items()},
         "fit": {
             "rmse_pa": {name: one and one.fitted for name, one in scores.items()},
             "heldout_rmse_pa": {name: one and one.heldout for name, one in scores.items()},
             "check_rmse_pa": {name: one and one.check for name, one in scores.items()},
             "rows": "all that were recorded",
-            "held_out": "each test in turn" if found.by_test else "each quarter of the only test in turn",
-            "improvement": _improvement(found.improvement),
+            "held_out": "each test in turn" if diagnosis.by_test else "each quarter of the only test in turn",
+            "improvement": _improvement(diagnosis.improvement),
             "confirmations": confirmations,
         },
         "tests": [
             {"role": "fit" if test.fitted else "check", "rows": len(test.strain)}
             | _picked(test, "name", "mode", "specimen", largest_stress_pa="peak", pa_per_unit="unit")
-            for test in found.protocol.tests
+            for test in diagnosis.protocol.tests
         ],
     }
 

@@ -23,7 +23,7 @@ _STYLES = {"declared": ":", "refitted": "--", "explained": "-"}
 _SHOWN, _DARK = 0.01, 0.55
 
 
-def agreement_figure(said: dict[str, Any], recorded: Recorded) -> str:
+def agreement_figure(summary: dict[str, Any], recorded: Recorded) -> str:
     """Observed beside computed, one panel a state, on common scales: every component of a displacement."""
     from matplotlib.ticker import MaxNLocator
 
@@ -32,7 +32,7 @@ def agreement_figure(said: dict[str, Any], recorded: Recorded) -> str:
     ends = np.concatenate([observed, *computed.values()])
     margin = 0.05 * float(np.ptp(ends)) or 1.0
     limits = (float(ends.min()) - margin, float(ends.max()) + margin)
-    errors = {state: length(said["fit"]["rmse_m"][state]) for state in shown}
+    errors = {state: length(summary["fit"]["rmse_m"][state]) for state in shown}
 
     def draw(narrow: bool) -> Any:
         figure, axes = panels(narrow, 3.6, len(shown), sharex=True, sharey=True, width=2.75 * len(shown))
@@ -89,11 +89,11 @@ def confusion_figure(rows: dict[str, dict[str, float]]) -> str:
     return inlined(draw, f"How much of each mechanism others imitate; most: {most}.", caption)
 
 
-def curves_figure(found: SpecimenDiagnosis) -> str:
+def curves_figure(diagnosis: SpecimenDiagnosis) -> str:
     """Stress of tests, recorded and computed: one panel a test, over strain, or over time where the strain is held."""
     from matplotlib.figure import Figure
 
-    tests = found.protocol.tests
+    tests = diagnosis.protocol.tests
 
     def draw(narrow: bool) -> Any:
         columns = 1 if narrow else min(3, len(tests))
@@ -101,8 +101,10 @@ def curves_figure(found: SpecimenDiagnosis) -> str:
         size = (NARROW if narrow else WIDTH, 0.5 + 2.3 * lines)
         figure = Figure(figsize=size, layout="constrained", facecolor="white")
         grid = figure.subplots(lines, columns, squeeze=False).ravel()
-        for panel, test, rows in zip(grid, tests, found.protocol.rows, strict=False):
-            _curve(panel, test, {state: found.stresses[state][rows] for state in STATES if state in found.stresses})
+        for panel, test, rows in zip(grid, tests, diagnosis.protocol.rows, strict=False):
+            _curve(
+                panel, test, {state: diagnosis.stresses[state][rows] for state in STATES if state in diagnosis.stresses}
+            )
         for empty in grid[len(tests) :]:
             empty.set_visible(False)
         grid[0].legend(fontsize=TEXT - 2, frameon=False)

@@ -22,13 +22,13 @@ from warpbrain.report.files import MILLIMETRES
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 
-def write_map(path: Path, found: Diagnosis) -> None:
+def write_map(path: Path, diagnosis: Diagnosis) -> None:
     """Write `file_of_map`."""
     with whole_file(path) as temporary:
-        write_vtu(temporary, file_of_map(found))
+        write_vtu(temporary, file_of_map(diagnosis))
 
 
-def file_of_map(found: Diagnosis) -> Any:
+def file_of_map(diagnosis: Diagnosis) -> Any:
     """Where the mismatch is, and what the data can see, as a `meshio.Mesh` with coordinates in mm.
 
     Point arrays: ``score`` (chi-squared of three degrees of freedom of the nearest place), ``significant`` (above the
@@ -38,7 +38,7 @@ def file_of_map(found: Diagnosis) -> Any:
     import meshio
     from scipy.spatial import cKDTree
 
-    mesh, where = found.base.at.system.model.mesh, found.map
+    mesh, where = diagnosis.base.at.system.model.mesh, diagnosis.map
     nearest = cKDTree(where.sites).query(mesh.points)[1]
     scores = where.scores[nearest]
     return meshio.Mesh(
@@ -50,7 +50,7 @@ def file_of_map(found: Diagnosis) -> Any:
             "region": (where.region[nearest] & where.significant).astype(np.uint8),
             "detectable_force": 1000.0 * where.detectable[nearest],
             "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
-            "displacement": found.base.at.u * MILLIMETRES,
+            "displacement": diagnosis.base.at.u * MILLIMETRES,
         },
         cell_data={"tissue": [mesh.tissue]},
     )
@@ -88,20 +88,20 @@ class Recorded:
     columns: Mapping[str, Any]
 
     @classmethod
-    def of(cls, found: Diagnosis) -> Recorded:
+    def of(cls, diagnosis: Diagnosis) -> Recorded:
         """Of a diagnosis, lengths in mm, forces in N, axes RAS.
 
         `observed` is along `direction`; `declared`, `refitted` and `explained` are what was computed of it: in the case
         as declared, with its tissue refitted beside all that is no physics, and with what is named. A held-out error is
         what was observed less what is predicted without the point and those around it.
         """
-        sensors = found.base.declared.sensors
+        sensors = diagnosis.base.declared.sensors
         moved, nothing = sensors.is_displacement, np.full(len(sensors), np.nan)
         factors = np.where(moved, MILLIMETRES, 1.0)
         observed = sensors.computed + sensors.residual
         computed, held = {"declared": factors * sensors.computed}, {}
         for state in (REFITTED, EXPLAINED):
-            known, predicted = found.weighted_sets.get(state), found.held_out.get(state)
+            known, predicted = diagnosis.weighted_sets.get(state), diagnosis.held_out.get(state)
             computed[state] = nothing if known is None else factors * (observed - known.best_residual)
             errors = nothing if predicted is None else np.where(moved, predicted.errors, np.nan)
             held[f"heldout_error_{state}"] = factors * errors
@@ -116,7 +116,7 @@ class Recorded:
                 "observed": factors * observed,
                 **computed,
                 **held,
-                "set_aside": found.gross.astype(int),
+                "set_aside": diagnosis.gross.astype(int),
             }
         )
 
@@ -163,14 +163,14 @@ class Recorded:
         return Vectors(where[first] / MILLIMETRES, left, self["set_aside"][rows][first] > 0)
 
 
-def write_points(path: Path, found: Diagnosis) -> None:
+def write_points(path: Path, diagnosis: Diagnosis) -> None:
     """Write `Recorded`, one row for each number; what does not apply is empty."""
-    _write_csv(path, Recorded.of(found).columns, "{:.6g}")
+    _write_csv(path, Recorded.of(diagnosis).columns, "{:.6g}")
 
 
-def write_curves(path: Path, found: SpecimenDiagnosis) -> None:
+def write_curves(path: Path, diagnosis: SpecimenDiagnosis) -> None:
     """Write one row for each that was compared; times [s] are empty where there are none, stresses are nominal [Pa]."""
-    tests = found.protocol.tests
+    tests = diagnosis.protocol.tests
     counts = [len(test.strain) for test in tests]
     columns: dict[str, Any] = {
         "test": np.repeat([test.name for test in tests], counts),
@@ -178,9 +178,9 @@ def write_curves(path: Path, found: SpecimenDiagnosis) -> None:
         "role": np.repeat(["fit" if test.fitted else "check" for test in tests], counts),
         "time_s": np.concatenate([np.full(len(t.strain), np.nan) if t.time is None else t.time for t in tests]),
         "strain": np.concatenate([test.strain for test in tests]),
-        "recorded_pa": found.protocol.observed,
+        "recorded_pa": diagnosis.protocol.observed,
     }
-    columns |= {f"{name.replace(' ', '_')}_pa": values for name, values in found.stresses.items()}
+    columns |= {f"{name.replace(' ', '_')}_pa": values for name, values in diagnosis.stresses.items()}
     _write_csv(path, columns, "{:.9g}")
 
 
@@ -193,7 +193,7 @@ def _write_csv(path: Path, columns: Mapping[str, Any], digits: str) -> None:
         csv.writer(stream, lineterminator="\n").writerows([list(columns), *zip(*texts, strict=True)])
 
 
-def write_covariance(path: Path, found: Diagnosis) -> None:
+def write_covariance(path: Path, diagnosis: Diagnosis) -> None:
     """Write the `covariance` (n, n) of noise and nuisances, its rows those of `points.csv` in their units, mm and N.
 
     With `change` (n,) what an effect changes there, of displacements along `direction` (n, 3), the effect stands out by
@@ -201,9 +201,9 @@ def write_covariance(path: Path, found: Diagnosis) -> None:
     `points.csv` tells. Gross errors are in it with the noise that was declared, and all noise is as many
     times larger as was found.
     """
-    base = found.base
+    base = diagnosis.base
     sensors = base.at.sensors
-    without = found.weighted_sets[REFITTED].marginal
+    without = diagnosis.weighted_sets[REFITTED].marginal
     noise = without.scale * without.model.noise_factor
     factors = np.where(sensors.is_displacement, MILLIMETRES, 1.0)[:, None]
     parts = factors * np.column_stack([noise, base.nuisances.columns])

@@ -34,18 +34,18 @@ _BADGES = {
 }
 
 
-def write_page(path: Path, found: Diagnosis | SpecimenDiagnosis, said: dict[str, Any]) -> None:
+def write_page(path: Path, diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any]) -> None:
     """Write the page of a diagnosis; arguments as of `page_of`."""
-    document.write_document(path, page_of(found, said))
+    document.write_document(path, page_of(diagnosis, summary))
 
 
-def page_of(found: Diagnosis | SpecimenDiagnosis, said: dict[str, Any]) -> str:
+def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any]) -> str:
     """The page.
 
     Parameters
     ----------
-    found : Diagnosis or SpecimenDiagnosis
-    said : dict
+    diagnosis : Diagnosis or SpecimenDiagnosis
+    summary : dict
         Its `diagnosis.json`.
     """
     sections: list[document.Section] = []
@@ -59,18 +59,20 @@ def page_of(found: Diagnosis | SpecimenDiagnosis, said: dict[str, Any]) -> str:
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     environment.filters |= {"percent": percent, "table": _table}
-    recorded = Recorded.of(found) if isinstance(found, Diagnosis) else None
+    recorded = Recorded.of(diagnosis) if isinstance(diagnosis, Diagnosis) else None
     environment.get_template("page.html").render(
         section=section,
-        said=said,
-        pictures=defaultdict(str, _pictures(found, said, recorded)),
+        summary=summary,
+        pictures=defaultdict(str, _pictures(diagnosis, summary, recorded)),
         text=text,
-        next=[[one["what"], f"{one['expected_nats']:.1f}"] for one in said["next_measurement"]],
+        next=[[one["what"], f"{one['expected_nats']:.1f}"] for one in summary["next_measurement"]],
         aside=[] if recorded is None else recorded.aside,
-        chances={one["mechanism"]: one["probability"] for one in said["ranking"]},
+        chances={one["mechanism"]: one["probability"] for one in summary["ranking"]},
     )
-    top = document.header(said["case"]["title"], said["verdict"], [said["sentence"]], _facts(said))
-    return document.document(f"{said['verdict']}: {said['case']['title']}", top, sections, _BADGES[said["verdict"]])
+    top = document.header(summary["case"]["title"], summary["verdict"], [summary["sentence"]], _facts(summary))
+    return document.document(
+        f"{summary['verdict']}: {summary['case']['title']}", top, sections, _BADGES[summary["verdict"]]
+    )
 
 
 def _table(rows: Iterable[Sequence[Any]], head: Sequence[str], numbers: Sequence[int] = (), caption: str = "") -> str:
@@ -79,34 +81,36 @@ def _table(rows: Iterable[Sequence[Any]], head: Sequence[str], numbers: Sequence
     return table(head, cells, numbers, caption) if cells else ""
 
 
-def _pictures(found: Diagnosis | SpecimenDiagnosis, said: dict[str, Any], recorded: Recorded | None) -> dict[str, str]:
+def _pictures(
+    diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], recorded: Recorded | None
+) -> dict[str, str]:
     """Figures and the 3-D view by name; of what was not recorded there are none."""
-    if recorded is None or not isinstance(found, Diagnosis):
-        return {"curves": curves_figure(found)} if isinstance(found, SpecimenDiagnosis) else {}
-    anatomy = Anatomy(found, said)
+    if recorded is None or not isinstance(diagnosis, Diagnosis):
+        return {"curves": curves_figure(diagnosis)} if isinstance(diagnosis, SpecimenDiagnosis) else {}
+    anatomy = Anatomy(diagnosis, summary)
     pictures, points = {"map": map_figure(anatomy)}, recorded.lengths.any() and not recorded.vectors.aside.all()
     if points:
         pictures["residuals"] = residuals_figure(anatomy, recorded)
     if recorded.counted.any():
-        pictures["agreement"] = agreement_figure(said, recorded)
+        pictures["agreement"] = agreement_figure(summary, recorded)
     view = view_of(anatomy, recorded if points else None)
     pictures["view"] = viewer(view, "what is left", "Arrows go from the computed to the observed place.")
-    if said["confusion"]["rows"]:
-        pictures["confusion"] = confusion_figure(said["confusion"]["rows"])
+    if summary["confusion"]["rows"]:
+        pictures["confusion"] = confusion_figure(summary["confusion"]["rows"])
     return pictures
 
 
-def _facts(said: dict[str, Any]) -> list[tuple[str, str]]:
-    facts = [("p, nothing missing", f"{said['p_value']:.2g}")]
-    if named := said["mechanisms"]:
+def _facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    facts = [("p, nothing missing", f"{summary['p_value']:.2g}")]
+    if named := summary["mechanisms"]:
         facts.insert(0, ("mechanism", document.text(" and ".join(one["mechanism"] for one in named))))
         facts.append(("probability", " and ".join(percent(one["probability"]) for one in named)))
-    suffix, factor, unit = text.unit_of(said)
-    held = said["fit"][f"heldout_rmse_{suffix}"]
+    suffix, factor, unit = text.unit_of(summary)
+    held = summary["fit"][f"heldout_rmse_{suffix}"]
     errors = [f"{factor * held[state]:.3g}" for state in ("refitted", "explained") if held[state] is not None]
     if errors:
         facts.append(("held-out error", f"{' → '.join(errors)} {unit}"))
-    if improvement := said["fit"]["improvement"]:
+    if improvement := summary["fit"]["improvement"]:
         low, high = (100.0 * value for value in improvement["interval_95"])
         facts.append(("of it gone (95 %)", f"{100.0 * improvement['part']:.0f} % ({low:.0f} to {high:.0f})"))
     return facts

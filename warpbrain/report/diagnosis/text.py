@@ -15,36 +15,36 @@ from warpbrain.report.files import MILLIMETRES
 _WIDTH = 110
 #: Times at which a size that changes is said; sets of causes and measurements that are.
 _TIMES, _SETS, _NEXT = 5, 6, 5
-Said = Mapping[str, Any]
+Summary = Mapping[str, Any]
 
 
-def diagnosis_lines(said: Said) -> list[str]:
+def diagnosis_lines(summary: Summary) -> list[str]:
     """The verdict on top, then sets of causes, each cause, the fit and what to do next."""
-    return [*_verdict(said), "", *_causes(said), "", *_fit(said), *_further(said)]
+    return [*_verdict(summary), "", *_causes(summary), "", *_fit(summary), *_further(summary)]
 
 
-def unit_of(said: Said) -> tuple[str, float, str]:
+def unit_of(summary: Summary) -> tuple[str, float, str]:
     """Of errors: how keys of `diagnosis.json` end, a factor to what is shown, and its unit."""
-    return ("m", MILLIMETRES, "mm") if "rmse_m" in said["fit"] else ("pa", 1.0, "Pa")
+    return ("m", MILLIMETRES, "mm") if "rmse_m" in summary["fit"] else ("pa", 1.0, "Pa")
 
 
-def set_rows(said: Said) -> list[list[str]]:
+def set_rows(summary: Summary) -> list[list[str]]:
     """The most probable sets of causes: which, with what probability, and the log evidence against nothing."""
-    sets = said.get("combinations", said.get("hypotheses"))
+    sets = summary.get("combinations", summary.get("hypotheses"))
     # of a specimen it is against nothing already
-    nothing = 0.0 if "combinations" in said else next((s["log_evidence"] for s in sets if not s["causes"]), 0.0)
+    nothing = 0.0 if "combinations" in summary else next((s["log_evidence"] for s in sets if not s["causes"]), 0.0)
     return [
         [" and ".join(s["causes"]) or "nothing", percent(s["probability"]), f"{s['log_evidence'] - nothing:+.1f}"]
         for s in sets[:_SETS]
     ]
 
 
-def candidate_rows(said: Said) -> list[list[str]]:
+def candidate_rows(summary: Summary) -> list[list[str]]:
     """Every candidate that was tried, the most probable first: name, probability, log evidence, `d`, change of the
     held-out error, what it says, and why it is behind."""
-    suffix, factor, unit = unit_of(said)
+    suffix, factor, unit = unit_of(summary)
     rows = []
-    for one in said["ranking"]:
+    for one in summary["ranking"]:
         if one["log_evidence"] is not None:
             held = one["heldout_rmse_change" if suffix == "m" else "heldout_rmse_change_pa"]
             d = one["detectability"] if one["physics"] else None
@@ -55,14 +55,14 @@ def candidate_rows(said: Said) -> list[list[str]]:
     return rows
 
 
-def rejected_rows(said: Said) -> list[list[str]]:
+def rejected_rows(summary: Summary) -> list[list[str]]:
     """What was not tried, and why."""
-    return [[one["mechanism"], one["rejected_because"]] for one in said["ranking"] if one["log_evidence"] is None]
+    return [[one["mechanism"], one["rejected_because"]] for one in summary["ranking"] if one["log_evidence"] is None]
 
 
-def fit_rows(said: Said) -> list[list[str]]:
+def fit_rows(summary: Summary) -> list[list[str]]:
     """Errors of each state, at what was fitted, held out, and only checked; beside them what others would reach."""
-    (suffix, factor, _), fit = unit_of(said), said["fit"]
+    (suffix, factor, _), fit = unit_of(summary), summary["fit"]
 
     def cell(value: Any) -> str:
         if isinstance(value, dict):
@@ -82,10 +82,10 @@ def fit_rows(said: Said) -> list[list[str]]:
     return rows
 
 
-def smallest_rows(said: Said) -> list[list[str]]:
+def smallest_rows(summary: Summary) -> list[list[str]]:
     """What these data would have shown of each mechanism, and from which size half would be named."""
     rows = []
-    for kind, one in said["smallest_detectable"].items():
+    for kind, one in summary["smallest_detectable"].items():
         named = one.get("named_from")
         # of what is there or not there is no size
         of_size = named is not None and one["unit"] != "of being there"
@@ -93,14 +93,14 @@ def smallest_rows(said: Said) -> list[list[str]]:
     return rows
 
 
-def placebo_sentences(said: Said) -> list[str]:
+def placebo_sentences(summary: Summary) -> list[str]:
     """How often patterns that mean nothing do as well as what was added."""
-    fit, words = said["fit"], "pattern that means nothing does as well with p ="
+    fit, words = summary["fit"], "pattern that means nothing does as well with p ="
     together = [] if fit.get("placebo_p") is None else [f"A {words} {fit['placebo_p']:.2g}."]
     return together or [f"{one['mechanism']}: a {words} {one['placebo_p']:.2g}." for one in fit["confirmations"]]
 
 
-def where_in_words(where: Said) -> str:
+def where_in_words(where: Summary) -> str:
     """Where a mismatch is largest: a place in a body, or a part of a test."""
     if "test" in where:
         low, high = where["strain"]
@@ -111,7 +111,7 @@ def where_in_words(where: Said) -> str:
     return f"({x:z.1f}, {y:z.1f}, {z:z.1f}) mm in RAS, {within}; p = {where['global_p']:.2g} looking everywhere"
 
 
-def when_in_words(when: Said) -> str:
+def when_in_words(when: Summary) -> str:
     """When something set in, how surely, and how it came."""
     first, last = when["seconds"]
     if "course" not in when:
@@ -133,52 +133,52 @@ def _wrapped(sentence: str, following: str = "  ") -> list[str]:
     return textwrap.wrap(sentence, _WIDTH, initial_indent="  ", subsequent_indent=following)
 
 
-def _verdict(said: Said) -> Iterator[str]:
-    yield f"VERDICT: {said['verdict']}"
-    yield from _wrapped(said["sentence"])
-    if said["where"] is not None:
-        yield f"  where: {where_in_words(said['where'])}"
-    if said["when"] is not None:
-        yield f"  when: {when_in_words(said['when'])}"
+def _verdict(summary: Summary) -> Iterator[str]:
+    yield f"VERDICT: {summary['verdict']}"
+    yield from _wrapped(summary["sentence"])
+    if summary["where"] is not None:
+        yield f"  where: {where_in_words(summary['where'])}"
+    if summary["when"] is not None:
+        yield f"  when: {when_in_words(summary['when'])}"
 
 
-def _causes(said: Said) -> Iterator[str]:
-    yield f"  p = {said['p_value']:.2g} that nothing is missing; the most probable sets of causes:"
-    for causes, probability, evidence in set_rows(said):
+def _causes(summary: Summary) -> Iterator[str]:
+    yield f"  p = {summary['p_value']:.2g} that nothing is missing; the most probable sets of causes:"
+    for causes, probability, evidence in set_rows(summary):
         yield f"    {causes:<60} {probability:>10}   log evidence {evidence:>8}"
-    if said["p_left"] is not None:
-        yield f"  p = {said['p_left']:.2g} that nothing is left beside the causes that the verdict is about"
+    if summary["p_left"] is not None:
+        yield f"  p = {summary['p_left']:.2g} that nothing is left beside the causes that the verdict is about"
     yield from ["", "  candidate          probability   log evidence        d    held-out RMSE    estimate"]
-    values = {one["mechanism"]: list(one["estimate"].items())[:3] for one in said["ranking"]}
-    for name, probability, evidence, d, change, *_ in candidate_rows(said):
+    values = {one["mechanism"]: list(one["estimate"].items())[:3] for one in summary["ranking"]}
+    for name, probability, evidence, d, change, *_ in candidate_rows(summary):
         each = (f"{key} {v['value']:.3g} ± {v['sd']:.2g} {v['unit']}".rstrip() for key, v in values[name])
         numbers = f"{probability:>11} {evidence:>14} {d:>8}   {change:>13}"
         yield f"  {name:<18} {numbers}    {', '.join(each)}".rstrip()
-    if rejected := rejected_rows(said):
+    if rejected := rejected_rows(summary):
         yield from ["", "  not tried:", *(f"    {name}: {why}" for name, why in rejected)]
 
 
-def _fit(said: Said) -> Iterator[str]:
-    rows = [[f"RMSE [{unit_of(said)[2]}]", "fitted", "held out", "check"], *fit_rows(said)]
+def _fit(summary: Summary) -> Iterator[str]:
+    rows = [[f"RMSE [{unit_of(summary)[2]}]", "fitted", "held out", "check"], *fit_rows(summary)]
     width = max(len(row[0]) for row in rows)
     for name, *errors in rows:
         inside, outside, check = errors if any(row[3] for row in rows[1:]) else (*errors[:2], "")
         yield f"  {name:<{width}} {inside:>8}   {outside:>14}   {check}".rstrip()
-    if improvement := said["fit"]["improvement"]:
+    if improvement := summary["fit"]["improvement"]:
         part, low, high = (100.0 * value for value in (improvement["part"], *improvement["interval_95"]))
         yield f"  held-out error falls by {part:.0f} % (95 %: {low:.0f} to {high:.0f} %)"
-    yield from (f"  {sentence}" for sentence in placebo_sentences(said))
-    for one in said["fit"]["confirmations"]:
+    yield from (f"  {sentence}" for sentence in placebo_sentences(summary))
+    for one in summary["fit"]["confirmations"]:
         held_out = f"of held-out rows {-one['heldout_log_density']:+.1f}"
         yield f"  without {one['mechanism']}: log evidence {-one['log_evidence']:+.1f}, {held_out}"
 
 
-def _further(said: Said) -> Iterator[str]:
-    if said["verdict"] != NOTHING and said["smallest_detectable"]:
-        shown = "; ".join(f"{kind} {one['says']}" for kind, one in said["smallest_detectable"].items())
+def _further(summary: Summary) -> Iterator[str]:
+    if summary["verdict"] != NOTHING and summary["smallest_detectable"]:
+        shown = "; ".join(f"{kind} {one['says']}" for kind, one in summary["smallest_detectable"].items())
         yield from ["", *_wrapped(f"What these data would have shown: {shown}.", "    ")]
-    if said["next_measurement"]:
+    if summary["next_measurement"]:
         yield from ["", "  what to measure next (expected log Bayes factor between the two most probable mechanisms):"]
-        yield from (f"    {one['expected_nats']:8.1f}  {one['what']}" for one in said["next_measurement"][:_NEXT])
-    if said.get("confusion"):
-        yield from ["", *(line for sentence in said["confusion"]["says"] for line in _wrapped(sentence, "    "))]
+        yield from (f"    {one['expected_nats']:8.1f}  {one['what']}" for one in summary["next_measurement"][:_NEXT])
+    if summary.get("confusion"):
+        yield from ["", *(line for sentence in summary["confusion"]["says"] for line in _wrapped(sentence, "    "))]

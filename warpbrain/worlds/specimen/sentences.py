@@ -19,35 +19,35 @@ from warpbrain.worlds.specimen.result import Ranked, SpecimenDiagnosis
 _VALUES = 6
 
 
-def sentence_of(found: SpecimenDiagnosis) -> str:
+def sentence_of(diagnosis: SpecimenDiagnosis) -> str:
     """The verdict for people."""
-    return " ".join([_verdict(found), *found.doubts])
+    return " ".join([_verdict(diagnosis), *diagnosis.doubts])
 
 
-def _verdict(found: SpecimenDiagnosis) -> str:
-    p, causes = f"p = {found.p_value:.2g}", found.decision.causes
-    if found.verdict == NOTHING:
-        seen = "; ".join(f"{name} {smallest_in_words(name, one)}" for name, one in found.smallest.items())
+def _verdict(diagnosis: SpecimenDiagnosis) -> str:
+    p, causes = f"p = {diagnosis.p_value:.2g}", diagnosis.decision.causes
+    if diagnosis.verdict == NOTHING:
+        seen = "; ".join(f"{name} {smallest_in_words(name, one)}" for name, one in diagnosis.smallest.items())
         return (
             f"No missing physics is detected ({p}). What these tests would have shown: "
             f"{seen or 'none of those that were looked for'}."
         )
-    if found.verdict in (NAMED, NAMED_AND_REST):
-        rest = " Something else is left, which this does not explain." if found.verdict == NAMED_AND_REST else ""
-        first, *others = map(effect_sentence, found.named)
+    if diagnosis.verdict in (NAMED, NAMED_AND_REST):
+        rest = " Something else is left, which this does not explain." if diagnosis.verdict == NAMED_AND_REST else ""
+        first, *others = map(effect_sentence, diagnosis.named)
         beside = [f"Beside it: {sentence[0].lower()}{sentence[1:]}" for sentence in others]
-        return f"{' '.join([first, *beside])} {_grounds(found)}{rest}"
-    if found.verdict == NOT_PHYSICS:
-        sentences = " ".join(one.sentence for one in found.ranking if one.name in causes)
+        return f"{' '.join([first, *beside])} {_grounds(diagnosis)}{rest}"
+    if diagnosis.verdict == NOT_PHYSICS:
+        sentences = " ".join(one.sentence for one in diagnosis.ranking if one.name in causes)
         return f"It is not physics that is missing ({p}). {sentences} That explains the mismatch better."
-    if found.verdict == UNKNOWN:
+    if diagnosis.verdict == UNKNOWN:
         return (
             f"Something is missing ({p}) that none of the known mechanisms explains: a smooth change of single tests "
             "fits better than all of them."
         )
-    members = [one for one in found.ranking if one.name in causes and one.name != UNKNOWN]
+    members = [one for one in diagnosis.ranking if one.name in causes and one.name != UNKNOWN]
     which = "; or ".join(f"{_clause(one)} ({percent(one.probability)})" for one in members)
-    if found.verdict == GROUP:
+    if diagnosis.verdict == GROUP:
         other = "; or something without a name" if UNKNOWN in causes else ""
         return f"Something is missing ({p}), and these tests do not tell which of these it is: {which}{other}."
     perhaps = f" Perhaps: {which}." if members else ""
@@ -64,10 +64,10 @@ def _clause(one: Ranked) -> str:
     return f"{one.sentence[0].lower()}{one.sentence[1:].rstrip('.')}"
 
 
-def _grounds(found: SpecimenDiagnosis) -> str:
-    before, after = (pascals(found.scores[name].heldout or 0.0) for name in ("refitted", "explained"))
-    chances = " and ".join(percent(one.probability) for one in found.named)
-    probable, it = ("Its probability is", "it") if len(found.named) == 1 else ("Their probabilities are", "them")
+def _grounds(diagnosis: SpecimenDiagnosis) -> str:
+    before, after = (pascals(diagnosis.scores[name].heldout or 0.0) for name in ("refitted", "explained"))
+    chances = " and ".join(percent(one.probability) for one in diagnosis.named)
+    probable, it = ("Its probability is", "it") if len(diagnosis.named) == 1 else ("Their probabilities are", "them")
     return (
         f"{probable} {chances}; tests that were held out are predicted to {after} with {it}, to {before} without {it}."
     )
