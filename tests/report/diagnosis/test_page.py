@@ -76,7 +76,7 @@ def test_a_specimen_has_curves_in_the_place_of_an_anatomy():
     assert "asymmetry: a pattern that means nothing does as well with p = " in body
     before, after = (f"{found.scores[state].heldout:.3g}" for state in ("refitted", "explained"))
     assert f"{before} → {after} Pa" in body
-    assert "most in rod &amp; &lt;more&gt; (axial), loading, at stretches or shears from" in body
+    assert "The mismatch is largest in rod &amp; &lt;more&gt; (axial), loading, at stretches or shears from" in body
     assert f"pull {found.scores['explained'].check['pull']:.4g}" in body
     assert "Recorded and computed stress of 2 tests" in body and body.count("<img") == 1
     # sets of causes as of a body

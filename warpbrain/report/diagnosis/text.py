@@ -105,10 +105,10 @@ def where_in_words(where: Summary) -> str:
     if "test" in where:
         low, high = where["strain"]
         part = f"{where['test']} ({where['mode']}), {where['segment']}"
-        return f"most in {part}, at stretches or shears from {low:.3g} to {high:.3g}"
+        return f"in {part}, at stretches or shears from {low:.3g} to {high:.3g}"
     x, y, z = (MILLIMETRES * value for value in where["centre_m"])
     within = f"within {MILLIMETRES * where['radius_m']:.1f} mm"
-    return f"({x:z.1f}, {y:z.1f}, {z:z.1f}) mm in RAS, {within}; p = {where['global_p']:.2g} looking everywhere"
+    return f"about ({x:z.1f}, {y:z.1f}, {z:z.1f}) mm in RAS, {within}; p = {where['global_p']:.2g} looking everywhere"
 
 
 def when_in_words(when: Summary) -> str:

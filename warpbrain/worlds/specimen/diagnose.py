@@ -128,7 +128,13 @@ class DiagnosingSpecimen:
             ranking=ranking,
             rejected=rejected,
             combinations=tuple(
-                Combination(one.hypothesis.causes, one.hypothesis.log_evidence - nothing, p, one.fit is not None)
+                Combination(
+                    # what has no name comes last
+                    tuple(sorted(one.hypothesis.causes, key=lambda name: name == UNKNOWN)),
+                    one.hypothesis.log_evidence - nothing,
+                    p,
+                    one.fit is not None,
+                )
                 for one, p in ordered[:_TOLD]
             ),
             assumed=tuple(sorted(best.names)),
