@@ -9,8 +9,8 @@ from shapes import box
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.diagnosis.diagnose import Diagnosing
-from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.inference.decide import Decision
 from warpbrain.mesh import TetMesh, write_mesh
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.gravity import Gravity
@@ -18,6 +18,7 @@ from warpbrain.recordings.location import locate
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
+from warpbrain.worlds.options import DiagnosisOptions
 
 #: What is looked for: few kinds take few seconds.
 OPTIONS = DiagnosisOptions(candidates=("gravity", "pressure", "swelling", "falx"), mesh_error=False)
@@ -99,3 +100,12 @@ def write_sinking(folder: Path, also: tuple[Mechanism, ...] = ()) -> Case:
 def diagnose_sinking(folder: Path, also: tuple[Mechanism, ...] = ()) -> Diagnosis:
     """Its diagnosis, in seconds."""
     return Diagnosing(write_sinking(folder, also), OPTIONS, "cpu").run()
+
+
+def verdict_of(found, verdict):
+    """The diagnosis as if another verdict had been given."""
+    if verdict.startswith("named"):
+        return replace(found, decision=Decision(verdict, ("gravity",)))
+    fit = replace(found.fit, explained=None, improvement=None, placebo_p=None)
+    causes = {"group": ("gravity", "swelling"), "not physics": ("registration",)}.get(verdict, ())
+    return replace(found, decision=Decision(verdict, causes), named=(), explained=None, fit=fit)

@@ -58,7 +58,7 @@ _HOMES = {
     "estimation.estimate": ("estimate",),
     "estimation.options": ("EstimationOptions",),
     "diagnosis.diagnose": ("diagnose",),
-    "diagnosis.options": ("DiagnosisOptions",),
+    "worlds.options": ("DiagnosisOptions",),
     "diagnosis.result": ("Diagnosis",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

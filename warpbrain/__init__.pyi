@@ -10,7 +10,6 @@ from warpbrain.cases.reading import read_case as read_case
 from warpbrain.cases.shipped import find_case as find_case
 from warpbrain.cases.writing import write_case as write_case
 from warpbrain.diagnosis.diagnose import diagnose as diagnose
-from warpbrain.diagnosis.options import DiagnosisOptions as DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis as Diagnosis
 from warpbrain.ensemble.results import EnsembleResult as EnsembleResult
 from warpbrain.ensemble.run import ensemble as ensemble
@@ -57,6 +56,7 @@ from warpbrain.simulation.run import Run as Run
 from warpbrain.simulation.run import run as run
 from warpbrain.simulation.specimen_run import SpecimenRun as SpecimenRun
 from warpbrain.simulation.system import System as System
+from warpbrain.worlds.options import DiagnosisOptions as DiagnosisOptions
 
 __version__: str
 cases: Mapping[str, Case]

@@ -19,12 +19,15 @@ from warpbrain.cases.writing import write_case
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.recording import TestRecording
-from warpbrain.report.diagnosis.files import write_explained
-from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines, write_curves
+from warpbrain.report.diagnosis.description import describe
+from warpbrain.report.diagnosis.files import write_curves, write_explained
+from warpbrain.report.diagnosis.page import write_page
+from warpbrain.report.diagnosis.text import diagnosis_lines
 from warpbrain.report.files import write_summary
 from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.worlds.listener import Listener
-from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
+from warpbrain.worlds.options import DiagnosisOptions
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 Floats = NDArray[np.float64]
@@ -93,7 +96,7 @@ def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosi
     folder = out / case.name
     if not (folder / "case.toml").exists():
         write_case(folder, case)
-    options = SpecimenOptions(ends=ends)
+    options = DiagnosisOptions(ends=ends)
     start = time.perf_counter()
     found = DiagnosingSpecimen(
         read_case(folder),
@@ -101,14 +104,15 @@ def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosi
         "cpu",
         Listener(lambda text: print(f"{time.perf_counter() - start:7.1f} s  {text}", flush=True)),
     ).run()
-    said = describe_specimen_diagnosis(found, options, "cpu")
+    said = describe(found, options, "cpu")
     beside = out / f"{case.name}-diagnosis{'' if ends else '-homogeneous'}"
     beside.mkdir(parents=True, exist_ok=True)
     write_curves(beside / "curves.csv", found)
     if found.explained is not None:
         write_explained(beside / "explained", found.explained)
     write_summary(beside / "diagnosis.json", said)
-    print("", *specimen_diagnosis_lines(found), "", sep="\n", flush=True)
+    write_page(beside / "report.html", found, said)
+    print("", *diagnosis_lines(said), "", sep="\n", flush=True)
     return found, said
 
 

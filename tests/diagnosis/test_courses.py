@@ -10,12 +10,12 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.reading import read_case
 from warpbrain.cases.writing import write_case
 from warpbrain.diagnosis.diagnose import Diagnosing
-from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.report.diagnosis.text import when_in_words
+from warpbrain.worlds.options import DiagnosisOptions
 
 _OPTIONS = DiagnosisOptions(candidates=("gravity", "pressure"), mesh_error=False, draws=60)
 _TIMES, _LEVELS = (10.0, 30.0, 80.0), (0.055, 0.04, 0.015)

@@ -9,7 +9,6 @@ from slow_block import CAUSES, PERMEABILITY, TIMES, write_slow
 from warpbrain.arrays import Floats
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.diagnosis.onset import OF_ITS_OWN, Onset, onset_of
-from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.estimation.prior import declared
 from warpbrain.physics.mechanisms.drainage import Drainage
@@ -25,6 +24,7 @@ from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.states import TOLERANCE, Hypothesis, States, steps_to
 from warpbrain.worlds.body.time_courses import AT_ONCE, EVENLY, time_courses
+from warpbrain.worlds.options import DiagnosisOptions
 
 _OPTIONS = DiagnosisOptions(candidates=("drainage", "viscoelasticity", "swelling"), mesh_error=False, draws=100)
 

@@ -10,11 +10,11 @@ from metamorphic.changes import CHANGES, split
 from metamorphic.drawn import displacement, drawn_case
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.diagnose import Diagnosing
-from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.estimate import estimate
 from warpbrain.estimation.options import EstimationOptions
+from warpbrain.worlds.options import DiagnosisOptions
 
 #: Largest difference of displacements at `TOLERANCE`, against the largest displacement; of estimates, against the width
 #: of their 95 % intervals; of probabilities.

@@ -49,8 +49,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from warpbrain.diagnosis.options import DiagnosisOptions
     from warpbrain.worlds.listener import Listener
+    from warpbrain.worlds.options import DiagnosisOptions
 
     kinds = None if options.candidates == "all" else tuple(options.candidates.split(","))
     asked = DiagnosisOptions(
@@ -66,8 +66,10 @@ def _run(options: argparse.Namespace) -> None:
 
     from warpbrain.atomic import safe_name
     from warpbrain.cases.shipped import find_case
+    from warpbrain.report.diagnosis.description import describe
     from warpbrain.report.diagnosis.files import write_explained
-    from warpbrain.report.diagnosis.html import write_page
+    from warpbrain.report.diagnosis.page import write_page
+    from warpbrain.report.diagnosis.text import diagnosis_lines
     from warpbrain.report.files import write_summary
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.quiet import start_warp_quietly
@@ -93,8 +95,8 @@ def _run(options: argparse.Namespace) -> None:
         found = diagnosing.run()
     finally:
         progress.clear()
-    said = way.describe(found, asked, device)
-    say("", *way.lines(found, said), sep="\n")
+    said = describe(found, asked, device)
+    say("", *diagnosis_lines(said), sep="\n")
     with results_in(out, record, options.overwrite):
         for name, write in way.tables.items():
             write(out / name, found)
@@ -104,7 +106,7 @@ def _run(options: argparse.Namespace) -> None:
             record.files.append("explained")
         # after all that it speaks of: whoever finds it finds the others
         write_summary(out / "diagnosis.json", said)
-        write_page(out)
+        write_page(out / "report.html", found, said)
         if images is not None:
             record.files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
         say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
@@ -114,17 +116,12 @@ class _Way(NamedTuple):
     """How cases of one kind are diagnosed, and what is written of it beside what all have."""
 
     diagnosing: Callable[..., Any]
-    describe: Callable[..., dict[str, Any]]
-    lines: Callable[[Any, dict[str, Any]], list[str]]
     tables: dict[str, Callable[[Path, Any], None]]
 
 
 def _of_a_body() -> _Way:
     from warpbrain.diagnosis.diagnose import Diagnosing
-    from warpbrain.report.diagnosis.description import describe_diagnosis
-    from warpbrain.report.diagnosis.files import write_map
-    from warpbrain.report.diagnosis.points import write_covariance, write_points
-    from warpbrain.report.diagnosis.text import diagnosis_lines
+    from warpbrain.report.diagnosis.files import write_covariance, write_map, write_points
     from warpbrain.report.state_files import write_diagnosed_state
 
     tables: dict[str, Callable[[Path, Any], None]]
@@ -134,16 +131,11 @@ def _of_a_body() -> _Way:
         "points.csv": write_points,
         "covariance.npz": write_covariance,
     }
-    return _Way(Diagnosing, describe_diagnosis, lambda _found, said: diagnosis_lines(said), tables)
+    return _Way(Diagnosing, tables)
 
 
 def _of_a_specimen() -> _Way:
-    from warpbrain.report.diagnosis.specimen import describe_specimen_diagnosis, specimen_diagnosis_lines, write_curves
+    from warpbrain.report.diagnosis.files import write_curves
     from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 
-    return _Way(
-        lambda case, asked, device, listener: DiagnosingSpecimen(case, asked.of_specimen, device, listener),
-        lambda found, asked, device: describe_specimen_diagnosis(found, asked.of_specimen, device),
-        lambda found, _said: specimen_diagnosis_lines(found),
-        {"curves.csv": write_curves},
-    )
+    return _Way(DiagnosingSpecimen, {"curves.csv": write_curves})

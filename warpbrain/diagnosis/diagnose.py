@@ -15,7 +15,6 @@ from warpbrain.diagnosis.held_out import distance
 from warpbrain.diagnosis.locating import ScoreMap, score_map
 from warpbrain.diagnosis.measuring import next_measurements
 from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of
-from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.ranking import Ranking, about_base
 from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Ranked
 from warpbrain.diagnosis.sentences import assumptions_of
@@ -43,6 +42,7 @@ from warpbrain.worlds.body.screened import screened
 from warpbrain.worlds.body.surfaces import with_sets_that_act
 from warpbrain.worlds.body.weighted_set import WeightedSet
 from warpbrain.worlds.listener import Listener
+from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
@@ -286,8 +286,7 @@ def diagnose(
     case = as_case(case)
     if case.specimen is None:
         return Diagnosing(case, options, device, listener).run()
-    specimen_options = (options or DiagnosisOptions()).of_specimen
-    return DiagnosingSpecimen(case, specimen_options, device, listener).run()
+    return DiagnosingSpecimen(case, options, device, listener).run()
 
 
 def _not_fitted(search: HypothesisSearch, causes: tuple[str, ...]) -> _Checked:

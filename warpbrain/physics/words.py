@@ -55,6 +55,11 @@ def length(metres: float) -> str:
     return f"{size:z.2f} mm" if abs(size) >= 0.1 or size == 0.0 else f"{number(size)} mm"
 
 
+def pascals(stress: float) -> str:
+    """A stress [Pa] for people, with three digits that count."""
+    return f"{number(1e-3 * stress, 3)} kPa" if abs(stress) >= 1000.0 else f"{stress:.3g} Pa"
+
+
 def place(position: ArrayLike, extent: float) -> str:
     """A position (3,) [m] in millimetres, to a hundredth of an extent [m] or finer; whole ones from 1 cm up."""
     decimals = max(0, 1 - math.floor(math.log10(1e3 * extent)))

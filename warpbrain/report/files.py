@@ -66,19 +66,19 @@ def _in_rows(u_middles: Floats) -> Floats:
 
 def write_summary(path: Path, summary: dict[str, Any]) -> None:
     """Write a summary as JSON; numbers that are not finite become null."""
-    text = json.dumps(_plain(summary), indent=2, allow_nan=False)
+    text = json.dumps(plain(summary), indent=2, allow_nan=False)
     with whole_file(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Dictionaries, lists and Python numbers of what may hold NumPy's."""
     if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not np.isfinite(value):

@@ -14,6 +14,7 @@ from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.ensemble.results import EnsembleResult
 from warpbrain.errors import InputError
 from warpbrain.estimation.posterior import Marginal, Posterior
+from warpbrain.inference.probability import percent
 from warpbrain.report.case_text import show_lines
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.ensemble_text import describe_ensemble, ensemble_lines
@@ -97,14 +98,14 @@ def _(what: Posterior) -> tuple[str, Rows]:
 @_told.register
 def _(what: Diagnosis) -> tuple[str, Rows]:
     rows = [("verdict", what.sentence)]
-    rows += [(one.kind, f"probability {one.probability:.3g}") for one in what.ranking]
+    rows += [(one.kind, f"probability {percent(one.probability)}") for one in what.ranking]
     return f"Diagnosis of: {what.case.title}", rows + [("doubt", doubt) for doubt in what.doubts]
 
 
 @_told.register
 def _(what: SpecimenDiagnosis) -> tuple[str, Rows]:
-    rows = [("verdict", what.verdict), *((one.name, one.sentence) for one in what.named)]
-    rows += [(one.name, f"probability {one.probability:.3g}") for one in what.ranking]
+    rows = [("verdict", what.sentence)]
+    rows += [(one.name, f"probability {percent(one.probability)}") for one in what.ranking]
     return f"Diagnosis of: {what.case.title}", rows + [("doubt", doubt) for doubt in what.doubts]
 
 

@@ -5,19 +5,23 @@ from pathlib import Path
 import pytest
 from sinking_block import OPTIONS
 
-from warpbrain.report.diagnosis.description import describe_diagnosis
-from warpbrain.report.diagnosis.files import write_map
-from warpbrain.report.diagnosis.html import write_page
-from warpbrain.report.diagnosis.points import write_covariance, write_points
+from warpbrain.report.diagnosis.description import describe
+from warpbrain.report.diagnosis.files import write_covariance, write_map, write_points
+from warpbrain.report.diagnosis.page import write_page
 from warpbrain.report.files import write_summary
 
 
 @pytest.fixture(scope="session")
-def diagnosed(small_diagnosis, tmp_path_factory) -> Path:
+def summary(small_diagnosis) -> dict:
+    return describe(small_diagnosis, OPTIONS, "cpu")
+
+
+@pytest.fixture(scope="session")
+def diagnosed(small_diagnosis, summary, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("diagnosed")
     write_map(folder / "map.vtu", small_diagnosis)
     write_points(folder / "points.csv", small_diagnosis)
     write_covariance(folder / "covariance.npz", small_diagnosis)
-    write_summary(folder / "diagnosis.json", describe_diagnosis(small_diagnosis, OPTIONS, "cpu"))
-    write_page(folder)
+    write_summary(folder / "diagnosis.json", summary)
+    write_page(folder / "report.html", small_diagnosis, summary)
     return folder

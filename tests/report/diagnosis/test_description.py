@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sinking_block import OPTIONS
+from sinking_block import OPTIONS, verdict_of
 
 from referee.diagnoses import read_diagnosis
 from warpbrain.diagnosis.held_out import distance
 from warpbrain.inference import Kind
-from warpbrain.inference.decide import VERDICTS, Decision
-from warpbrain.report.diagnosis.description import describe_diagnosis
+from warpbrain.inference.decide import VERDICTS
+from warpbrain.report.diagnosis.description import describe
 from warpbrain.report.files import write_summary
 
 KEYS = {
@@ -31,18 +31,9 @@ RANKED = {
 }
 
 
-def verdict_of(found, verdict):
-    """The diagnosis as if another verdict had been given."""
-    if verdict.startswith("named"):
-        return replace(found, decision=Decision(verdict, ("gravity",)))
-    fit = replace(found.fit, explained=None, improvement=None, placebo_p=None)
-    causes = {"group": ("gravity", "swelling"), "not physics": ("registration",)}.get(verdict, ())
-    return replace(found, decision=Decision(verdict, causes), named=(), explained=None, fit=fit)
-
-
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_keys_are_complete(small_diagnosis, verdict, tmp_path):
-    said = describe_diagnosis(verdict_of(small_diagnosis, verdict), OPTIONS, "cpu")
+    said = describe(verdict_of(small_diagnosis, verdict), OPTIONS, "cpu")
     write_summary(tmp_path / "diagnosis.json", said)
     read = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))
     assert set(read) == KEYS
@@ -56,7 +47,7 @@ def test_keys_are_complete(small_diagnosis, verdict, tmp_path):
 def test_the_referee_reads_all_of_it(small_diagnosis, verdict, tmp_path):
     """What it scores by and calibrates from, key by key."""
     told = verdict_of(small_diagnosis, verdict)
-    write_summary(tmp_path / "diagnosis.json", describe_diagnosis(told, OPTIONS, "cpu"))
+    write_summary(tmp_path / "diagnosis.json", describe(told, OPTIONS, "cpu"))
     read = read_diagnosis(tmp_path / "diagnosis.json")
     assert (read.verdict, read.p_value, read.group) == (verdict, told.p_value, told.group)
     assert read.names == tuple(one.kind for one in told.named)
@@ -103,7 +94,7 @@ def test_what_was_not_weighed_is_in_the_ranking_whatever_kind_it_is_of(small_dia
     """What is no physics, and the unknown, are no mechanisms with a sentence of their own."""
     kinds = {"drainage": True, "loads": False, "registration": False, "unknown": False}
     diagnosis = replace(small_diagnosis, rejected=dict.fromkeys(kinds, "nothing tells of it"))
-    write_summary(tmp_path / "diagnosis.json", describe_diagnosis(diagnosis, OPTIONS, "cpu"))
+    write_summary(tmp_path / "diagnosis.json", describe(diagnosis, OPTIONS, "cpu"))
     rows = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))["ranking"][-len(kinds) :]
     assert {row["mechanism"]: row["physics"] for row in rows} == kinds
     assert all(row["says"].endswith(".") and set(row) == RANKED for row in rows)

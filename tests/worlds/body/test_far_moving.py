@@ -10,7 +10,6 @@ from shapes import box
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.diagnosis.diagnose import diagnose
-from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanisms.gravity import Gravity
@@ -19,6 +18,7 @@ from warpbrain.recordings.recording import PointsRecording
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
+from warpbrain.worlds.options import DiagnosisOptions
 
 #: Length and height of the beam, noise [m]; tracked points.
 LENGTH, HEIGHT, NOISE, POINTS = 0.1, 0.03, 2e-4, 45

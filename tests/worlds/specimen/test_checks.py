@@ -9,17 +9,16 @@ from testing_machine import case_of
 
 from warpbrain.inference.confirm import Confirmation, after_checks
 from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decision
-from warpbrain.worlds.specimen.checking import CheckResults, grown_errors
-from warpbrain.worlds.specimen.checks import Folds, folds_of, held_out
-from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
-from warpbrain.worlds.specimen.effects import effects_of
-from warpbrain.worlds.specimen.effects.law_shape import stiffening
-from warpbrain.worlds.specimen.fit import Fitting
+from warpbrain.physics.values import Value
+from warpbrain.worlds.options import DiagnosisOptions
+from warpbrain.worlds.specimen.checks import CheckResults, Folds, folds_of, grown_errors, held_out
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
+from warpbrain.worlds.specimen.effects import stiffening
+from warpbrain.worlds.specimen.fit import fit
 from warpbrain.worlds.specimen.forward import Component, Forward
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
-from warpbrain.worlds.specimen.linear import linearise
-from warpbrain.worlds.specimen.noise import noise_factor
 from warpbrain.worlds.specimen.protocol import protocol_of
+from warpbrain.worlds.specimen.registered import effects_of
 from warpbrain.worlds.specimen.result import Score
 
 
@@ -35,21 +34,17 @@ def cycles(*durations, seed=2, roles=None):
 
 def base_of(case):
     everything = protocol_of(case.specimen, case.recordings)
-    thinned = everything.thinned
-    forward = Forward(case, thinned, GluedEnds(case, everything), False)
-    fit = Fitting(noise_factor(thinned), thinned.mask(thinned.to_fit)).fit(
-        forward, (), np.zeros((len(thinned), 0)), np.zeros(len(forward.nuisances)), 1.0
-    )
-    return everything, fit
+    forward = Forward(case, everything.thinned, GluedEnds(case, everything), False)
+    return everything, fit(forward, (), np.zeros(len(forward)))
 
 
 def test_held_out_rows_are_the_conditional_of_the_model():
-    _, fit = base_of(cycles(400.0, 40.0))
-    held = fit.forward.protocol.mask([1])
-    again = fit.refitted_to(~held)
+    _, base = base_of(cycles(400.0, 40.0))
+    held = base.forward.protocol.mask([1])
+    again = base.refitted_to(~held)
     # an independent conditional: by the inverse of the joint covariance
     U = again.columns
-    S = fit.scale**2 * fit.noise @ fit.noise.T + U @ U.T
+    S = base.scale**2 * base.forward.noise @ base.forward.noise.T + U @ U.T
     P = np.linalg.inv(S)
     r = again.residual
     mean = -np.linalg.solve(P[np.ix_(held, held)], P[np.ix_(held, ~held)] @ r[~held])
@@ -57,16 +52,16 @@ def test_held_out_rows_are_the_conditional_of_the_model():
     log = -0.5 * (
         e @ P[np.ix_(held, held)] @ e - np.linalg.slogdet(P[np.ix_(held, held)])[1] + held.sum() * np.log(2 * np.pi)
     )
-    stress, log_density = held_out(fit, Folds((held,), True))
+    stress, log_density = held_out(base, Folds((held,), True))
     assert log_density == pytest.approx(log, abs=1e-6)
     np.testing.assert_allclose(
-        stress[held], (again.stress - U @ again.z)[held] + mean, atol=1e-6 * np.abs(fit.stress).max()
+        stress[held], (again.stress - U @ again.z)[held] + mean, atol=1e-6 * np.abs(base.stress).max()
     )
 
 
 def test_errors_are_of_all_recorded_rows():
     case = cycles(400.0, 40.0, 100.0, roles=("fit", "fit", "check"))
-    found = DiagnosingSpecimen(case, SpecimenOptions(candidates=("viscoelasticity",), draws=100), "cpu").run()
+    found = DiagnosingSpecimen(case, DiagnosisOptions(candidates=("viscoelasticity",), draws=100), "cpu").run()
     assert len(found.protocol) == 3 * 161
     assert len(found.protocol.thinned) < len(found.protocol)
     for name in ("refitted", "explained"):
@@ -80,7 +75,7 @@ def test_errors_are_of_all_recorded_rows():
 @pytest.mark.slow
 def test_a_viscosity_stays_where_more_tests_are_fitted():
     for durations in ((400.0, 40.0), (400.0, 40.0, 100.0, 200.0)):
-        options = SpecimenOptions(candidates=("viscoelasticity", "softening", "drift of the zero"), draws=100)
+        options = DiagnosisOptions(candidates=("viscoelasticity", "softening", "drift of the zero"), draws=100)
         found = DiagnosingSpecimen(cycles(*durations), options, "cpu").run()
         assert "viscoelasticity" in [one.name for one in found.named], durations
 
@@ -89,15 +84,15 @@ def test_what_stiffens_is_what_tissue_remembers_too():
     case = cycles(40.0)
     everything, _ = base_of(case)
     forward = Forward(case, everything, GluedEnds(case, everything), False)
-    effect, linear = stiffening(case, everything), linearise(base_of(case)[1], ())
-    assert linear.causes[0].name == "unknown"
+    effect = stiffening(case, everything)
+    assert effects_of(case, everything)[0][-1].name == "unknown"
     viscous_effect = next(one for one in effects_of(case, everything)[0] if one.name == "viscoelasticity")
     variant = viscous_effect.variants[3]
     both = (
         Component(viscous_effect, variant, variant.trials[0], 1.0),
         Component(effect, effect.variants[0], effect.variants[0].trials[0], 1.0),
     )
-    z = np.zeros(len(forward.nuisances) + sum(map(len, both)))
+    z = np.zeros(len(forward) + sum(map(len, both)))
     z[-len(both[1]) - len(both[0])] = 1.0
     plain = forward.stress(both, z)
     z[-1] = 1.0
@@ -106,6 +101,14 @@ def test_what_stiffens_is_what_tissue_remembers_too():
     np.testing.assert_allclose(
         forward.stress(both, z), plain * np.exp(k * (strain**2 + 2.0 / strain - 3.0)), rtol=1e-12
     )
+
+
+def test_the_sentence_of_stiffening_has_the_sign_of_what_was_found():
+    case = cycles(40.0)
+    effect = stiffening(case, protocol_of(case.specimen, case.recordings))
+    for k, word in ((3.0, " more than"), (-3.0, " less than")):
+        assert word in effect.sentence_of((Value("k", k, 0.5, ""),))
+    assert "more or less" in effect.sentence_of(())
 
 
 def test_a_check_that_fails_is_said():

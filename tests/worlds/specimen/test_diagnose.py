@@ -11,7 +11,8 @@ from testing_machine import case_of, recorded
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.recordings.recording import TestRecording
-from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
+from warpbrain.worlds.options import DiagnosisOptions
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.protocol import protocol_of
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
@@ -26,7 +27,7 @@ def static(law, rng: np.random.Generator) -> list[TestRecording]:
 
 def diagnosed(recordings: list[TestRecording], kinds=KINDS, **options) -> SpecimenDiagnosis:
     case = replace(case_of(ROD), recordings=tuple(recordings))
-    return DiagnosingSpecimen(case, SpecimenOptions(candidates=kinds, **options), "cpu").run()
+    return DiagnosingSpecimen(case, DiagnosisOptions(candidates=kinds, **options), "cpu").run()
 
 
 @pytest.mark.slow
@@ -137,7 +138,7 @@ def test_bad_cases_are_refused():
         DiagnosingSpecimen(case_with(shear))
     diagnosing = DiagnosingSpecimen(
         case_with(rod_test("tension", np.linspace(1.0, 1.1, 30), neo_hookean(np.linspace(1.0, 1.1, 30)))),
-        SpecimenOptions(candidates=("gravity",)),
+        DiagnosisOptions(candidates=("gravity",)),
     )
     with pytest.raises(InputError, match="--candidates gravity"):
         diagnosing.run()

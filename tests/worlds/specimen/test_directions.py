@@ -13,7 +13,8 @@ from warpbrain.errors import InputError
 from warpbrain.physics.mechanisms.fibres import Fibres
 from warpbrain.recordings.recording import turn_of
 from warpbrain.simulation.specimen import Rig
-from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen, SpecimenOptions
+from warpbrain.worlds.options import DiagnosisOptions
+from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.material import HomogeneousMaterial
 
 ROD = Specimen("cylinder", (8e-3, 8e-3, 5e-3), "lubricated")
@@ -39,7 +40,7 @@ def test_a_test_across_the_tissue_is_one_of_turned_fibres():
     turned = replace(case, mechanisms=(replace(fibres, direction=(0.0, 0.0, 1.0)),))
     reference = Rig(turned, "cpu", options=EXACT).run(recorded("stretch", STRETCH), steps=3)
     np.testing.assert_allclose(result.response, reference.response, rtol=1e-9, atol=1e-9)
-    found = HomogeneousMaterial.of_case(case, (), along.turn).axial(result.imposed, None)
+    found = HomogeneousMaterial.of_case(case, (), along.turn).stress("axial", result.imposed, None)
     np.testing.assert_allclose(found, result.response, rtol=1e-5, atol=0.01)
 
 
@@ -48,7 +49,7 @@ def rods_with_fibres():
     case, rng, found = case_of(ROD), np.random.default_rng(4), []
     for name, axis in (("along", (1.0, 0.0, 0.0)), ("across", (0.0, 1.0, 0.0)), ("through", (0.0, 0.0, 1.0))):
         test = replace(recorded("stretch", STRETCH), axis=axis, name=name)
-        stress = HomogeneousMaterial.of_case(case, (fibres,), test.turn).axial(STRETCH, None)
+        stress = HomogeneousMaterial.of_case(case, (fibres,), test.turn).stress("axial", STRETCH, None)
         noise = 0.01 * np.abs(stress).max() * rng.normal(size=len(STRETCH))
         found.append(replace(test, response=stress + noise))
     return found
@@ -59,7 +60,9 @@ def test_fibres_are_told_by_one_mode_along_and_across_them(tmp_path):
     write_case(tmp_path / "case", case)
     read = read_case(tmp_path / "case")
     assert [r.axis for r in read.recordings] == [r.axis for r in case.recordings]
-    options = SpecimenOptions(candidates=("fibres", "asymmetry", "stiffening", "second invariant", "drift of the zero"))
+    options = DiagnosisOptions(
+        candidates=("fibres", "asymmetry", "stiffening", "second invariant", "drift of the zero")
+    )
     found = DiagnosingSpecimen(read, options, "cpu").run()
     assert found.verdict == "named" and [one.name for one in found.named] == ["fibres"]
     assert found.named[0].region == "fibres along x"

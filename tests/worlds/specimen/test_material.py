@@ -26,21 +26,21 @@ def uniaxial_ogden(mu: float, alpha: float, l: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("alpha", [2.0, -15.0])
 def test_nearly_incompressible_uniaxial_stress_is_the_closed_form(alpha):
     law = Ogden((2.0 * 1000.0 / alpha,), (alpha,))
-    found = HomogeneousMaterial(law, 0.49999, "uncoupled").axial(STRETCH, None)
+    found = HomogeneousMaterial(law, 0.49999, "uncoupled").stress("axial", STRETCH, None)
     np.testing.assert_allclose(found, uniaxial_ogden(1000.0, alpha, STRETCH), rtol=5e-4, atol=0.05)
 
 
 def test_simple_shear_is_the_closed_form():
     shear = np.linspace(-0.3, 0.3, 7)
     law = Ogden((2.0 * 1000.0 / -12.0,), (-12.0,))
-    found = HomogeneousMaterial(law, 0.45, "coupled").shear(shear, None)
+    found = HomogeneousMaterial(law, 0.45, "coupled").stress("shear", shear, None)
     l = 0.5 * shear + np.sqrt(1.0 + 0.25 * shear**2)
     np.testing.assert_allclose(found, 2.0 * 1000.0 / -12.0 * (l**-12.0 - l**12.0) / (l + 1.0 / l), atol=1e-3)
 
 
 def test_torsion_of_a_neo_hookean_cylinder_is_linear():
     rim = np.array([0.0, 0.2, 0.4])
-    found = HomogeneousMaterial(NeoHookean(1000.0), 0.45, "coupled").torsion(rim, None)
+    found = HomogeneousMaterial(NeoHookean(1000.0), 0.45, "coupled").stress("torsion", rim, None)
     # T = mu (rim / R) pi R^4 / 2 over 2/3 pi R^3
     np.testing.assert_allclose(found, 0.75 * 1000.0 * rim, atol=1e-3)
 
@@ -52,7 +52,7 @@ def test_states_are_those_of_the_rig(law, formulation):
     tissue = replace(case.tissues[1], law=law, formulation=formulation, model=law.name)
     case = replace(case, tissues={1: tissue})
     result = simulate_test(case, recorded("stretch", STRETCH), "cpu", options=EXACT, steps=4)
-    found = HomogeneousMaterial.of_case(case, ()).axial(result.imposed, None)
+    found = HomogeneousMaterial.of_case(case, ()).stress("axial", result.imposed, None)
     np.testing.assert_allclose(found, result.response, rtol=1e-5, atol=1e-4)
 
 
@@ -88,7 +88,7 @@ def test_states_with_fibres_are_those_of_the_rig(direction):
     fibres = Fibres(direction=direction, stiffness=400.0, exponent=2.0)
     case = replace(case_of(PLATE), mechanisms=(fibres,))
     result = simulate_test(case, recorded("stretch", STRETCH), "cpu", options=EXACT, steps=4)
-    found = HomogeneousMaterial.of_case(case, ()).axial(result.imposed, None)
+    found = HomogeneousMaterial.of_case(case, ()).stress("axial", result.imposed, None)
     np.testing.assert_allclose(found, result.response, rtol=1e-5, atol=0.01)  # they begin to pull at rest: a kink
 
 
@@ -113,7 +113,7 @@ def test_a_viscous_history_is_that_of_the_rig():
     stretch = 1.0 + 0.12 * np.sin(2.0 * np.pi * time / 20.0)
     case = replace(case_of(PLATE), mechanisms=(Viscoelasticity(moduli=(1.5, 0.5), times=(3.0, 30.0)),))
     result = simulate_test(case, replace(recorded("stretch", stretch), time=time), "cpu", steps=8)
-    found = HomogeneousMaterial.of_case(case, ()).axial(stretch, time)
+    found = HomogeneousMaterial.of_case(case, ()).stress("axial", stretch, time)
     # the rig's midpoint rule errs by its steps
     np.testing.assert_allclose(found, result.predicted, atol=0.01 * np.abs(found).max())
 

@@ -2,155 +2,212 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 from warpbrain.diagnosis.held_out import distance
-from warpbrain.diagnosis.onset import Onset
-from warpbrain.diagnosis.options import DiagnosisOptions
 from warpbrain.diagnosis.result import Diagnosis, Ranked
 from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence, sentence_of_kind
-from warpbrain.diagnosis.traits import Traits
+from warpbrain.inference.causes import Kind
+from warpbrain.inference.decide import Decision
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import smallest_in_words
-from warpbrain.report.diagnosis.common import describe_cause, describe_common, describe_decision, describe_values
+from warpbrain.physics.values import Smallest, Value
+from warpbrain.report.files import plain
+from warpbrain.report.fingerprints import fingerprints
+from warpbrain.report.summary import machine
+from warpbrain.worlds.options import DiagnosisOptions
+from warpbrain.worlds.specimen import result as of_specimen
+from warpbrain.worlds.specimen import sentences as specimen_sentences
+from warpbrain.worlds.specimen.result import SpecimenDiagnosis
+
+#: States of a case in the order in which they are shown, and their names for people.
+STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what is named"}
 
 
-def describe_diagnosis(found: Diagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:
-    """Everything that is known of a diagnosis, lengths in metres and other units beside the values."""
-    best = found.named[0] if found.named else None
-    particular = {
-        "hypotheses": [asdict(one) | {"kinds": [kind.value for kind in one.kinds]} for one in found.combinations],
-        "by_posterior": describe_decision(found.by_posterior),
-        "where": _where(found, best),
-        "mechanisms": [_named(one, found.case.gravity_axis) for one in found.named],
-        "unknown": _unknown(found.unknown),
-        "when": _when(found.when),
-        "ranking": [_ranked(ranked, found.case.gravity_axis) for ranked in found.ranking]
-        + [_rejected(kind, why) for kind, why in found.rejected.items()],
-        "smallest_detectable": {
-            kind: {
-                "size": one.size,
-                "unit": one.unit,
-                "parameter": one.name,
-                "named_from": one.named,
-                "says": smallest_in_words(kind, one),
-            }
-            for kind, one in found.smallest.items()
-        },
-        "confusion": {"says": list(confusion_sentences(found.confusion)), "rows": found.confusion.rows},
-        "fit": _fit(found),
-        "map": {
-            "threshold": found.map.threshold,
-            "largest": float(found.map.scores.max()),
-            "patch_m": found.map.length,
-            "blind_above_n": found.map.blind_above,
-            "places": len(found.map.sites),
-            "significant": found.map.significant,
-        },
-        "equilibria": found.base.states.solves,
-    }
-    asked = {name: value for name, value in asdict(options).items() if name != "ends"}
-    names = [one.kind for one in found.named]
-    return describe_common(found, found.sentence, names, asked, device, particular)
-
-
-def _named(one: Ranked, gravity_axis: tuple[float, float, float] | None) -> dict[str, Any]:
-    return {
-        "mechanism": one.kind,
-        "says": effect_sentence(one, gravity_axis),
-        "probability": one.probability,
-        "parameters": describe_values(one.values),
-        "where": _ball(one),
-        "region": one.region,
-    }
-
-
-def _unknown(traits: Traits | None) -> dict[str, Any] | None:
-    if traits is None:
-        return None
-    return {
-        "net_force_n": traits.force,
-        "net_force_sd_n": traits.force_sd,
-        "net_moment_nm": traits.moment,
-        "net_moment_sd_nm": traits.moment_sd,
-        "from_outside": traits.outside,
-        "net_force_hidden": traits.hidden,
-        "turning": traits.turning,
-        "surface_over_depth_nats": traits.surface_nats,
-        "centre_m": traits.centre,
-    }
-
-
-def _where(found: Diagnosis, best: Ranked | None) -> dict[str, Any] | None:
-    place = best if best is not None and best.centre is not None else found.map if found.map.significant else None
-    if place is None:
-        return None
-    return {
-        "centre_m": place.centre,
-        "radius_m": place.radius,
-        "region": best.region if best is not None else "",
-        "local_p": found.map.local_p,
-        "global_p": found.map.global_p,
-    }
-
-
-def _when(onset: Onset | None) -> dict[str, Any] | None:
-    if onset is None:
-        return None
-    return {
-        "seconds": [onset.first, onset.last],
-        "probability": onset.probability,
-        "course": onset.course,
-        "intervals": [{"seconds": [a, b], "probability": p} for a, b, p in onset.intervals],
-        "sizes": None if onset.sizes is None else asdict(onset.sizes),
-    }
-
-
-def _ranked(ranked: Ranked, gravity_axis: tuple[float, float, float] | None) -> dict[str, Any]:
-    return describe_cause(
-        ranked.kind,
-        ranked.rejected_because,
-        says=effect_sentence(ranked, gravity_axis),
-        physics=ranked.physics,
-        log_evidence=ranked.log_evidence,
-        probability=ranked.probability,
-        heldout_rmse_change=ranked.heldout_rmse_change,
-        detectability=ranked.detectability,
-        estimate=describe_values(ranked.values),
-        where=_ball(ranked),
-        region=ranked.region,
+def describe(diagnosis: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:
+    """Everything that is known of a diagnosis, lengths in metres, stresses in Pa, other units beside the values."""
+    other = ("mesh_error", "without_nuisances") if isinstance(diagnosis, SpecimenDiagnosis) else ("ends",)
+    asked = {name: value for name, value in asdict(options).items() if name not in other}
+    particular = (
+        _of_specimen(diagnosis, options.alpha) if isinstance(diagnosis, SpecimenDiagnosis) else _of_body(diagnosis)
+    )
+    named, first = particular["mechanisms"], next(iter((*diagnosis.named, *diagnosis.ranking)), None)
+    return plain(
+        {
+            "verdict": diagnosis.verdict,
+            "sentence": diagnosis.sentence,
+            "p_value": diagnosis.p_value,
+            "p_left": diagnosis.p_left,
+            "mechanism": named[0]["mechanism"] if named else None,
+            "probability": first and first.probability,
+            "parameters": _values(diagnosis.named[0].values) if named else {},
+            "group": diagnosis.group,
+            "doubts": diagnosis.doubts,
+            **particular,
+            "next_measurement": [asdict(one) for one in diagnosis.next_measurement],
+            "assumptions": diagnosis.assumptions,
+            "remarks": diagnosis.remarks,
+            "case": {"name": diagnosis.case.name, "title": diagnosis.case.title, "origin": diagnosis.case.origin},
+            "inputs_sha256": fingerprints(diagnosis.case),
+            "options": asked | {"candidates": "all" if options.candidates is None else options.candidates},
+            "seconds": diagnosis.seconds,
+            "device": device,
+            "versions": machine(),
+        }
     )
 
 
-def _rejected(kind: str, why: str) -> dict[str, Any]:
-    physics = kind in mechanisms()
-    return describe_cause(kind, why, says=sentence_of_kind(kind), physics=physics, heldout_rmse_change=None, where=None)
+def _picked(one: Any, *names: str, **renamed: str) -> Any:
+    """Attributes of an object as a dictionary, some by other names than their own; None of none."""
+    keys = {name: name for name in names} | renamed
+    return None if one is None else {key: getattr(one, name) for key, name in keys.items()}
 
 
-def _ball(ranked: Ranked) -> dict[str, Any] | None:
-    return None if ranked.centre is None else {"centre_m": ranked.centre, "radius_m": ranked.radius}
+def _decision(decision: Decision) -> Any:
+    return _picked(decision, "verdict", "causes")
 
 
-def _fit(found: Diagnosis) -> dict[str, Any]:
-    fit, noise, sensors = found.fit, found.base.noise, found.base.at.sensors
-    rows = {"declared": fit.declared, "refitted": fit.refitted, "explained": fit.explained}
-    check = dict(zip(rows, fit.check, strict=False)) if fit.check else None
-    improvement = fit.improvement
+def _values(values: Sequence[Value]) -> dict[str, Any]:
+    return {one.name: _picked(one, "value", "sd", "unit") for one in values}
+
+
+def _smallest(kind: str, one: Smallest) -> dict[str, Any]:
+    return {"size": one.size, "unit": one.unit, "parameter": one.name, "says": smallest_in_words(kind, one)}
+
+
+def _improvement(improvement: tuple[float, float, float] | None) -> dict[str, Any] | None:
+    return None if improvement is None else {"part": improvement[0], "interval_95": improvement[1:]}
+
+
+def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
+    where, onset, best = diagnosis.map, diagnosis.when, diagnosis.named[0] if diagnosis.named else None
+    place = _place(best) or (_picked(where, centre_m="centre", radius_m="radius") if where.significant else None)
+    ranking = [
+        _cause(
+            one.kind, _words(diagnosis, one), _picked(one, "physics", "heldout_rmse_change", "rejected_because"), one
+        )
+        | {"where": _place(one)}
+        for one in diagnosis.ranking
+    ]
+    rejected = [
+        _cause(kind, sentence_of_kind(kind), {"physics": kind in mechanisms(), "rejected_because": why})
+        | {"where": None, "heldout_rmse_change": None}
+        for kind, why in diagnosis.rejected.items()
+    ]
+    named = [
+        {"mechanism": one.kind, "says": _words(diagnosis, one), "parameters": _values(one.values), "where": _place(one)}
+        | _picked(one, "probability", "region")
+        for one in diagnosis.named
+    ]
     return {
-        "rmse_m": {name: None if pair is None else pair[0] for name, pair in rows.items()},
-        "heldout_rmse_m": {name: None if pair is None else pair[1] for name, pair in rows.items()},
-        "check_rmse_m": check,
+        "hypotheses": [asdict(one) | {"kinds": [kind.value for kind in one.kinds]} for one in diagnosis.combinations],
+        "by_posterior": _decision(diagnosis.by_posterior),
+        "where": place and place | {"region": best.region if best is not None else ""}
+        | {"local_p": where.local_p, "global_p": where.global_p},
+        "mechanisms": named,
+        "unknown": _picked(
+            diagnosis.unknown, "turning", net_force_n="force", net_force_sd_n="force_sd", net_moment_nm="moment",
+            net_moment_sd_nm="moment_sd", from_outside="outside", net_force_hidden="hidden",
+            surface_over_depth_nats="surface_nats", centre_m="centre",
+        ),
+        "when": onset and {
+            "seconds": [onset.first, onset.last],
+            "probability": onset.probability,
+            "course": onset.course,
+            "intervals": [{"seconds": [a, b], "probability": p} for a, b, p in onset.intervals],
+            "sizes": None if onset.sizes is None else asdict(onset.sizes),
+        },
+        "ranking": ranking + rejected,
+        "smallest_detectable": {
+            kind: _smallest(kind, one) | {"named_from": one.named} for kind, one in diagnosis.smallest.items()
+        },
+        "confusion": {"says": confusion_sentences(diagnosis.confusion), "rows": diagnosis.confusion.rows},
+        "fit": _fit(diagnosis),
+        "map": {"largest": where.scores.max(), "places": len(where.sites)}
+        | _picked(where, "threshold", "significant", patch_m="length", blind_above_n="blind_above"),
+        "equilibria": diagnosis.base.states.solves,
+    }  # fmt: skip
+
+
+def _words(diagnosis: Diagnosis, one: Ranked) -> str:
+    return effect_sentence(one, diagnosis.case.gravity_axis)
+
+
+def _cause(
+    name: str, words: str, known: Mapping[str, Any], one: Ranked | of_specimen.Ranked | None = None
+) -> dict[str, Any]:
+    """A row of a ranking; of a cause that was not tried there are no numbers."""
+    numbers = _picked(one, "log_evidence", "probability", "detectability", "region")
+    nothing = {"log_evidence": None, "probability": 0.0, "detectability": None, "region": ""}
+    estimate = {} if one is None else _values(one.values)
+    return {"mechanism": name, "says": words, "estimate": estimate, **(numbers or nothing), **known}
+
+
+def _place(one: Ranked | None) -> dict[str, Any] | None:
+    return None if one is None or one.centre is None else _picked(one, centre_m="centre", radius_m="radius")
+
+
+def _fit(diagnosis: Diagnosis) -> dict[str, Any]:
+    fit, noise, sensors = diagnosis.fit, diagnosis.base.noise, diagnosis.base.at.sensors
+    rows = {"declared": fit.declared, "refitted": fit.refitted, "explained": fit.explained}
+    moved = sensors.is_displacement
+    return {
+        "rmse_m": {name: pair and pair[0] for name, pair in rows.items()},
+        "heldout_rmse_m": {name: pair and pair[1] for name, pair in rows.items()},
+        "check_rmse_m": dict(zip(rows, fit.check, strict=False)) if fit.check else None,
         "ceiling_heldout_rmse_m": fit.ceiling,
-        "noise_m": float(noise[sensors.is_displacement].mean()) if sensors.is_displacement.any() else None,
-        "noise_rmse_m": distance(sensors, noise) if sensors.is_displacement.any() else None,
-        "improvement": None
-        if improvement is None
-        else {"part": improvement[0], "interval_95": [improvement[1], improvement[2]]},
+        "noise_m": noise[moved].mean() if moved.any() else None,
+        "noise_rmse_m": distance(sensors, noise) if moved.any() else None,
+        "improvement": _improvement(fit.improvement),
         "placebo_p": fit.placebo_p,
-        "placebo_heldout_rmse_m": None if fit.placebo is None else list(fit.placebo),
+        "placebo_heldout_rmse_m": fit.placebo,
         "confirmations": [
             {"mechanism" if key == "name" else key: value for key, value in asdict(one).items()}
-            for one in found.confirmations
+            for one in diagnosis.confirmations
         ],
     }
+
+
+def _of_specimen(diagnosis: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
+    where, scores = diagnosis.where, {name: diagnosis.scores.get(name) for name in STATES}
+    rejected = [
+        _cause(name, "", {"physics": True, "rejected_because": why, "heldout_rmse_change_pa": None})
+        for name, why in diagnosis.rejected.items()
+    ]
+    confirmations = [
+        {"mechanism": one.name, "heldout_gain": _improvement(one.gain), "why_not": one.why_not(alpha)}
+        | _picked(one, "log_evidence", "heldout_log_density", "placebo_p")
+        for one in diagnosis.confirmations
+    ]
+    return {
+        "mechanisms": [_ranked_of_specimen(one) for one in diagnosis.named],
+        "where": _picked(where, "test", "mode", "segment", "strain"),
+        "when": {"seconds": where.time} if where is not None and where.time is not None else None,
+        "ranking": [_ranked_of_specimen(one) for one in diagnosis.ranking] + rejected,
+        "combinations": [asdict(one) for one in diagnosis.combinations],
+        "before_checks": _decision(diagnosis.by_posterior),
+        "smallest_detectable": {name: _smallest(name, one) for name, one in diagnosis.smallest.items()},
+        "fit": {
+            "rmse_pa": {name: one and one.fitted for name, one in scores.items()},
+            "heldout_rmse_pa": {name: one and one.heldout for name, one in scores.items()},
+            "check_rmse_pa": {name: one and one.check for name, one in scores.items()},
+            "rows": "all that were recorded",
+            "held_out": "each test in turn" if diagnosis.by_test else "each quarter of the only test in turn",
+            "improvement": _improvement(diagnosis.improvement),
+            "confirmations": confirmations,
+        },
+        "tests": [
+            {"role": "fit" if test.fitted else "check", "rows": len(test.strain)}
+            | _picked(test, "name", "mode", "specimen", largest_stress_pa="peak", pa_per_unit="unit")
+            for test in diagnosis.protocol.tests
+        ],
+    }
+
+
+def _ranked_of_specimen(one: of_specimen.Ranked) -> dict[str, Any]:
+    why = "" if math.isfinite(one.log_evidence) else "no fit with it stands"
+    known = {"physics": one.kind is Kind.PHYSICS, "rejected_because": why, "heldout_rmse_change_pa": one.change}
+    return _cause(one.name, specimen_sentences.effect_sentence(one), known, one)

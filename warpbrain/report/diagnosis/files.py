@@ -1,38 +1,44 @@
-"""The files of a diagnosis beside its JSON: the maps, and the case with what was named."""
+"""The files of a diagnosis beside its JSON: the map, tables of what was recorded, and the case with what was named."""
 
 from __future__ import annotations
 
+import csv
 import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.atomic import UNFINISHED, whole_file
 from warpbrain.cases.case import Case
 from warpbrain.cases.writing import write_case
-from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Diagnosis
 from warpbrain.mesh.vtu import write_vtu
+from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.files import MILLIMETRES
+from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 
-def write_map(path: Path, found: Diagnosis) -> None:
-    """Write where the mismatch is, and what the data can see, as VTU with coordinates in mm.
+def write_map(path: Path, diagnosis: Diagnosis) -> None:
+    """Write `file_of_map`."""
+    with whole_file(path) as temporary:
+        write_vtu(temporary, file_of_map(diagnosis))
+
+
+def file_of_map(diagnosis: Diagnosis) -> Any:
+    """Where the mismatch is, and what the data can see, as a `meshio.Mesh` with coordinates in mm.
 
     Point arrays: ``score`` (chi-squared of three degrees of freedom of the nearest place), ``significant`` (above the
     threshold of all places), ``region`` (cannot be told from the best place), ``detectable_force`` [mN] and
     ``blind`` (no force of the size that is seen elsewhere would be), ``displacement`` of the base state [mm].
     """
-    with whole_file(path) as temporary:
-        write_vtu(temporary, file_of_map(found))
-
-
-def file_of_map(found: Diagnosis) -> Any:
-    """What `write_map` writes, as a `meshio.Mesh`."""
     import meshio
     from scipy.spatial import cKDTree
 
-    mesh, where = found.base.at.system.model.mesh, found.map
+    mesh, where = diagnosis.base.at.system.model.mesh, diagnosis.map
     nearest = cKDTree(where.sites).query(mesh.points)[1]
     scores = where.scores[nearest]
     return meshio.Mesh(
@@ -44,10 +50,167 @@ def file_of_map(found: Diagnosis) -> Any:
             "region": (where.region[nearest] & where.significant).astype(np.uint8),
             "detectable_force": 1000.0 * where.detectable[nearest],
             "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
-            "displacement": found.base.at.u * MILLIMETRES,
+            "displacement": diagnosis.base.at.u * MILLIMETRES,
         },
         cell_data={"tissue": [mesh.tissue]},
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Vectors:
+    """Points that were recorded at the last time.
+
+    Attributes
+    ----------
+    where : (k, 3) array
+        [m]
+    left : dict of str to (k, 3) array
+        What was observed less what was computed [m], by state: of a surface the part along its normal.
+    aside : (k,) bool array
+        Set aside as gross errors.
+    """
+
+    where: Floats
+    left: dict[str, Floats]
+    aside: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Numbers that were recorded: components of points, distances to surfaces, components of forces.
+
+    Attributes
+    ----------
+    columns : dict of str to (n,) array
+        As `points.csv` has them; NaN where it has nothing.
+    """
+
+    columns: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, diagnosis: Diagnosis) -> Recorded:
+        """Of a diagnosis, lengths in mm, forces in N, axes RAS.
+
+        `observed` is along `direction`; `declared`, `refitted` and `explained` are what was computed of it: in the case
+        as declared, with its tissue refitted beside all that is no physics, and with what is named. A held-out error is
+        what was observed less what is predicted without the point and those around it.
+        """
+        sensors = diagnosis.base.declared.sensors
+        moved, nothing = sensors.is_displacement, np.full(len(sensors), np.nan)
+        factors = np.where(moved, MILLIMETRES, 1.0)
+        observed = sensors.computed + sensors.residual
+        computed, held = {"declared": factors * sensors.computed}, {}
+        for state in (REFITTED, EXPLAINED):
+            known, predicted = diagnosis.weighted_sets.get(state), diagnosis.held_out.get(state)
+            computed[state] = nothing if known is None else factors * (observed - known.best_residual)
+            errors = nothing if predicted is None else np.where(moved, predicted.errors, np.nan)
+            held[f"heldout_error_{state}"] = factors * errors
+        return cls(
+            {
+                "recording": np.array(sensors.names)[sensors.recordings],
+                "point": sensors.groups,
+                "time_s": np.where(np.isfinite(sensors.times), sensors.times, np.nan),
+                "unit": np.where(moved, "mm", "N"),
+                **{f"{axis}_mm": MILLIMETRES * sensors.positions[:, k] for k, axis in enumerate("xyz")},
+                **{f"direction_{axis}": sensors.directions[:, k] for k, axis in enumerate("xyz")},
+                "observed": factors * observed,
+                **computed,
+                **held,
+                "set_aside": diagnosis.gross.astype(int),
+            }
+        )
+
+    def __getitem__(self, name: str) -> Any:
+        return self.columns[name]
+
+    @property
+    def states(self) -> list[str]:
+        """Of which something was computed, in the order in which they are shown."""
+        return [state for state in STATES if not np.isnan(self[state]).all()]
+
+    @property
+    def lengths(self) -> Bools:
+        """Which rows are of displacements."""
+        return np.asarray(self["unit"] == "mm")
+
+    @property
+    def counted(self) -> Bools:
+        """Which of these are not set aside."""
+        return self.lengths & (self["set_aside"] == 0)
+
+    @property
+    def aside(self) -> list[tuple[str, int, str]]:
+        """Recording, number and place [mm] of each point that was set aside as a gross error."""
+        places = [", ".join(f"{value:.1f}" for value in row) for row in self._axes("{}_mm")]
+        points = zip(self["recording"].tolist(), self["point"].tolist(), places, self["set_aside"], strict=True)
+        return list(dict.fromkeys(point[:3] for point in points if point[3]))
+
+    def _axes(self, name: str) -> Floats:
+        return np.column_stack([self[name.format(axis)] for axis in "xyz"])
+
+    @property
+    def vectors(self) -> Vectors:
+        """The points of the last time of each recording."""
+        times = np.where(np.isnan(self["time_s"]), np.inf, self["time_s"])
+        ends = {name: times[self["recording"] == name].max() for name in np.unique(self["recording"])}
+        rows = self.lengths & (times == [ends[name] for name in self["recording"]])
+        points, first, which = np.unique(self["point"][rows], return_index=True, return_inverse=True)
+        where, along = (self._axes(name)[rows] for name in ("{}_mm", "direction_{}"))
+        left = {}
+        for state in self.states:
+            left[state] = np.zeros((len(points), 3))
+            np.add.at(left[state], which, along * (self["observed"] - self[state])[rows][:, None] / MILLIMETRES)
+        return Vectors(where[first] / MILLIMETRES, left, self["set_aside"][rows][first] > 0)
+
+
+def write_points(path: Path, diagnosis: Diagnosis) -> None:
+    """Write `Recorded`, one row for each number; what does not apply is empty."""
+    _write_csv(path, Recorded.of(diagnosis).columns, "{:.6g}")
+
+
+def write_curves(path: Path, diagnosis: SpecimenDiagnosis) -> None:
+    """Write one row for each that was compared; times [s] are empty where there are none, stresses are nominal [Pa]."""
+    tests = diagnosis.protocol.tests
+    counts = [len(test.strain) for test in tests]
+    columns: dict[str, Any] = {
+        "test": np.repeat([test.name for test in tests], counts),
+        "mode": np.repeat([test.mode for test in tests], counts),
+        "role": np.repeat(["fit" if test.fitted else "check" for test in tests], counts),
+        "time_s": np.concatenate([np.full(len(t.strain), np.nan) if t.time is None else t.time for t in tests]),
+        "strain": np.concatenate([test.strain for test in tests]),
+        "recorded_pa": diagnosis.protocol.observed,
+    }
+    columns |= {f"{name.replace(' ', '_')}_pa": values for name, values in diagnosis.stresses.items()}
+    _write_csv(path, columns, "{:.9g}")
+
+
+def _write_csv(path: Path, columns: Mapping[str, Any], digits: str) -> None:
+    texts = [
+        ["" if np.isnan(x) else digits.format(x) for x in values] if values.dtype.kind == "f" else values.tolist()
+        for values in columns.values()
+    ]
+    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, lineterminator="\n").writerows([list(columns), *zip(*texts, strict=True)])
+
+
+def write_covariance(path: Path, diagnosis: Diagnosis) -> None:
+    """Write the `covariance` (n, n) of noise and nuisances, its rows those of `points.csv` in their units, mm and N.
+
+    With `change` (n,) what an effect changes there, of displacements along `direction` (n, 3), the effect stands out by
+    `sqrt(change @ solve(covariance, change))`. Walls have other normals than in the case as declared, which
+    `points.csv` tells. Gross errors are in it with the noise that was declared, and all noise is as many
+    times larger as was found.
+    """
+    base = diagnosis.base
+    sensors = base.at.sensors
+    without = diagnosis.weighted_sets[REFITTED].marginal
+    noise = without.scale * without.model.noise_factor
+    factors = np.where(sensors.is_displacement, MILLIMETRES, 1.0)[:, None]
+    parts = factors * np.column_stack([noise, base.nuisances.columns])
+    # half the digits: variances are a million times the least of them, not more
+    covariance = (parts @ parts.T).astype(np.float32)
+    with whole_file(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, covariance=covariance, direction=sensors.directions)
 
 
 def write_explained(folder: Path, case: Case) -> None:

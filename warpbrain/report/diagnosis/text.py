@@ -1,103 +1,184 @@
-"""A diagnosis as lines of text, made from its JSON."""
+"""A diagnosis as lines of text and as rows of tables, made from its JSON."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from warpbrain.inference.decide import NOTHING
 from warpbrain.inference.probability import percent
 from warpbrain.physics.words import measured
-from warpbrain.report.diagnosis.saved import STATES
+from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.files import MILLIMETRES
 
 _WIDTH = 110
-#: Times at which a size that changes is said.
-_SHOWN = 5
+#: Times at which a size that changes is said; sets of causes and measurements that are.
+_TIMES, _SETS, _NEXT = 5, 6, 5
+Summary = Mapping[str, Any]
 
 
-def diagnosis_lines(summary: Mapping[str, Any]) -> list[str]:
-    """The verdict on top, then the candidates, the fit and what to do next."""
-    lines = [
-        f"VERDICT: {summary['verdict']}",
-        *textwrap.wrap(summary["sentence"], _WIDTH, initial_indent="  ", subsequent_indent="  "),
+def diagnosis_lines(summary: Summary) -> list[str]:
+    """The verdict on top, then sets of causes, each cause, the fit and what to do next."""
+    return [*_verdict(summary), "", *_causes(summary), "", *_fit(summary), *_further(summary)]
+
+
+def unit_of(summary: Summary) -> tuple[str, float, str]:
+    """Of errors: how keys of `diagnosis.json` end, a factor to what is shown, and its unit."""
+    return ("m", MILLIMETRES, "mm") if "rmse_m" in summary["fit"] else ("pa", 1.0, "Pa")
+
+
+def set_rows(summary: Summary) -> list[list[str]]:
+    """The most probable sets of causes: which, with what probability, and the log evidence against nothing."""
+    sets = summary.get("combinations", summary.get("hypotheses"))
+    # of a specimen it is against nothing already
+    nothing = 0.0 if "combinations" in summary else next((s["log_evidence"] for s in sets if not s["causes"]), 0.0)
+    return [
+        [" and ".join(s["causes"]) or "nothing", percent(s["probability"]), f"{s['log_evidence'] - nothing:+.1f}"]
+        for s in sets[:_SETS]
     ]
-    where = summary["where"]
-    if where is not None:
-        x, y, z = (MILLIMETRES * value for value in where["centre_m"])
-        lines.append(
-            f"  where: ({x:.1f}, {y:.1f}, {z:.1f}) mm, within {MILLIMETRES * where['radius_m']:.1f} mm; "
-            f"p = {where['global_p']:.2g} looking everywhere"
-        )
-    if summary["when"] is not None:
-        lines.append(f"  when: {when_in_words(summary['when'])}")
-    lines += ["", "  candidate          probability   log evidence        d    held-out RMSE    estimate"]
-    lines += [_line(one) for one in summary["ranking"] if one["log_evidence"] is not None]
-    rejected = [one for one in summary["ranking"] if one["log_evidence"] is None]
-    if rejected:
-        lines += ["", "  not tried:"]
-        lines += [f"    {one['mechanism']}: {one['rejected_because']}" for one in rejected]
-    lines += ["", *_fit_lines(summary["fit"])]
-    if summary["verdict"] != NOTHING and summary["smallest_detectable"]:
-        shown = "; ".join(f"{kind} {one['says']}" for kind, one in summary["smallest_detectable"].items())
-        shown = f"What these data would have shown: {shown}."
-        lines += ["", *textwrap.wrap(shown, _WIDTH, initial_indent="  ", subsequent_indent="    ")]
-    if summary["next_measurement"]:
-        lines += ["", "  what to measure next (expected log Bayes factor between the two most probable mechanisms):"]
-        lines += [f"    {one['expected_nats']:8.1f}  {one['what']}" for one in summary["next_measurement"][:5]]
-    if summary["confusion"]:
-        lines.append("")
-        for sentence in summary["confusion"]["says"]:
-            lines += textwrap.wrap(sentence, _WIDTH, initial_indent="  ", subsequent_indent="    ")
-    return lines
 
 
-def when_in_words(when: Mapping[str, Any]) -> str:
+def candidate_rows(summary: Summary) -> list[list[str]]:
+    """Every candidate that was tried, the most probable first: name, probability, log evidence, `d`, change of the
+    held-out error, what it says, and why it is behind."""
+    suffix, factor, unit = unit_of(summary)
+    rows = []
+    for one in summary["ranking"]:
+        if one["log_evidence"] is not None:
+            held = one["heldout_rmse_change" if suffix == "m" else "heldout_rmse_change_pa"]
+            d = one["detectability"] if one["physics"] else None
+            numbers = f"{one['log_evidence']:+.1f}", "" if d is None else f"{d:.1f}"
+            change = "" if held is None else f"{factor * held:+.3g} {unit}"
+            words = one["says"], one["rejected_because"]
+            rows.append([one["mechanism"], percent(one["probability"]), *numbers, change, *words])
+    return rows
+
+
+def rejected_rows(summary: Summary) -> list[list[str]]:
+    """What was not tried, and why."""
+    return [[one["mechanism"], one["rejected_because"]] for one in summary["ranking"] if one["log_evidence"] is None]
+
+
+def fit_rows(summary: Summary) -> list[list[str]]:
+    """Errors of each state, at what was fitted, held out, and only checked; beside them what others would reach."""
+    (suffix, factor, _), fit = unit_of(summary), summary["fit"]
+
+    def cell(value: Any) -> str:
+        if isinstance(value, dict):
+            return ", ".join(f"{name} {cell(one)}" for name, one in value.items())
+        return "" if value is None else f"{factor * value:.4g}"
+
+    columns = [fit[f"{key}_{suffix}"] or {} for key in ("rmse", "heldout_rmse", "check_rmse")]
+    known = (state for state in STATES if columns[0][state] is not None)
+    rows = [[STATES[state], *(cell(column.get(state)) for column in columns)] for state in known]
+    if fit.get("ceiling_heldout_rmse_m") is not None:
+        rows.append(["any smooth force without a name", "", cell(fit["ceiling_heldout_rmse_m"]), ""])
+    if fit.get("placebo_heldout_rmse_m") is not None:
+        between = " to ".join(map(cell, fit["placebo_heldout_rmse_m"]))
+        rows.append(["nine of ten patterns that mean nothing, with as many parameters", "", between, ""])
+    if fit.get("noise_rmse_m") is not None:
+        rows.append(["what noise alone leaves", cell(fit["noise_rmse_m"]), "", ""])
+    return rows
+
+
+def smallest_rows(summary: Summary) -> list[list[str]]:
+    """What these data would have shown of each mechanism, and from which size half would be named."""
+    rows = []
+    for kind, one in summary["smallest_detectable"].items():
+        named = one.get("named_from")
+        # of what is there or not there is no size
+        of_size = named is not None and one["unit"] != "of being there"
+        rows.append([kind, one["says"], f"{named:.2g} {one['unit']}" if of_size else ""])
+    return rows
+
+
+def placebo_sentences(summary: Summary) -> list[str]:
+    """How often patterns that mean nothing do as well as what was added."""
+    fit, words = summary["fit"], "pattern that means nothing does as well with p ="
+    together = [] if fit.get("placebo_p") is None else [f"A {words} {fit['placebo_p']:.2g}."]
+    return together or [f"{one['mechanism']}: a {words} {one['placebo_p']:.2g}." for one in fit["confirmations"]]
+
+
+def where_in_words(where: Summary) -> str:
+    """Where a mismatch is largest: a place in a body, or a part of a test."""
+    if "test" in where:
+        low, high = where["strain"]
+        part = f"{where['test']} ({where['mode']}), {where['segment']}"
+        return f"in {part}, at stretches or shears from {low:.3g} to {high:.3g}"
+    x, y, z = (MILLIMETRES * value for value in where["centre_m"])
+    within = f"within {MILLIMETRES * where['radius_m']:.1f} mm"
+    return f"about ({x:z.1f}, {y:z.1f}, {z:z.1f}) mm in RAS, {within}; p = {where['global_p']:.2g} looking everywhere"
+
+
+def when_in_words(when: Summary) -> str:
     """When something set in, how surely, and how it came."""
     first, last = when["seconds"]
     if "course" not in when:
         # of a laboratory test it is the part of the record
         return f"{first:.3g} to {last:.3g} s"
-    if when.get("sizes") is not None:
-        return _sizes_in_words(when["sizes"])
+    if (sizes := when.get("sizes")) is not None:
+        # at the first and the last time, and at a few between
+        rows = list(zip(sizes["seconds"], sizes["values"], sizes["deviations"], strict=True))
+        chosen = [rows[k] for k in sorted({round(k * (len(rows) - 1) / (_TIMES - 1)) for k in range(_TIMES)})]
+        each = (f"{measured(value, sd, sizes['unit'])} at {time:.3g} s" for time, value, sd in chosen)
+        return f"it changes with time: {sizes['says']} {', '.join(each)}"
     between = f"by {last:.3g} s" if first == 0.0 else f"between {first:.3g} and {last:.3g} s"
     sure = "" if when["probability"] is None else f" (probability {percent(when['probability'])})"
     course = f", {when['course']}" if when["course"] else ""
     return f"it set in {between}{sure}{course}"
 
 
-def _sizes_in_words(sizes: Mapping[str, Any]) -> str:
-    """A size over time: at the first and the last time, and at a few between."""
-    rows = list(zip(sizes["seconds"], sizes["values"], sizes["deviations"], strict=True))
-    chosen = sorted({round(k * (len(rows) - 1) / (_SHOWN - 1)) for k in range(_SHOWN)})
-    each = (f"{measured(value, sd, sizes['unit'])} at {time:.3g} s" for time, value, sd in (rows[k] for k in chosen))
-    return f"it changes with time: {sizes['says']} {', '.join(each)}"
+def _wrapped(sentence: str, following: str = "  ") -> list[str]:
+    return textwrap.wrap(sentence, _WIDTH, initial_indent="  ", subsequent_indent=following)
 
 
-def _line(one: Mapping[str, Any]) -> str:
-    change = one["heldout_rmse_change"]
-    held = f"{MILLIMETRES * change:+8.3f} mm" if change is not None else " " * 11
-    estimate = ", ".join(
-        f"{name} {value['value']:.3g} ± {value['sd']:.2g} {value['unit']}".rstrip()
-        for name, value in list(one["estimate"].items())[:3]
-    )
-    d = f"{one['detectability']:8.1f}" if one["physics"] else " " * 8
-    numbers = f"{percent(one['probability']):>11} {one['log_evidence']:14.1f} {d}   {held}"
-    return f"  {one['mechanism']:<18} {numbers}      {estimate}".rstrip()
+def _verdict(summary: Summary) -> Iterator[str]:
+    yield f"VERDICT: {summary['verdict']}"
+    yield from _wrapped(summary["sentence"])
+    if summary["where"] is not None:
+        yield f"  where: {where_in_words(summary['where'])}"
+    if summary["when"] is not None:
+        yield f"  when: {when_in_words(summary['when'])}"
 
 
-def _fit_lines(fit: Mapping[str, Any]) -> list[str]:
-    lines = ["  RMSE [mm]                      fitted   held out"]
-    for key, name in STATES.items():
-        inside, outside = fit["rmse_m"][key], fit["heldout_rmse_m"][key]
-        if inside is not None:
-            lines.append(f"  {name:<28} {MILLIMETRES * inside:8.3f}   {MILLIMETRES * outside:8.3f}")
-    lines.append(f"  {'any smooth force (ceiling)':<28} {'':8}   {MILLIMETRES * fit['ceiling_heldout_rmse_m']:8.3f}")
-    if fit["improvement"] is not None:
-        low, high = fit["improvement"]["interval_95"]
-        lines.append(
-            f"  held-out error falls by {100 * fit['improvement']['part']:.0f} % (95 %: {100 * low:.0f} to "
-            f"{100 * high:.0f} %); a pattern that means nothing does as well with p = {fit['placebo_p']:.2g}"
-        )
-    return lines
+def _causes(summary: Summary) -> Iterator[str]:
+    yield f"  p = {summary['p_value']:.2g} that nothing is missing; the most probable sets of causes:"
+    for causes, probability, evidence in set_rows(summary):
+        yield f"    {causes:<60} {probability:>10}   log evidence {evidence:>8}"
+    if summary["p_left"] is not None:
+        yield f"  p = {summary['p_left']:.2g} that nothing is left beside the causes that the verdict is about"
+    yield from ["", "  candidate          probability   log evidence        d    held-out RMSE    estimate"]
+    values = {one["mechanism"]: list(one["estimate"].items())[:3] for one in summary["ranking"]}
+    for name, probability, evidence, d, change, *_ in candidate_rows(summary):
+        each = (f"{key} {v['value']:.3g} ± {v['sd']:.2g} {v['unit']}".rstrip() for key, v in values[name])
+        numbers = f"{probability:>11} {evidence:>14} {d:>8}   {change:>13}"
+        yield f"  {name:<18} {numbers}    {', '.join(each)}".rstrip()
+    if rejected := rejected_rows(summary):
+        yield from ["", "  not tried:", *(f"    {name}: {why}" for name, why in rejected)]
+
+
+def _fit(summary: Summary) -> Iterator[str]:
+    rows = [[f"RMSE [{unit_of(summary)[2]}]", "fitted", "held out", "check"], *fit_rows(summary)]
+    width = max(len(row[0]) for row in rows)
+    for name, *errors in rows:
+        inside, outside, check = errors if any(row[3] for row in rows[1:]) else (*errors[:2], "")
+        yield f"  {name:<{width}} {inside:>8}   {outside:>14}   {check}".rstrip()
+    if improvement := summary["fit"]["improvement"]:
+        part, low, high = (100.0 * value for value in (improvement["part"], *improvement["interval_95"]))
+        yield f"  held-out error falls by {part:.0f} % (95 %: {low:.0f} to {high:.0f} %)"
+    yield from (f"  {sentence}" for sentence in placebo_sentences(summary))
+    for one in summary["fit"]["confirmations"]:
+        held_out = f"of held-out rows {-one['heldout_log_density']:+.1f}"
+        yield f"  without {one['mechanism']}: log evidence {-one['log_evidence']:+.1f}, {held_out}"
+
+
+def _further(summary: Summary) -> Iterator[str]:
+    if summary["verdict"] != NOTHING and summary["smallest_detectable"]:
+        shown = "; ".join(f"{kind} {one['says']}" for kind, one in summary["smallest_detectable"].items())
+        yield from ["", *_wrapped(f"What these data would have shown: {shown}.", "    ")]
+    if summary["next_measurement"]:
+        yield from ["", "  what to measure next (expected log Bayes factor between the two most probable mechanisms):"]
+        yield from (f"    {one['expected_nats']:8.1f}  {one['what']}" for one in summary["next_measurement"][:_NEXT])
+    if summary.get("confusion"):
+        yield from ["", *(line for sentence in summary["confusion"]["says"] for line in _wrapped(sentence, "    "))]

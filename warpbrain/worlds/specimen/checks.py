@@ -13,12 +13,16 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.blocks import Blocks
-from warpbrain.inference.causes import Cause, Place
+from warpbrain.inference.causes import Cause, Kind, Place
+from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.predict import predictive_p
+from warpbrain.inference.predict import Prediction, predictive_p
+from warpbrain.physics.words import pascals
+from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.specimen.fit import Fit
-from warpbrain.worlds.specimen.linear import Linear
 from warpbrain.worlds.specimen.protocol import Protocol
+from warpbrain.worlds.specimen.result import Score
+from warpbrain.worlds.specimen.search import Linear, Sets
 
 #: Parts of a test that are held out where it is the only one, and blocks of its rows for intervals.
 _BLOCKS = 4
@@ -27,15 +31,121 @@ _PLACEBOS, _WAVES, _LENGTH = 100, 40, 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Folds:
-    """Which rows are held out one after the other.
+class CheckResults:
+    """A fit beside the base; see `SpecimenDiagnosis` for what these are."""
 
-    Attributes
-    ----------
-    held : tuple of (n,) bool arrays
-        Each test that may be fitted, or each quarter of the only one.
-    by_test : bool
-    """
+    p_left: float | None
+    scores: dict[str, Score]
+    stresses: dict[str, Floats]
+    improvement: tuple[float, float, float] | None = None
+    confirmations: tuple[Confirmation, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Predicted:
+    """A fit, its stress and held-out stress at all recorded rows (n,) [Pa], and its held-out log density."""
+
+    fit: Fit
+    stress: Floats
+    held: Floats
+    log_density: float
+
+
+class Checker:
+    """Checks fits of one diagnosis by all recorded rows, with some draws of rows in which nothing is left."""
+
+    def __init__(self, sets: Sets, protocol: Protocol, draws: int, random: np.random.Generator) -> None:
+        self.sets, self.protocol, self._draws, self._random = sets, protocol, draws, random
+        self.folds = folds_of(protocol.thinned)
+        self._predictions: dict[int, _Predicted] = {}
+
+    def p_left(self, fit: Fit) -> float:
+        """Posterior predictive probability of rows that other causes explain as well, if a fit has all that acts.
+
+        Rows are drawn from the fit's own model, so that having looked for many things in many ways is paid for.
+        """
+        fields = [place.columns for cause in self.sets.about(fit).causes for place in cause.places]
+        sizes, residual = beliefs("specimen.sizes"), fit.residual[fit.rows]
+        return predictive_p(fit.model, fields, sizes, residual, self._draws, self._random)
+
+    def of(self, fit: Fit) -> CheckResults:
+        """Everything about a fit; of the base only its errors."""
+        base = self.sets.base
+        scores: dict[str, Score] = {}
+        stresses: dict[str, Floats] = {}
+        for name, one in (("refitted", base), ("explained", fit))[: 1 if fit is base else 2]:
+            predicted = self._predicted(one)
+            stresses |= {name: predicted.stress, f"heldout {name}": predicted.held}
+            scores[name] = score(self.protocol, predicted.stress, predicted.held)
+        if fit is base:
+            return CheckResults(None, scores, stresses)
+        names = [one.effect.name for one in fit.assumed if one.effect.kind is Kind.PHYSICS]
+        confirmations = [found for name in names if (found := self._confirm(fit, name)) is not None]
+        return CheckResults(self.p_left(fit), scores, stresses, self._improvement(base, fit), tuple(confirmations))
+
+    def heldout_rms(self, fit: Fit) -> float:
+        """Of all recorded rows of tests that were held out in turn [Pa]."""
+        return root_mean_square((self.protocol.observed - self._predicted(fit).held)[self.protocol.fitted])
+
+    def _predicted(self, fit: Fit) -> _Predicted:
+        if id(fit) not in self._predictions:
+            # what has no name is known at thinned rows alone, and explains nothing of others
+            assumed, z = fit.only(lambda effect: effect.kind is not Kind.UNKNOWN)
+            everywhere, z = fit.forward.of(protocol=self.protocol), np.concatenate([fit.z[: len(fit.forward)], z])
+            whole = everywhere.stress(assumed, z)
+            predicted, log_density = held_out(fit, self.folds)
+            # of thinned rows it is known by how much it differs from the fit: smoothly
+            held = whole + self.protocol.spread(predicted - fit.forward.stress(assumed, z))
+            self._predictions[id(fit)] = _Predicted(fit, whole, held, log_density)
+        return self._predictions[id(fit)]
+
+    def _improvement(self, before: Fit, after: Fit) -> tuple[float, float, float]:
+        """Of held-out errors relative to the largest stress of each test."""
+        observed, peaks, blocks = self.protocol.observed, self.protocol.peaks, _blocks(self.protocol)
+        first, second = (
+            Prediction((observed - self._predicted(fit).held) / peaks, blocks, np.zeros(0)) for fit in (before, after)
+        )
+        return second.improvement(first, self.protocol.fitted, self._random)
+
+    def _confirm(self, fit: Fit, name: str) -> Confirmation | None:
+        """Of one cause where all others of the fit act; None if no fit stands without it."""
+        others = self.sets.fitted(fit.names - {name})
+        if others is None:
+            return None
+        evidence = [self.sets.by_names[names].hypothesis.log_evidence for names in (fit.names, others.names)]
+        gained = self._predicted(fit).log_density - self._predicted(others).log_density
+        p = _placebo_p(self.sets.about(others), name, self.folds, self._random)
+        return Confirmation(name, evidence[0] - evidence[1], gained, self._improvement(others, fit), p)
+
+
+def score(protocol: Protocol, stress: Floats, held: Floats | None = None) -> Score:
+    """Errors of stresses (n,) at all recorded rows [Pa]."""
+    errors = protocol.observed - stress
+    tests = zip(protocol.tests, protocol.rows, strict=True)
+    check = {test.name: root_mean_square(errors[rows]) for test, rows in tests if not test.fitted}
+    outside = None if held is None else root_mean_square((protocol.observed - held)[protocol.fitted])
+    return Score(root_mean_square(errors[protocol.fitted]), outside, check)
+
+
+def grown_errors(checked: CheckResults) -> tuple[list[str], list[str]]:
+    """Errors that are larger with what was added than without, in words: of held-out tests, of tests never fitted."""
+    if "explained" not in checked.scores:
+        return [], []
+    before, after = (checked.scores[name] for name in ("refitted", "explained"))
+    first, second = before.heldout or 0.0, after.heldout or 0.0
+    grown = [f"The error of held-out tests grows with it: from {pascals(first)} to {pascals(second)}."]
+    checks = [
+        f"'{name}', which was not fitted, is predicted worse with it: {pascals(before.check[name])} without, "
+        f"{pascals(after.check[name])} with it."
+        for name in before.check
+        if after.check[name] > before.check[name]
+    ]
+    return grown if second > first else [], checks
+
+
+@dataclass(frozen=True, eq=False)
+class Folds:
+    """Rows (n,) that are held out in turn: each test that may be fitted, or each quarter of the only one."""
 
     held: tuple[Bools, ...]
     by_test: bool
@@ -45,12 +155,11 @@ def folds_of(protocol: Protocol) -> Folds:
     """Of all tests that may be fitted."""
     if len(protocol.to_fit) > 1:
         return Folds(tuple(protocol.mask([number]) for number in protocol.to_fit), True)
-    blocks = blocks_of(protocol)
-    fitted = protocol.mask(protocol.to_fit)
-    return Folds(tuple(fitted & (blocks == block) for block in np.unique(blocks[fitted])), False)
+    blocks = _blocks(protocol)
+    return Folds(tuple(protocol.fitted & (blocks == k) for k in np.unique(blocks[protocol.fitted])), False)
 
 
-def blocks_of(protocol: Protocol) -> Ints:
+def _blocks(protocol: Protocol) -> Ints:
     """Parts of tests by number (n,)."""
     each = [
         _BLOCKS * k + np.minimum((_BLOCKS * test.path / max(float(test.path[-1]), 1e-12)).astype(np.int64), _BLOCKS - 1)
@@ -62,40 +171,25 @@ def blocks_of(protocol: Protocol) -> Ints:
 def held_out(fit: Fit, folds: Folds) -> tuple[Floats, float]:
     """What a fit says of each fold's rows given the others: its causes fitted to these, and linear about that.
 
-    Returns
-    -------
-    stress : (n,) array
-        Predicted [Pa]; NaN where nothing was held out.
-    log_density : float
-        Of all folds.
+    Returns the predicted stress (n,) [Pa], NaN where nothing was held out, and the log density of all folds.
     """
     rows = fit.rows
     predicted, total = np.full(len(rows), np.nan), 0.0
     for held in folds.held:
-        again = fit.refitted_to(rows & ~held)
-        columns = np.column_stack([fit.unknown, again.columns])[rows]
-        model = GaussianModel(fit.model.noise_factor, columns, fit.scale)
-        observed = ~held[rows]
+        again, observed = fit.refitted_to(rows & ~held), ~held[rows]
+        model = GaussianModel(fit.model.noise_factor, again.columns[rows], fit.scale)
         mean, _ = model.conditional(again.residual[rows], observed)
         predicted[held] = (again.stress - again.columns @ again.z)[held] + mean
         total += model.log_density_of_hidden(again.residual[rows], observed)
     return predicted, total
 
 
-def placebo_p(about: Linear, name: str, folds: Folds, rng: np.random.Generator) -> float:
+def _placebo_p(about: Linear, name: str, folds: Folds, random: np.random.Generator) -> float:
     """Probability that a pattern that means nothing predicts held-out rows as well as a cause does.
 
     A pattern is a random smooth function of stretch, shear, the path of a test and the logarithm of its time, the
     same in all tests, so that it can carry over to those that are held out as a cause does. It has as many places and
     columns as the cause, of the same sizes, and both are in the same model: about the fit without the cause.
-
-    Parameters
-    ----------
-    about : Linear
-        About the fit without the cause.
-    name : str
-    folds : Folds
-    rng : Generator
     """
     fit = about.fit
     cause = next(one for one in about.causes if one.name == name)
@@ -105,18 +199,18 @@ def placebo_p(about: Linear, name: str, folds: Folds, rng: np.random.Generator) 
     for number in range(_PLACEBOS):
         places = []
         for place in cause.places:
-            pattern = peaks[:, None] * _pattern(where, place.columns.shape[1], rng)
+            pattern = peaks[:, None] * _pattern(where, place.columns.shape[1], random)
             places.append(Place(pattern * length / np.sqrt(np.mean(pattern**2)), None, place.weight))
         causes.append(Cause(str(number), tuple(places), 0.0, cause.sizes))
-    total = np.zeros(len(causes))
-    whole = _log_densities(fit.model, fit.residual[fit.rows], causes)
+    residual = fit.residual[fit.rows]
+    total, whole = np.zeros(len(causes)), _log_densities(fit.model, residual, causes)
     for held in folds.held:
         observed = ~held[fit.rows]
         kept = [
             Cause(one.name, tuple(Place(p.columns[observed], None, p.weight) for p in one.places), 0.0, one.sizes)
             for one in causes
         ]
-        total += whole - _log_densities(fit.model.rows(observed), fit.residual[fit.rows][observed], kept)
+        total += whole - _log_densities(fit.model.rows(observed), residual[observed], kept)
     return float((1 + np.sum(total[1:] >= total[0])) / (1 + _PLACEBOS))
 
 
@@ -129,11 +223,11 @@ def _log_densities(model: GaussianModel, residual: Floats, causes: Sequence[Caus
     return np.asarray(found + float(model.log_density(residual)))
 
 
-def _pattern(where: Floats, count: int, rng: np.random.Generator) -> Floats:
+def _pattern(where: Floats, count: int, random: np.random.Generator) -> Floats:
     """Random smooth functions (n, count) of coordinates (n, d): sums of waves."""
-    waves = rng.normal(size=(where.shape[1], _WAVES * count)) / _LENGTH
-    phases = rng.uniform(0.0, 2.0 * np.pi, size=_WAVES * count)
-    weights = rng.normal(size=_WAVES * count)
+    waves = random.normal(size=(where.shape[1], _WAVES * count)) / _LENGTH
+    phases = random.uniform(0.0, 2.0 * np.pi, size=_WAVES * count)
+    weights = random.normal(size=_WAVES * count)
     return (weights * np.cos(where @ waves + phases)).reshape(len(where), _WAVES, count).sum(axis=1)
 
 
@@ -146,12 +240,3 @@ def _coordinates(protocol: Protocol) -> Floats:
         since = zero if test.time is None else np.log1p(test.time - test.time[0]) / 5.0
         rows.append(np.column_stack([stretch, shear, test.path / max(float(test.path[-1]), 1e-12), since]))
     return np.concatenate(rows)
-
-
-def p_of_nothing_left(about: Linear, draws: int, rng: np.random.Generator) -> float:
-    """Posterior predictive probability of rows that other causes explain as well, if a fit has all that acts.
-
-    Rows are drawn from the fit's own model, so that having looked for many things in many ways is paid for.
-    """
-    fit, fields = about.fit, [place.columns for cause in about.causes for place in cause.places]
-    return predictive_p(fit.model, fields, beliefs("specimen.sizes"), fit.residual[fit.rows], draws, rng)

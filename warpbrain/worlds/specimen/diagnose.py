@@ -3,64 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.causes import Kind
 from warpbrain.inference.confirm import after_checks
 from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, Decision, decide
-from warpbrain.physics.values import Measurement, Value
+from warpbrain.physics.values import Measurement
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.seconds import Seconds
 from warpbrain.simulation.specimen import not_transmitted, specimen_of
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.listener import Listener
-from warpbrain.worlds.specimen.actions import Effect
-from warpbrain.worlds.specimen.checking import Checker, grown_errors
-from warpbrain.worlds.specimen.effects import effects_of
-from warpbrain.worlds.specimen.explained import explained_case
-from warpbrain.worlds.specimen.fit import Fit, Fitting
+from warpbrain.worlds.options import DiagnosisOptions
+from warpbrain.worlds.specimen.checks import Checker, grown_errors, score
+from warpbrain.worlds.specimen.fit import Fit, fit
 from warpbrain.worlds.specimen.forward import Forward
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
-from warpbrain.worlds.specimen.measures import score, smallest_of, values_of, where_it_shows
-from warpbrain.worlds.specimen.next_tests import next_measurements
-from warpbrain.worlds.specimen.noise import noise_factor
+from warpbrain.worlds.specimen.measures import next_measurements, smallest_of, values_of, where_it_shows
 from warpbrain.worlds.specimen.protocol import protocol_of
+from warpbrain.worlds.specimen.registered import effects_of
 from warpbrain.worlds.specimen.result import Combination, Ranked, SpecimenDiagnosis
 from warpbrain.worlds.specimen.search import CauseSet, Sets
 from warpbrain.worlds.specimen.sentences import assumptions_of
 
 #: Rows below which nothing is concluded; combinations that are told.
 _FEWEST, _TOLD = 15, 12
-
-
-@dataclass(frozen=True)
-class SpecimenOptions:
-    """What is asked for.
-
-    Parameters
-    ----------
-    candidates : tuple of str or None
-        Causes to look for; None: all.
-    alpha : float
-        Probability of an alarm where nothing is missing, and below which a check fails.
-    seed : int
-        Of all draws.
-    draws : int
-        Of rows in which nothing is missing.
-    ends : bool
-        Whether glued ends are computed; otherwise states are taken for homogeneous, as test evaluations do.
-    """
-
-    candidates: tuple[str, ...] | None = None
-    alpha: float = 0.05
-    seed: int = 0
-    draws: int = 400
-    ends: bool = True
+#: Sets with their probabilities, the most probable first.
+Ordered = Sequence[tuple[CauseSet, float]]
 
 
 class DiagnosingSpecimen:
@@ -70,7 +43,7 @@ class DiagnosingSpecimen:
     ----------
     case : Case
         With a specimen.
-    options : SpecimenOptions, optional
+    options : DiagnosisOptions, optional
     device : str, optional
         Of the finite elements that glued ends need.
     listener : Listener, optional
@@ -84,33 +57,17 @@ class DiagnosingSpecimen:
     def __init__(
         self,
         case: Case,
-        options: SpecimenOptions | None = None,
+        options: DiagnosisOptions | None = None,
         device: str | None = None,
         listener: Listener | None = None,
     ) -> None:
         self.case, self.device, self._listener = case, device, listener or Listener()
-        self.options = options or SpecimenOptions()
+        self.options = options or DiagnosisOptions()
         self.seconds = Seconds()
         recordings = [one for one in case.recordings if isinstance(one, TestRecording)]
-        self._check(recordings)
-        #: All recorded rows, and those that densities are of.
+        _check(case, recordings)
+        #: All recorded rows.
         self.protocol = protocol_of(specimen_of(case), recordings)
-        self.thinned = self.protocol.thinned
-
-    def _check(self, recordings: Sequence[TestRecording]) -> None:
-        specimen, path = specimen_of(self.case), self.case.path
-        rows = sum(len(one.imposed) for one in recordings if one.role == "fit")
-        if rows < _FEWEST:
-            raise InputError(
-                f"{path}: [[recording]] role = 'fit': {rows} rows of tests: too few for any conclusion; "
-                f"{_FEWEST - rows} more would do"
-            )
-        for one in recordings:
-            who = f"{path}: [[recording]] '{one.name}'"
-            if why := not_transmitted(specimen.grips, one.mode):
-                raise InputError(f"{who} mode '{one.mode}': {why}")
-            if not np.abs(one.response).any():
-                raise InputError(f"{who} file '{one.file}': every response is 0")
 
     def run(self) -> SpecimenDiagnosis:
         """Every stage.
@@ -124,139 +81,168 @@ class DiagnosingSpecimen:
             return self._run()
 
     def _run(self) -> SpecimenDiagnosis:
-        options, thinned, everything = self.options, self.thinned, self.protocol
+        options, protocol = self.options, self.protocol
         self._listener.stage("base: the case as declared, its tissue refitted")
         with self.seconds.of("base"):
-            assert self.case.specimen is not None
-            glued = self.case.specimen.grips == "glued" and options.ends
-            forward = Forward(self.case, thinned, GluedEnds(self.case, everything, self.device), glued)
-            fitting = Fitting(noise_factor(thinned), thinned.mask(thinned.to_fit))
-            effects, rejected = effects_of(self.case, thinned, options.candidates)
-            base = fitting.fit(forward, (), np.zeros((len(thinned), 0)), np.zeros(len(forward.nuisances)), 1.0)
+            glued = specimen_of(self.case).grips == "glued" and options.ends
+            forward = Forward(self.case, protocol.thinned, GluedEnds(self.case, protocol, self.device), glued)
+            effects, rejected = effects_of(self.case, protocol.thinned, options.candidates)
+            base = fit(forward, (), np.zeros(len(forward)))
         if base is None:
             raise InputError(f"{self.case.path}: the declared law finds no state in the tests")
         with self.seconds.of("sets of causes"):
-            sets = Sets(fitting, effects, base, self._listener)
+            sets = Sets(effects, base, self._listener)
             ordered = sets.ordered()
         with self.seconds.of("checks"):
-            checking = Checker(sets, everything, options.draws, np.random.default_rng([options.seed, 11]))
-            p_value = checking.p_left(base)
-            hypotheses, chances = [one.hypothesis for one, _ in ordered], np.array([p for _, p in ordered])
-            by_posterior, _ = decide(hypotheses, chances, calibration().losses)
+            checker = Checker(sets, protocol, options.draws, np.random.default_rng([options.seed, 11]))
+            p_value = checker.p_left(base)
+            chances = np.array([p for _, p in ordered])
+            by_posterior, _ = decide([one.hypothesis for one, _ in ordered], chances, calibration().losses)
             if p_value > options.alpha:
                 by_posterior = Decision(NOTHING)
             best = base if by_posterior.verdict == NOTHING else _explaining(ordered, by_posterior)
-            checked = checking.of(best)
-            grown, worse = grown_errors(checked)
+            checked = checker.of(best)
             decision, doubts = after_checks(
-                by_posterior, checked.confirmations, checked.p_left, options.alpha, grown, worse
+                by_posterior, checked.confirmations, checked.p_left, options.alpha, *grown_errors(checked)
             )
-        named = decision.causes if decision.verdict in (NAMED, NAMED_AND_REST) else ()
+        names = decision.causes if decision.verdict in (NAMED, NAMED_AND_REST) else ()
         with self.seconds.of("next measurement"):
             measurements = _next(ordered, base)
         with self.seconds.of("explained"):
-            explained = explained_case(fitting, best) if named else None
-        declared = forward.of(everything).stress((), np.zeros(len(forward.nuisances)))
-        scores = {"declared": score(everything, declared, None)} | checked.scores
-        ranking = _ranking(sets, ordered, effects, checking)
-        by_name = {one.name: one for one in ranking}
-        nothing = sets.by_names[frozenset()].hypothesis.log_evidence
+            explained = _explained_case(best) if names else None
+        declared = forward.of(protocol=protocol).stress((), np.zeros(len(forward)))
+        ranking = _ranking(sets, ordered, checker)
+        nothing = sets.nothing.hypothesis.log_evidence
+        shows = None
+        if best is not base:
+            shows = where_it_shows(protocol, checked.stresses["refitted"], checked.stresses["explained"])
         return SpecimenDiagnosis(
             case=self.case,
-            protocol=everything,
+            protocol=protocol,
             decision=decision,
             by_posterior=by_posterior,
             doubts=doubts,
             p_value=p_value,
             p_left=checked.p_left,
-            named=tuple(replace(by_name[name], values=_values(best, name)) for name in named),
+            named=tuple(replace(_of_name(ranking, name), values=values_of(best, name)) for name in names),
             ranking=ranking,
             rejected=rejected,
             combinations=tuple(
-                Combination(one.hypothesis.causes, one.hypothesis.log_evidence - nothing, p, one.fit is not None)
+                Combination(
+                    # what has no name comes last
+                    tuple(sorted(one.hypothesis.causes, key=lambda name: name == UNKNOWN)),
+                    one.hypothesis.log_evidence - nothing,
+                    p,
+                    one.fit is not None,
+                )
                 for one, p in ordered[:_TOLD]
             ),
             assumed=tuple(sorted(best.names)),
-            where=where_it_shows(everything, checked.stresses["refitted"], checked.stresses["explained"])
-            if best is not base
-            else None,
+            where=shows,
             next_measurement=measurements,
             smallest=smallest_of(sets.about(base)),
-            scores=scores,
+            scores={"declared": score(protocol, declared)} | checked.scores,
             stresses={"declared": declared} | checked.stresses,
             improvement=checked.improvement,
             confirmations=checked.confirmations,
             explained=explained,
-            assumptions=assumptions_of(best, everything, checking.folds.by_test),
+            assumptions=assumptions_of(best, protocol, checker.folds.by_test),
             remarks=tuple(
                 f"{one.effect.name} is not simulated by a run: the explained case is fitted without it"
                 for one in best.assumed
-                if not one.effect.runs
+                if not one.effect.runs and one.effect.name != UNKNOWN
             ),
-            by_test=checking.folds.by_test,
+            by_test=checker.folds.by_test,
             seconds=self.seconds,
         )
 
 
-def _explaining(ordered: Sequence[tuple[CauseSet, float]], decision: Decision) -> Fit:
+def _check(case: Case, recordings: Sequence[TestRecording]) -> None:
+    """Raise `InputError` if nothing can be said of tests."""
+    rows = sum(len(one.imposed) for one in recordings if one.role == "fit")
+    if rows < _FEWEST:
+        raise InputError(
+            f"{case.path}: [[recording]] role = 'fit': {rows} rows of tests: too few for any conclusion; "
+            f"{_FEWEST - rows} more would do"
+        )
+    for one in recordings:
+        who = f"{case.path}: [[recording]] '{one.name}'"
+        if why := not_transmitted(specimen_of(case).grips, one.mode):
+            raise InputError(f"{who} mode '{one.mode}': {why}")
+        if not np.abs(one.response).any():
+            raise InputError(f"{who} file '{one.file}': every response is 0")
+
+
+def _explaining(ordered: Ordered, decision: Decision) -> Fit:
     """The most probable fit that has all causes of a verdict; of one that speaks of none, of all with any."""
-    fits = [one.fit for one, _ in ordered if one.fit is not None and one.names]
-    wanted = {name for name in decision.causes if name != UNKNOWN}
-    if decision.verdict not in (NAMED, NAMED_AND_REST):
-        wanted = set()
-    nothing = next(one.fit for one, _ in ordered if not one.names)
-    assert nothing is not None
-    return next((fit for fit in fits if wanted <= fit.names), nothing)
+    spoken = decision.verdict in (NAMED, NAMED_AND_REST)
+    wanted = {name for name in decision.causes if name != UNKNOWN} if spoken else set()
+    fits = [one.fit for one, _ in ordered if one.fit is not None]
+    return next((one for one in fits if one.names and wanted <= one.names), next(one for one in fits if not one.names))
 
 
-def _next(ordered: Sequence[tuple[CauseSet, float]], base: Fit) -> tuple[Measurement, ...]:
+def _explained_case(best: Fit) -> Case | None:
+    """The case with what was named, ready for `warpbrain run`: fitted again with nothing that a run cannot simulate.
+
+    None if a run can simulate nothing of what is assumed, or no fit stands.
+    """
+    assumed, z = best.only(lambda effect: effect.runs)
+    forward = best.forward.of(shape_of_law=False)
+    found = fit(forward, assumed, np.concatenate([np.zeros(len(forward)), z]), best.scale) if assumed else None
+    if found is None:
+        return None
+    case = forward.case
+    [(label, tissue)] = case.tissues.items()
+    law = tissue.known_law.scaled_to(found.forward.modulus(found.z) * tissue.known_law.shear_modulus)
+    return replace(
+        case,
+        name=f"{case.name}-explained",
+        title=f"{case.title}, with {'-and-'.join(one.effect.name for one in assumed)}",
+        tissues={label: replace(tissue, law=law)},
+        mechanisms=(*case.mechanisms, *found.forward.mechanisms(assumed, found.z)),
+    )
+
+
+def _next(ordered: Ordered, base: Fit) -> tuple[Measurement, ...]:
     """What would tell the two most probable sets with mechanisms of a run apart, or the only one from none."""
     fits: dict[frozenset[str], Fit] = {}
     for one, _ in ordered:
         if one.fit is not None:
-            runs = frozenset(own.effect.name for own in one.fit.assumed if own.effect.runs)
-            fits.setdefault(runs, one.fit)
-    first = [fit for runs, fit in fits.items() if runs][:2]
-    return next_measurements(first[0], first[1] if len(first) > 1 else base) if first else ()
+            fits.setdefault(frozenset(own.effect.name for own in one.fit.assumed if own.effect.runs), one.fit)
+    first = [*(found for runs, found in fits.items() if runs), base]
+    return next_measurements(*first[:2]) if len(first) > 1 else ()
 
 
-def _values(fit: Fit, name: str) -> tuple[Value, ...]:
-    return values_of(fit, [one.effect.name for one in fit.assumed].index(name))
-
-
-def _ranking(
-    sets: Sets, ordered: Sequence[tuple[CauseSet, float]], effects: Sequence[Effect], checking: Checker
-) -> tuple[Ranked, ...]:
-    """Every cause alone, that which most probably acts first, and what has no name."""
-    nothing = sets.by_names[frozenset()].hypothesis.log_evidence
+def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[Ranked, ...]:
+    """Every cause alone, that which most probably acts first."""
+    base, nothing = sets.base, sets.nothing.hypothesis.log_evidence
     found = []
-    for effect in (*effects, None):
-        name = UNKNOWN if effect is None else effect.name
-        alone = sets.by_names.get(frozenset({name}))
-        probability = sum(p for one, p in ordered if name in one.names)
-        change, d = None, 0.0
+    for effect in sets.effects:
+        alone = sets.by_names.get(frozenset({effect.name}))
+        change = d = None
         if alone is not None and alone.fit is not None:
-            change = checking.heldout_rms(alone.fit) - checking.heldout_rms(sets.base)
-            d = _detectability(sets.base, alone.fit)
-        fit = next((one.fit for one, _ in ordered if name in one.names and one.fit is not None), None)
-        one = None if fit is None or effect is None else next(a for a in fit.assumed if a.effect.name == name)
+            change = checker.heldout_rms(alone.fit) - checker.heldout_rms(base)
+            moved = (alone.fit.stress - base.stress)[base.rows]
+            d = float(np.linalg.norm(base.model.standardised(moved)))
+        fits = (one.fit for one, _ in ordered if effect.name in one.names and one.fit is not None)
+        best = next(fits, None)
+        values = () if best is None else values_of(best, effect.name)
+        regions = () if best is None else (one.variant.region for one in best.assumed if one.effect is effect)
         found.append(
             Ranked(
-                name=name,
-                kind=Kind.UNKNOWN if effect is None else effect.kind,
-                sentence="" if effect is None else effect.sentence,
+                name=effect.name,
+                sentence=effect.sentence_of(values),
+                kind=effect.kind,
                 log_evidence=float("-inf") if alone is None else alone.hypothesis.log_evidence - nothing,
-                probability=probability,
+                probability=sum(p for one, p in ordered if effect.name in one.names),
                 detectability=d,
                 change=change,
-                values=() if one is None or fit is None else _values(fit, name),
-                region="" if one is None else one.variant.region,
+                values=values,
+                region=next(iter(regions), ""),
             )
         )
     return tuple(sorted(found, key=lambda one: (-one.probability, -one.log_evidence)))
 
 
-def _detectability(base: Fit, fit: Fit) -> float:
-    """Length of what a fit changes, in standard deviations of noise and nuisances about the base."""
-    moved = (fit.stress - base.stress)[base.rows]
-    return float(np.linalg.norm(base.model.standardised(moved)))
+def _of_name(ranking: Sequence[Ranked], name: str) -> Ranked:
+    return next(one for one in ranking if one.name == name)

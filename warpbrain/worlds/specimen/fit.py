@@ -6,6 +6,7 @@ them the rows are a `GaussianModel`, whose log density is the evidence; the scal
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,9 +14,9 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError
-from warpbrain.inference.decide import UNKNOWN
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.noise import scales
+from warpbrain.worlds.specimen.effects import Effect
 from warpbrain.worlds.specimen.forward import Component, Forward
 from warpbrain.worlds.specimen.material import NoStateError
 
@@ -30,35 +31,15 @@ _SAME = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Causes at their most probable coefficients.
+    """Causes at their most probable coefficients `z` (k,), in standard deviations, after some of the `rows` (n,).
 
-    Attributes
-    ----------
-    forward : Forward
-    assumed : tuple of Component
-    unknown : (n, q) array
-        Columns of smooth changes without a name, one standard deviation each; q is 0 without them.
-    rows : (n,) bool array
-        That were fitted.
-    noise : (n, n) array
-        Factor of the noise.
-    z : (k,) array
-        In standard deviations.
-    stress : (n,) array
-        At all rows of the protocol, fitted or not [Pa].
-    columns : (n, k) array
-        Change with each coefficient.
-    scale : float
-        Of the noise.
-    log_density : float
-        Of the fitted rows at this scale, with the scale's log probability.
+    `stress` (n,) [Pa] and its change `columns` (n, k) with each coefficient are of all rows of the protocol, fitted or
+    not; `log_density` is of the fitted ones at this `scale` of the noise, with the scale's log probability.
     """
 
     forward: Forward
     assumed: tuple[Component, ...]
-    unknown: Floats
     rows: Bools
-    noise: Floats
     z: Floats
     stress: Floats
     columns: Floats
@@ -67,9 +48,8 @@ class Fit:
 
     @property
     def names(self) -> frozenset[str]:
-        """Of its causes, what has no name among them."""
-        names = frozenset(one.effect.name for one in self.assumed)
-        return names | {UNKNOWN} if self.unknown.shape[1] else names
+        """Of its causes."""
+        return frozenset(one.effect.name for one in self.assumed)
 
     @cached_property
     def residual(self) -> Floats:
@@ -79,113 +59,99 @@ class Fit:
     @cached_property
     def model(self) -> GaussianModel:
         """Of the residual at the fitted rows."""
-        return _model(self.noise, self.rows, self.unknown, self.columns, self.scale)
+        return GaussianModel(self.forward.noise[np.ix_(self.rows, self.rows)], self.columns[self.rows], self.scale)
 
     @cached_property
     def covariance(self) -> Floats:
         """Of the coefficients (k, k)."""
-        return self.model.coefficients(self.residual[self.rows])[1][self.unknown.shape[1] :, self.unknown.shape[1] :]
+        return self.model.coefficients(self.residual[self.rows])[1]
 
     def refitted_to(self, rows: Bools) -> Fit:
         """The same causes fitted to other rows (n,), with its noise and glued ends; itself where no fit stands."""
-        fitting = Fitting(self.noise, rows)
         try:
-            return fitting.once(self.forward, self.assumed, self.unknown, self.z, self.scale)
+            return _fit(self.forward, self.assumed, self.z, self.scale, rows)
         except CANNOT_BE:
             return self
 
     def part(self, number: int) -> slice:
         """Coefficients of one of the causes."""
-        first = len(self.forward.nuisances) + sum(map(len, self.assumed[:number]))
+        first = len(self.forward) + sum(map(len, self.assumed[:number]))
         return slice(first, first + len(self.assumed[number]))
 
+    def only(self, kept: Callable[[Effect], bool]) -> tuple[tuple[Component, ...], Floats]:
+        """Some of its causes, and their coefficients (k,)."""
+        numbers = [k for k, one in enumerate(self.assumed) if kept(one.effect)]
+        z = np.concatenate([np.zeros(0), *(self.z[self.part(k)] for k in numbers)])
+        return tuple(self.assumed[k] for k in numbers), z
 
-class Fitting:
-    """Fits causes to some rows of tests.
 
-    Parameters
-    ----------
-    noise : (n, n) array
-        Factor of the noise, see `noise_factor`.
-    rows : (n,) bool array
-        That are fitted.
+def fit(forward: Forward, assumed: tuple[Component, ...], z: Floats, scale: float = 1.0) -> Fit | None:
+    """Fit causes to all rows that may be fitted, from coefficients (k,) and a scale of the noise; None if none stands.
+
+    The noise and the glued ends are those of what is arrived at.
     """
+    found = None
+    for _ in range(_SETTLING):
+        try:
+            again = _fit(forward, assumed, z, scale, forward.protocol.fitted)
+            law = forward.material(assumed, again.z)
+        except CANNOT_BE:
+            return found
+        moved = forward.of(law=law) if forward.glued else forward
+        same_ends = float(np.abs(moved.factor - forward.factor).max()) <= _SAME
+        found = again
+        if again.scale == scale and same_ends:
+            break
+        z, scale = again.z, again.scale
+        forward = forward if same_ends else moved
+    return found
 
-    def __init__(self, noise: Floats, rows: Bools) -> None:
-        self.noise, self.rows = noise, rows
 
-    def fit(
-        self, forward: Forward, assumed: tuple[Component, ...], unknown: Floats, z: Floats, scale: float
-    ) -> Fit | None:
-        """A fit whose noise and glued ends are those that it was made with; None if none stands.
+def _fit(forward: Forward, assumed: tuple[Component, ...], z: Floats, scale: float, rows: Bools) -> Fit:
+    """A fit with one scale of the noise and the glued ends of one law; raises one of `CANNOT_BE` if none stands."""
+    from scipy.optimize import least_squares
 
-        Parameters
-        ----------
-        forward : Forward
-        assumed : tuple of Component
-        unknown : (n, q) array
-        z : (k,) array
-            Where it begins.
-        scale : float
-            Of the noise to begin with.
-        """
-        found = None
-        for _ in range(_SETTLING):
-            try:
-                again = self.once(forward, assumed, unknown, z, scale)
-                law = forward.material(assumed, again.z)
-            except CANNOT_BE:
-                return found
-            moved = forward.of(law=law) if forward.glued else forward
-            ends = float(np.abs(moved.declared.glued - forward.declared.glued).max())
-            settled = again.scale == scale and ends <= _SAME
-            found = again
-            if settled:
-                break
-            z, scale = again.z, again.scale
-            forward = moved if ends > _SAME else forward
-        return found
+    observed = forward.protocol.observed
+    # what only adds stress is linear: it is integrated out while all else is searched for
+    adds, added = forward.adding(assumed)
+    noise = GaussianModel(forward.noise[np.ix_(rows, rows)], added[rows], scale)
 
-    def once(self, forward: Forward, assumed: tuple[Component, ...], unknown: Floats, z: Floats, scale: float) -> Fit:
-        """A fit with one scale of the noise and the glued ends of one law; raises one of `CANNOT_BE` if none stands."""
-        from scipy.optimize import least_squares
+    def whole(at: Floats) -> Floats:
+        z = np.zeros(len(adds))
+        z[~adds] = at
+        return z
 
-        rows, observed = self.rows, forward.protocol.observed
-        white = GaussianModel(self.noise[np.ix_(rows, rows)], unknown[rows], scale).standardised
-
-        def residuals(at: Floats) -> Floats:
-            try:
-                with np.errstate(all="ignore"):
-                    return np.concatenate([white((observed - forward.stress(assumed, at))[rows]), at])
-            except CANNOT_BE:
-                # the step is shortened
-                return np.full(np.count_nonzero(rows) + len(at), np.nan)
-
-        def slopes(at: Floats) -> Floats:
+    def residuals(at: Floats) -> Floats:
+        try:
             with np.errstate(all="ignore"):
-                tangent = forward.tangent(assumed, at, forward.stress(assumed, at))
-            return np.concatenate([-white(tangent[rows]), np.eye(len(at))])
+                left = observed - forward.stress(assumed, whole(at))
+                return np.concatenate([noise.standardised(left[rows]), at])
+        except CANNOT_BE:
+            # the step is shortened
+            return np.full(np.count_nonzero(rows) + len(at), np.nan)
 
-        z = least_squares(residuals, z, slopes, ftol=_DONE, xtol=_DONE, gtol=None, max_nfev=_STEPS).x
-        stress = forward.stress(assumed, z)
-        columns = forward.tangent(assumed, z, stress)
-        residual = (observed - stress + columns @ z)[rows]
-        each = []
-        for kappa, log_prior in zip(*(values.tolist() for values in scales()), strict=True):
-            model = _model(self.noise, rows, unknown, columns, kappa)
-            each.append(log_prior + float(model.log_density(residual)) - _beyond(model, residual, z, unknown.shape[1]))
-        best = int(np.argmax(each))
-        kappa = float(scales()[0][best])
-        return Fit(forward, assumed, unknown, rows, self.noise, z, stress, columns, kappa, each[best])
+    def slopes(at: Floats) -> Floats:
+        with np.errstate(all="ignore"):
+            tangent = forward.tangent(assumed, whole(at), forward.stress(assumed, whole(at)))
+        return np.concatenate([-noise.standardised(tangent[rows][:, ~adds]), np.eye(len(at))])
+
+    at = least_squares(residuals, z[~adds], slopes, ftol=_DONE, xtol=_DONE, gtol=None, max_nfev=_STEPS).x
+    z = whole(at)
+    z[adds] = noise.coefficients((observed - forward.stress(assumed, z))[rows])[0]
+    stress = forward.stress(assumed, z)
+    columns = forward.tangent(assumed, z, stress)
+    residual = (observed - stress + columns @ z)[rows]
+    model = noise.of_noise(columns[rows])
+    values, logs = scales()
+    each = []
+    for kappa, log_prior in zip(values.tolist(), logs.tolist(), strict=True):
+        at_scale = model.with_scale(kappa)
+        each.append(log_prior + float(at_scale.log_density(residual)) - _beyond(at_scale, residual, z))
+    best = int(np.argmax(each))
+    return Fit(forward, assumed, rows, z, stress, columns, float(values[best]), each[best])
 
 
-def _model(noise: Floats, rows: Bools, unknown: Floats, columns: Floats, scale: float) -> GaussianModel:
-    return GaussianModel(noise[np.ix_(rows, rows)], np.column_stack([unknown, columns])[rows], scale)
-
-
-def _beyond(model: GaussianModel, residual: Floats, z: Floats, first: int) -> float:
+def _beyond(model: GaussianModel, residual: Floats, z: Floats) -> float:
     """What the linear model promises beyond `z` [nats]: at a limit of a parameter there is no such better point."""
     mean, covariance = model.coefficients(residual)
-    away = z - mean[first:]
-    precision = np.linalg.inv(covariance[first:, first:])
-    return float(0.5 * away @ precision @ away)
+    return float(0.5 * (z - mean) @ np.linalg.solve(covariance, z - mean))

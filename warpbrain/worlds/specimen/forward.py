@@ -1,38 +1,40 @@
-"""What a set of causes says of all tests: its stresses, and how they change with its coefficients."""
+"""What a set of causes says of all tests: its stresses, and how they change with its coefficients.
+
+    stress = exp(m) prod_s exp(v_s) (simulated + second invariant) x factors + zero offsets + drifts
+
+What may explain a difference before any cause is credited with it is always there, each with the size that it is known
+to have (`priors.toml`), a coefficient that is normal with mean 0 and standard deviation 1: the modulus `m`, specimens
+of one tissue, what glued ends do, a law that stiffens a little (a factor on all of the stress, what it remembers among
+it) or depends on the second invariant, the zero of a gauge and its drift.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from math import prod
+from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
+from warpbrain.inference.beliefs import belief
 from warpbrain.physics.mechanism import Mechanism
-from warpbrain.worlds.specimen.actions import Action, Baseline, Effect, Variant
+from warpbrain.worlds.specimen.effects import Action, Effect, Variant, excess_rows, invariant_rows, specimen_rows
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.material import HomogeneousMaterial
-from warpbrain.worlds.specimen.nuisances import Nuisances
+from warpbrain.worlds.specimen.noise import noise_factor
 from warpbrain.worlds.specimen.protocol import Protocol
 
-#: Step of differences, in standard deviations.
-_STEP = 1e-3
-#: Responses that are kept.
-_REMEMBERED = 500
+#: Step of differences, in standard deviations; responses that are kept.
+_STEP, _REMEMBERED = 1e-3, 500
 
 
 @dataclass(frozen=True, eq=False)
 class Component:
-    """A cause of a fit: it acts in one of its variants, near one of its trials, with one of its sizes.
-
-    Attributes
-    ----------
-    effect : Effect
-    variant : Variant
-    trial : (m, k) array
-    size : float
-    """
+    """A cause of a fit: it acts in one of its variants, near one of its trials (m, k), with one of its sizes."""
 
     effect: Effect
     variant: Variant
@@ -59,19 +61,12 @@ class Component:
 
 
 class Forward:
-    """Stresses of causes of one case at the rows of a protocol.
+    """Stresses of causes of one case at the rows of a protocol; its length is the number of nuisances, of `names`.
 
-    Parameters
-    ----------
-    case : Case
-    protocol : Protocol
-    ends : GluedEnds
-    glued : bool
-        Whether glued ends are computed; otherwise the state is taken for homogeneous.
-    law : HomogeneousMaterial, optional
-        Whose factor of glued ends is taken; the declared one if not given.
-    shape_of_law : bool
-        See `Nuisances`.
+    With `glued` the `factor` (n,) of glued ends is that of a law, the declared one if none is given; otherwise the
+    state is taken for homogeneous. Without `shape_of_law` nuisances are those of a run, whose law and ends are the
+    case's. They change the logarithm of all stress (`logarithmic` (n, k)), the simulated stress before it is scaled
+    (`scaled`), or what is `added` after that [Pa].
     """
 
     def __init__(
@@ -83,28 +78,67 @@ class Forward:
         law: HomogeneousMaterial | None = None,
         shape_of_law: bool = True,
     ) -> None:
-        self.case, self.protocol, self.ends, self.glued = case, protocol, ends, glued
-        self.shape_of_law = shape_of_law
-        declared = HomogeneousMaterial.of_case(case, ())
-        self.law = law or declared
+        self.case, self.protocol, self.glued, self._ends = case, protocol, glued, ends
+        self._declared = HomogeneousMaterial.of_case(case, ())
+        self.law = law or self._declared
+        self._arguments: dict[str, Any] = dict(  # noqa: C408
+            case=case, protocol=protocol, ends=ends, glued=glued, law=self.law, shape_of_law=shape_of_law
+        )
+        self.factor = ends.factor(self.law, protocol) if glued else np.ones(len(protocol))
         self._responses: dict[str, Floats] = {}
-        factor = ends.factor(self.law, protocol) if glued else np.ones(len(protocol))
-        # only ends that stick without being glued ask what glued ones would do
-        sticking = (lambda: factor) if glued else (lambda: ends.factor(declared, protocol))
         [tissue] = case.tissues.values()
-        elastic = self._homogeneous(()) * factor
-        self.declared = Baseline(protocol, elastic, tissue.known_law.shear_modulus, factor, sticking)
-        self.nuisances = Nuisances(self.declared, shape_of_law)
+        self.mu = tissue.known_law.shear_modulus
+        self._set_nuisances(shape_of_law)
 
-    def of(
-        self,
-        protocol: Protocol | None = None,
-        law: HomogeneousMaterial | None = None,
-        shape_of_law: bool | None = None,
-    ) -> Forward:
-        """The same at the rows of another protocol, with glued ends of another law, or without the shape of the law."""
-        shape = self.shape_of_law if shape_of_law is None else shape_of_law
-        return Forward(self.case, protocol or self.protocol, self.ends, self.glued, law or self.law, shape)
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def of(self, **changed: Any) -> Forward:
+        """The same with another `protocol`, `law` or `shape_of_law`."""
+        return Forward(**self._arguments | changed)
+
+    @cached_property
+    def sticking(self) -> Floats:
+        """Factor (n,) of ends that stick, glued or not."""
+        return self.factor if self.glued else self._ends.factor(self._declared, self.protocol)
+
+    @cached_property
+    def noise(self) -> Floats:
+        """Factor (n, n) of the noise."""
+        return noise_factor(self.protocol)
+
+    def _set_nuisances(self, shape: bool) -> None:
+        protocol = self.protocol
+        logs, names = [belief("specimen.modulus") * np.ones(len(protocol))], ["modulus"]
+        if len(protocol.specimens) > 1:
+            logs += list(belief("specimen.specimens") * specimen_rows(protocol).T)
+            names += [f"specimen {name}" for name in protocol.specimens]
+        if shape:
+            kI = belief("specimen.stiffening") * invariant_rows(protocol)
+            logs.append(kI / (1.0 + kI))
+            names.append("stiffening")
+            if bool(np.any(self.factor != 1.0)):
+                # 1 standard deviation leaves a homogeneous state
+                logs.append(-belief("specimen.ends") * np.log(self.factor))
+                names.append("ends that hold less")
+        self.logarithmic = np.column_stack(logs)
+        second = belief("specimen.second_invariant") * excess_rows(self)
+        self.scaled = second[:, None] if shape else np.zeros((len(protocol), 0))
+        names += ["second invariant"] if shape else []
+        added = []
+        for number, test in enumerate(protocol.tests):
+            zero = test.peak * protocol.mask([number])
+            added.append(belief("specimen.zero") * zero)
+            names.append(f"zero of {test.name}")
+            if test.time is not None:
+                zero[protocol.rows[number]] *= test.share - 0.5
+                added.append(belief("specimen.drift") * zero)
+                names.append(f"drift in {test.name}")
+        self.added, self.names = np.column_stack(added), tuple(names)
+
+    def modulus(self, z: Floats) -> float:
+        """Factor on the modulus at coefficients (k,)."""
+        return float(np.exp(belief("specimen.modulus") * z[0]))
 
     def mechanisms(self, assumed: Sequence[Component], z: Floats) -> tuple[Mechanism, ...]:
         """Of the registry, at coefficients (k,)."""
@@ -115,70 +149,59 @@ class Forward:
         return HomogeneousMaterial.of_case(self.case, self.mechanisms(assumed, z))
 
     def stress(self, assumed: Sequence[Component], z: Floats) -> Floats:
-        """Nominal stress (n,) at all rows [Pa].
-
-        Raises
-        ------
-        InputError
-            If coefficients make no sense to a mechanism.
-        NoStateError
-            If there is no state.
-        """
+        """Nominal stress (n,) at all rows [Pa]; raises `InputError` if a mechanism cannot be, or `NoStateError`."""
         return self.stress_of(self.actions(assumed, z), z)
-
-    def tangent(self, assumed: Sequence[Component], z: Floats, stress: Floats) -> Floats:
-        """Change (n, k) of the stress with each coefficient: differences for causes, exact for nuisances."""
-        actions = self.actions(assumed, z)
-        logs, _, zeros = self.nuisances.split(z)
-        scaled = stress - self.nuisances.added @ zeros - _sum([one.added for one in actions], len(stress))
-        scale = np.exp(self.nuisances.logarithmic @ logs) * _product([one.factor for one in actions], len(stress))
-        columns = [
-            self.nuisances.logarithmic * scaled[:, None],
-            self.nuisances.scaled * scale[:, None],
-            self.nuisances.added,
-        ]
-        for number in range(len(self.nuisances), len(z)):
-            moved = z.copy()
-            moved[number] += _STEP
-            columns.append(((self.stress(assumed, moved) - stress) / _STEP)[:, None])
-        return np.concatenate(columns, axis=1)
 
     def actions(self, assumed: Sequence[Component], z: Floats) -> list[Action]:
         """What causes do at coefficients (k,)."""
-        parts = np.split(z, np.cumsum([len(self.nuisances), *map(len, assumed)])[:-1])[1:]
-        return [one.variant.act(one.coefficients(c), self.declared) for one, c in zip(assumed, parts, strict=True)]
+        parts = np.split(z, np.cumsum([len(self), *map(len, assumed)])[:-1])[1:]
+        return [one.variant.act(one.coefficients(c), self) for one, c in zip(assumed, parts, strict=True)]
 
     def stress_of(self, actions: Sequence[Action], z: Floats) -> Floats:
         """The stress of what causes do, with the coefficients of nuisances among all (k,)."""
-        logs, shapes, zeros = self.nuisances.split(z)
-        n = len(self.protocol)
-        mechanisms = tuple(mechanism for one in actions for mechanism in one.mechanisms)
-        simulated = self._homogeneous(mechanisms) * self.declared.glued if mechanisms else self.declared.elastic
-        simulated = simulated + self.nuisances.scaled @ shapes + _sum([one.scaled for one in actions], n)
-        scale = np.exp(self.nuisances.logarithmic @ logs) * _product([one.factor for one in actions], n)
-        return np.asarray(scale * simulated + self.nuisances.added @ zeros + _sum([one.added for one in actions], n))
+        scale, shapes, added = self._nuisances(actions, z)
+        simulated = self._homogeneous(tuple(m for one in actions for m in one.mechanisms)) * self.factor
+        simulated = simulated + self.scaled @ shapes + sum(one.scaled for one in actions)
+        return np.asarray(scale * simulated + added)
+
+    def tangent(self, assumed: Sequence[Component], z: Floats, stress: Floats) -> Floats:
+        """Change (n, k) of the stress with each coefficient: differences for causes that do not only add stress."""
+        scale, _, added = self._nuisances(self.actions(assumed, z), z)
+        of_law = self.logarithmic * (stress - added)[:, None], self.scaled * scale[:, None]
+        adds, columns = self.adding(assumed)
+        found = np.empty((len(stress), len(z)))
+        found[:, : len(self) - self.added.shape[1]] = np.concatenate(of_law, axis=1)
+        found[:, adds] = columns
+        for number in np.flatnonzero(~adds[len(self) :]) + len(self):
+            moved = self.stress(assumed, z + _STEP * np.eye(len(z))[number])
+            found[:, number] = (moved - stress) / _STEP
+        return found
+
+    def adding(self, assumed: Sequence[Component]) -> tuple[Bools, Floats]:
+        """Which coefficients (k,) only add stress, and what one of each of these adds (n, a) [Pa]."""
+        adds, columns = [np.arange(len(self)) >= len(self) - self.added.shape[1]], [self.added]
+        for one in assumed:
+            adds.append(np.full(len(one), one.variant.added is not None))
+            if one.variant.added is not None:
+                columns.append(one.variant.added(self.protocol) * one.sd)
+        return np.concatenate(adds), np.concatenate(columns, axis=1)
+
+    def _nuisances(self, actions: Sequence[Action], z: Floats) -> tuple[Floats, Floats, Floats]:
+        """Factor (n,) on the simulated stress, coefficients of the law's shape, and all that is added (n,)."""
+        a = self.logarithmic.shape[1]
+        b = a + self.scaled.shape[1]
+        scale = np.exp(self.logarithmic @ z[:a]) * prod(one.factor for one in actions)
+        return scale, z[a:b], self.added @ z[b : len(self)] + sum(one.added for one in actions)
 
     def _homogeneous(self, mechanisms: tuple[Mechanism, ...]) -> Floats:
         key = repr(mechanisms)
         if key not in self._responses:
-            found = np.zeros(len(self.protocol))
+            each = []
             for chain in self.protocol.chains:
                 test = self.protocol.tests[chain.tests[0]]
                 material = HomogeneousMaterial.of_case(self.case, mechanisms, test.turn)
-                found[self.protocol.mask(chain.tests)] = material.stress(test.mode, chain.strain, chain.time)
+                each.append(material.stress(test.mode, chain.strain, chain.time))
             if len(self._responses) > _REMEMBERED:
                 self._responses.clear()
-            self._responses[key] = found
+            self._responses[key] = np.concatenate(each)
         return self._responses[key]
-
-
-def _sum(columns: Sequence[Floats | None], n: int) -> Floats:
-    return sum((column for column in columns if column is not None), start=np.zeros(n))
-
-
-def _product(columns: Sequence[Floats | None], n: int) -> Floats:
-    found = np.ones(n)
-    for column in columns:
-        if column is not None:
-            found = found * column
-    return found

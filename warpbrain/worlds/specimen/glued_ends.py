@@ -8,16 +8,15 @@ farthest strain that it reached is kept.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
-from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import SolveError
 from warpbrain.recordings.recording import TestRecording
-from warpbrain.simulation.specimen import HOMOGENEOUS, Rig
+from warpbrain.simulation.specimen import HOMOGENEOUS, Rig, specimen_of
 from warpbrain.worlds.specimen.material import HomogeneousMaterial, NoStateError
 from warpbrain.worlds.specimen.protocol import REST, Protocol, radius_of, strain_of, stress_unit
 
@@ -30,100 +29,66 @@ ELEMENTS = "tet4-averaged"
 _QUANTITIES = {"axial": ("stretch", "stress"), "shear": ("displacement", "force"), "torsion": ("angle", "torque")}
 
 
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """Factors at strains, of a mode."""
-
-    strain: Floats
-    factor: Floats
-
-    def at(self, strain: Floats) -> Floats:
-        """At any strain: straight from point to point, constant beyond the last."""
-        return np.interp(strain, self.strain, self.factor)
-
-
-@dataclass(eq=False)
 class GluedEnds:
-    """Factors of a specimen with its ends glued, for any law.
+    """Factors of a specimen with its ends glued, for any law, over the strains of all recorded rows."""
 
-    Parameters
-    ----------
-    case : Case
-    protocol : Protocol
-    device : str, optional
-    """
-
-    case: Case
-    protocol: Protocol
-    device: str | None = None
-    _known: list[tuple[HomogeneousMaterial, dict[str, Curve]]] = field(default_factory=list)
-
-    def curves(self, material: HomogeneousMaterial) -> dict[str, Curve]:
-        """By mode, of a law; computed once for laws that are nearly alike, whatever their modulus."""
-        for known, curves in self._known:
-            if _alike(known, material):
-                return curves
-        modes = dict.fromkeys(test.mode for test in self.protocol.tests)
-        found = {mode: self._curve(mode, material) for mode in modes}
-        self._known.append((material, found))
-        return found
+    def __init__(self, case: Case, protocol: Protocol, device: str | None = None) -> None:
+        self._specimen = replace(specimen_of(case), grips="glued")
+        self._case, self._protocol, self._device = case, protocol, device
+        #: Of laws that were asked for: by mode strains, and factors at these.
+        self._known: list[tuple[HomogeneousMaterial, dict[str, tuple[Floats, Floats]]]] = []
 
     def factor(self, material: HomogeneousMaterial, protocol: Protocol) -> Floats:
-        """At all rows (n,) of a protocol of the same tests."""
-        curves = self.curves(material)
-        return np.concatenate([curves[test.mode].at(test.strain) for test in protocol.tests])
+        """At all rows (n,) of a protocol of the same tests: straight from strain to strain, constant beyond the last.
 
-    def _curve(self, mode: str, material: HomogeneousMaterial) -> Curve:
+        Computed once for laws that are nearly alike, whatever their modulus.
+        """
+        curves = next((curves for known, curves in self._known if _alike(known, material)), None)
+        if curves is None:
+            modes = dict.fromkeys(test.mode for test in self._protocol.tests)
+            curves = {mode: self._curve(mode, material) for mode in modes}
+            self._known.append((material, curves))
+        return np.concatenate([np.interp(test.strain, *curves[test.mode]) for test in protocol.tests])
+
+    def _curve(self, mode: str, material: HomogeneousMaterial) -> tuple[Floats, Floats]:
+        """Strains and factors of a mode."""
         rest = REST[mode]
+        none = np.array([rest]), np.ones(1)
         if mode in HOMOGENEOUS:
-            return Curve(np.array([rest]), np.ones(1))
+            return none
         most = _STRETCH if mode == "axial" else _SHEAR
-        strains = np.concatenate([test.strain for test in self.protocol.tests if test.mode == mode]) - rest
+        strains = np.concatenate([test.strain for test in self._protocol.tests if test.mode == mode]) - rest
         low, high = max(float(strains.min()), -most), min(float(strains.max()), most)
-        reach = max(-low, high)
         elastic = replace(material, moduli=(), times=(), storing=())
         for shrink in (1.0, 0.5, 0.25):
             recording = self._recording(mode, np.array([rest + shrink * low, rest + shrink * high]))
             try:
                 found = self._rig(material).run(recording, _STEPS)
-            except SolveError:
-                continue
-            strain = strain_of(self.case_specimen, mode, recording.quantities[0], found.imposed)
-            moved = np.abs(strain - rest) > 0.05 * reach
-            try:
+                strain = strain_of(self._specimen, mode, recording.quantities[0], found.imposed)
+                moved = np.abs(strain - rest) > 0.05 * max(-low, high)
                 homogeneous = elastic.stress(mode, strain[moved], None)
-            except NoStateError:
+            except (SolveError, NoStateError):
                 continue
-            unit = stress_unit(self.case_specimen, recording)
-            return Curve(strain[moved], unit * found.response[moved] / homogeneous)
-        return Curve(np.array([rest]), np.ones(1))
-
-    @property
-    def case_specimen(self) -> Specimen:
-        """The specimen with its ends glued."""
-        assert self.case.specimen is not None
-        return replace(self.case.specimen, grips="glued")
+            unit = stress_unit(self._specimen, recording)
+            return strain[moved], unit * found.response[moved] / homogeneous
+        return none
 
     def _recording(self, mode: str, strain: Floats) -> TestRecording:
-        height = self.case_specimen.size[2]
-        to_imposed = {"axial": 1.0, "shear": height, "torsion": height / radius_of(self.case_specimen)}[mode]
+        height = self._specimen.size[2]
+        to_imposed = {"axial": 1.0, "shear": height, "torsion": height / radius_of(self._specimen)}[mode]
         return TestRecording(
-            name=mode,
-            file="",
-            mode=mode,
-            quantities=_QUANTITIES[mode],
-            imposed=to_imposed * strain,
+            name=mode, file="", mode=mode, quantities=_QUANTITIES[mode], imposed=to_imposed * strain,
             response=np.zeros(len(strain)),
-        )
+        )  # fmt: skip
 
     def _rig(self, material: HomogeneousMaterial) -> Rig:
-        [(label, tissue)] = self.case.tissues.items()
+        [(label, tissue)] = self._case.tissues.items()
         law = material.law
         tissue = replace(tissue, law=law, model=law.name, formulation=material.formulation)
         case = replace(
-            self.case, specimen=self.case_specimen, tissues={label: tissue}, poisson=material.poisson, mechanisms=()
+            self._case, specimen=self._specimen, tissues={label: tissue}, poisson=material.poisson, mechanisms=()
         )
-        return Rig(case, self.device, elements=ELEMENTS)
+        return Rig(case, self._device, elements=ELEMENTS)
 
 
 def _alike(one: HomogeneousMaterial, other: HomogeneousMaterial) -> bool:

@@ -1,8 +1,8 @@
 """Stress of a homogeneous state, in closed form or by a few Newton steps for all states of a test at once.
 
-A state is a stretch along z, two lateral ones and a shear of x along z, `F = [[lx, 0, g], [0, ly, 0], [0, 0, lz]]`.
-Stresses are slopes of the energy, taken by differences, so that every law of the house is the same to them. Lateral
-faces are free: lubricated ends leave `lx` and `ly` to equilibrium. Simple shear prescribes all of `F`.
+A state is a stretch along each axis and a shear of x along z, `F = [[lx, 0, g], [0, ly, 0], [0, 0, lz]]`. Stresses are
+slopes of the energy, taken by differences, so that every law of the house is the same to them. Stretches of free faces
+are left to equilibrium.
 
 Memory is a Prony series (`warpbrain.physics.mechanism.Relaxing`), integrated exactly for a stress that goes straight
 from row to row (Simo and Hughes, Computational Inelasticity, section 10.3, before its midpoint rule).
@@ -25,12 +25,12 @@ from warpbrain.physics.mechanism import Mechanism, Relaxing, Storing, Substituti
 
 _STEP = 2e-5
 _NEWTON, _TOLERANCE = 60, 1e-9
-#: Slope of a branch's lateral stress over its modulus, for Newton steps: near enough to converge.
+#: Slope of a branch's stress across over its modulus, for Newton steps: near enough to converge.
 _BRANCH_SLOPE = 2.0
 
 
 class NoStateError(Exception):
-    """Lateral faces find no equilibrium: the parameters cannot be."""
+    """Free faces find no equilibrium: the parameters cannot be."""
 
 
 def can_act(kind: type[Mechanism]) -> bool:
@@ -70,8 +70,7 @@ class HomogeneousMaterial:
             If one of them is not known to a homogeneous state, or parameters make no sense.
         """
         [(label, tissue)] = case.tissues.items()
-        law, poisson, formulation = tissue.known_law, case.poisson, tissue.formulation
-        material = cls(law, poisson, formulation)
+        material = cls(tissue.known_law, case.poisson, tissue.formulation)
         for given in (*case.mechanisms, *mechanisms):
             mechanism = given if turn is None else given.turned(turn)
             if isinstance(mechanism, Substituting):
@@ -91,116 +90,67 @@ class HomogeneousMaterial:
                 )
         return material
 
-    def energy(self, lx: Floats, ly: Floats, lz: Floats, g: Floats) -> Floats:
-        """Strain energy [Pa] without memory."""
+    def stress(self, mode: str, strain: Floats, time: Floats | None) -> Floats:
+        """Nominal stress (n,) [Pa] of states one after the other; without times [s] nothing relaxes.
+
+        The mode is ``"axial"``, with free lateral faces, ``"confined"``, as wide as at rest, ``"biaxial"``, stretched
+        alike along x and y, ``"shear"``, or ``"torsion"``, of which the strain is the shear at the rim and the stress
+        the torque over `int r dA`. Raises `NoStateError` if free faces find no equilibrium.
+        """
+        if mode == "shear":
+            return self._shear(strain, time)
+        if mode == "torsion":
+            # radii stay what they are
+            nodes, weights = np.polynomial.legendre.leggauss(6)
+            radii, weights = 0.5 * (nodes + 1.0), 0.5 * weights
+            total = sum(w * r**2 * self._shear(strain * r, time) for r, w in zip(radii, weights, strict=True))
+            return np.asarray(3.0 * total)
+        unit, axis = np.ones_like(strain), 2
+        if mode == "confined":
+            stretches = np.column_stack([unit, unit, strain])
+        elif mode == "axial":
+            across = strain**-self.poisson
+            # what is alike across z stays so
+            free: tuple[tuple[int, ...], ...] = ((0,), (1,)) if self.storing else ((0, 1),)
+            stretches = self._settled(np.column_stack([across, across, strain]), free, time)
+        else:
+            across, axis = strain ** (-2.0 * self.poisson / (1.0 - self.poisson)), 0
+            stretches = self._settled(np.column_stack([strain, strain, across]), ((2,),), time)
+        stress = _slope(lambda h: self._energy(stretches + h * np.eye(3)[axis]))
+        if time is not None and self.times:
+            stress = stress + strain * self._held(self._isochoric(stretches)[axis], time)
+        return stress
+
+    def _shear(self, shear: Floats, time: Floats | None) -> Floats:
+        unit = np.ones((len(shear), 3))
+        stress = _slope(lambda h: self._energy(unit, shear + h))
+        if time is not None and self.times:
+            _, _, Szz, Sxz = self._isochoric(unit, shear)
+            stress = stress + self._held(Sxz, time) + shear * self._held(Szz, time)
+        return stress
+
+    def _energy(self, stretches: Floats, g: Floats | float = 0.0) -> Floats:
+        """Strain energy (n,) [Pa] without memory, of stretches (n, 3) and shears."""
+        lx, ly, lz = stretches.T
         # singular values of [[lx, g], [0, lz]]
         apart = np.sqrt(((lx - lz) ** 2 + g**2) * ((lx + lz) ** 2 + g**2))
         first = np.sqrt(0.5 * (lx**2 + lz**2 + g**2 + apart))
-        stretches = np.stack([first, ly, lx * lz / first], axis=-1)
-        energy = total_energy(self.law, stretches, self.poisson, self.formulation)
+        principal = np.stack([first, ly, lx * lz / first], axis=-1)
+        energy = total_energy(self.law, principal, self.poisson, self.formulation)
         if self.storing:
             F = np.zeros((len(lx), 3, 3))
             F[:, 0, 0], F[:, 1, 1], F[:, 2, 2], F[:, 0, 2] = lx, ly, lz, g
             energy = energy + sum(mechanism.stored_energy(F) for mechanism in self.storing)
         return energy
 
-    def axial(self, stretch: Floats, time: Floats | None) -> Floats:
-        """Nominal stress [Pa] along z of states with free lateral faces, one after the other.
-
-        Raises
-        ------
-        NoStateError
-            If lateral faces find no equilibrium.
-        """
-        g = np.zeros_like(stretch)
-        # what is alike across z stays so
-        groups = ((0,), (1,)) if self.storing else ((0, 1),)
-        lateral = np.repeat(stretch[:, None] ** -self.poisson, 2, axis=1)
-        with np.errstate(all="ignore"):
-            for _ in range(_NEWTON):
-                residual, slope = self._lateral(groups, lateral, stretch, g, time)
-                step = np.linalg.solve(slope, residual[..., None])[..., 0]
-                step = np.clip(step, -0.2 * lateral.min(), 0.2 * lateral.min())
-                for j, group in enumerate(groups):
-                    for axis in group:
-                        lateral[:, axis] -= step[:, j]
-                if not np.isfinite(step).all() or np.abs(step).max() < _TOLERANCE:
-                    break
-        if not np.isfinite(step).all() or np.abs(step).max() > 1e3 * _TOLERANCE:
-            raise NoStateError("lateral faces find no equilibrium")
-        lx, ly = lateral.T
-        stress = _slope(lambda h: self.energy(lx, ly, stretch + h, g))
-        if time is not None and self.times:
-            _, _, Szz, _ = self._isochoric(lx, ly, stretch, g)
-            stress = stress + stretch * self._held(Szz, time)
-        return stress
-
-    def shear(self, shear: Floats, time: Floats | None) -> Floats:
-        """Nominal stress [Pa] along x of states in simple shear."""
-        unit = np.ones_like(shear)
-        stress = _slope(lambda h: self.energy(unit, unit, unit, shear + h))
-        if time is not None and self.times:
-            _, _, Szz, Sxz = self._isochoric(unit, unit, unit, shear)
-            stress = stress + self._held(Sxz, time) + shear * self._held(Szz, time)
-        return stress
-
-    def torsion(self, rim: Floats, time: Floats | None) -> Floats:
-        """Torque over `int r dA` [Pa] of a cylinder that is twisted by a shear at its rim; radii stay what they are."""
-        nodes, weights = np.polynomial.legendre.leggauss(6)
-        radii, weights = 0.5 * (nodes + 1.0), 0.5 * weights
-        total = sum(w * r**2 * self.shear(rim * r, time) for r, w in zip(radii, weights, strict=True))
-        return np.asarray(3.0 * total)
-
-    def confined(self, stretch: Floats, time: Floats | None) -> Floats:
-        """Nominal stress [Pa] along z of states that are as wide as at rest."""
-        unit, g = np.ones_like(stretch), np.zeros_like(stretch)
-        stress = _slope(lambda h: self.energy(unit, unit, stretch + h, g))
-        if time is not None and self.times:
-            stress = stress + stretch * self._held(self._isochoric(unit, unit, stretch, g)[2], time)
-        return stress
-
-    def biaxial(self, stretch: Floats, time: Floats | None) -> Floats:
-        """Nominal stress [Pa] along x of states that are stretched alike along x and y, with free faces along z.
-
-        Raises
-        ------
-        NoStateError
-            If these faces find no equilibrium.
-        """
-        g, thickness = np.zeros_like(stretch), stretch ** (-2.0 * self.poisson / (1.0 - self.poisson))
-        remembers, h = time is not None and bool(self.times), _STEP
-        with np.errstate(all="ignore"):
-            for _ in range(_NEWTON):
-                down, middle, up = (self.energy(stretch, stretch, thickness + move, g) for move in (-h, 0.0, h))
-                residual, slope = (up - down) / (2.0 * h), (up - 2.0 * middle + down) / h**2
-                if time is not None and remembers:
-                    S = self._isochoric(stretch, stretch, thickness, g)[2]
-                    residual = residual + thickness * self._held(S, time)
-                    slope = slope + _BRANCH_SLOPE * self._mu * sum(self.moduli)
-                step = np.clip(residual / slope, -0.2 * thickness.min(), 0.2 * thickness.min())
-                thickness = thickness - step
-                if not np.isfinite(step).all() or np.abs(step).max() < _TOLERANCE:
-                    break
-        if not np.isfinite(step).all() or np.abs(step).max() > 1e3 * _TOLERANCE:
-            raise NoStateError("faces across a sheet find no equilibrium")
-        stress = _slope(lambda h: self.energy(stretch + h, stretch, thickness, g))
-        if time is not None and remembers:
-            stress = stress + stretch * self._held(self._isochoric(stretch, stretch, thickness, g)[0], time)
-        return stress
-
-    def stress(self, mode: str, strain: Floats, time: Floats | None) -> Floats:
-        """Nominal stress [Pa] of a chain of one mode."""
-        by_mode = {"axial": self.axial, "shear": self.shear, "torsion": self.torsion}
-        by_mode |= {"confined": self.confined, "biaxial": self.biaxial}
-        return by_mode[mode](strain, time)
-
     def _held(self, S: Floats, time: Floats) -> Floats:
         """What all branches hold (n,) of stresses (n,)."""
         each = (beta * relaxing(S, time, tau) for beta, tau in zip(self.moduli, self.times, strict=True))
         return sum(each, start=np.zeros(len(S)))
 
-    def _isochoric(self, lx: Floats, ly: Floats, lz: Floats, g: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    def _isochoric(self, stretches: Floats, g: Floats | float = 0.0) -> tuple[Floats, Floats, Floats, Floats]:
         """`S = mu0 J^(-2/3) (I - I1/3 C^-1)`: xx, yy, zz and xz."""
+        lx, ly, lz = stretches.T
         J, I1 = lx * ly * lz, lx**2 + ly**2 + lz**2 + g**2
         scale = self._mu * J ** (-2.0 / 3.0)
         det = (lx * lz) ** 2
@@ -214,35 +164,49 @@ class HomogeneousMaterial:
     def _mu(self) -> float:
         return self.law.shear_modulus
 
-    def _lateral(
-        self, groups: tuple[tuple[int, ...], ...], lateral: Floats, stretch: Floats, g: Floats, time: Floats | None
+    def _settled(self, stretches: Floats, free: tuple[tuple[int, ...], ...], time: Floats | None) -> Floats:
+        """Stretches (n, 3) at which nothing pulls along the free axes; those of a group are alike."""
+        faces = [axis for group in free for axis in group]
+        with np.errstate(all="ignore"):
+            for _ in range(_NEWTON):
+                force, slope = self._forces(stretches, free, time)
+                step = np.linalg.solve(slope, force[..., None])[..., 0]
+                most = 0.2 * stretches[:, faces].min()
+                step = np.clip(step, -most, most)
+                for group, move in zip(free, step.T, strict=True):
+                    stretches[:, group] -= move[:, None]
+                if not np.isfinite(step).all() or np.abs(step).max() < _TOLERANCE:
+                    break
+        if not np.isfinite(step).all() or np.abs(step).max() > 1e3 * _TOLERANCE:
+            raise NoStateError("free faces find no equilibrium")
+        return stretches
+
+    def _forces(
+        self, stretches: Floats, free: tuple[tuple[int, ...], ...], time: Floats | None
     ) -> tuple[Floats, Floats]:
-        """Forces (n, k) on the lateral faces and about how they change with the stretches (n, k, k)."""
+        """Forces (n, k) on the free faces, and about how they change with their stretches (n, k, k)."""
+        k, h = len(free), _STEP
+        axes = np.array([np.isin(np.arange(3), group) for group in free], dtype=float)
 
         def at(*moves: float) -> Floats:
-            stretches = lateral.copy()
-            for move, group in zip(moves, groups, strict=True):
-                for axis in group:
-                    stretches[:, axis] += move
-            return self.energy(stretches[:, 0], stretches[:, 1], stretch, g)
+            return self._energy(stretches + np.array(moves) @ axes)
 
-        k, h = len(groups), _STEP
-        middle = at(*([0.0] * k))
-        residual, slope = np.zeros((len(stretch), k)), np.zeros((len(stretch), k, k))
-        for i in range(k):
-            up, down = at(*(h * np.eye(k)[i])), at(*(-h * np.eye(k)[i]))
-            residual[:, i] = (up - down) / (2.0 * h)
+        middle = at(*np.zeros(k))
+        force, slope = np.zeros((len(stretches), k)), np.zeros((len(stretches), k, k))
+        for i, move in enumerate(h * np.eye(k)):
+            up, down = at(*move), at(*-move)
+            force[:, i] = (up - down) / (2.0 * h)
             slope[:, i, i] = (up - 2.0 * middle + down) / h**2
         if k == 2:
             mixed = (at(h, h) - at(h, -h) - at(-h, h) + at(-h, -h)) / (4.0 * h**2)
             slope[:, 0, 1] = slope[:, 1, 0] = mixed
         if time is not None and self.times:
-            S = self._isochoric(lateral[:, 0], lateral[:, 1], stretch, g)
-            for i, group in enumerate(groups):
+            S = self._isochoric(stretches)
+            for i, group in enumerate(free):
                 for axis in group:
-                    residual[:, i] += lateral[:, axis] * self._held(S[axis], time)
+                    force[:, i] += stretches[:, axis] * self._held(S[axis], time)
                 slope[:, i, i] += _BRANCH_SLOPE * len(group) * self._mu * sum(self.moduli)
-        return residual, slope
+        return force, slope
 
 
 def relaxing(values: Floats, time: Floats, tau: float) -> Floats:

@@ -1,89 +1,117 @@
-"""Numbers of fits for people: errors over all recorded rows, parameters, where a cause shows, what would be seen."""
+"""Numbers of fits for people: parameters, where a cause shows, what would be seen, which test would tell more."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
-from warpbrain.physics.values import Smallest, Value
-from warpbrain.recordings.agreement import root_mean_square
-from warpbrain.worlds.specimen.fit import Fit
-from warpbrain.worlds.specimen.linear import Linear
-from warpbrain.worlds.specimen.protocol import Protocol, Test
-from warpbrain.worlds.specimen.result import Score, Segment
+from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.physics.values import Measurement, Smallest, Value
+from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
+from warpbrain.worlds.specimen.noise import noise_factor
+from warpbrain.worlds.specimen.protocol import REST, Protocol, Test
+from warpbrain.worlds.specimen.result import Segment
+from warpbrain.worlds.specimen.search import Linear
 
 #: Movement between rows, over the largest strain, below which a test rests; step of differences.
 _STILL, _STEP = 0.002, 1e-3
+#: Rows of a side of a further test, largest strain of one, duration [s] where no test has times, and part of a modulus
+#: that differs from specimen to specimen and tells nothing.
+_ROWS, _REACH, _DURATION, _SPREAD = 40, 0.5, 100.0, 0.1
 
 
-def score(protocol: Protocol, stress: Floats, held: Floats | None) -> Score:
-    """Errors of stresses (n,) at all recorded rows [Pa]."""
-    errors, fitted = protocol.observed - stress, protocol.mask(protocol.to_fit)
-    check = {protocol.tests[k].name: root_mean_square(errors[protocol.rows[k]]) for k in protocol.to_check}
-    outside = None if held is None else root_mean_square((protocol.observed - held)[fitted])
-    return Score(root_mean_square(errors[fitted]), outside, check)
-
-
-def values_of(fit: Fit, number: int) -> tuple[Value, ...]:
+def values_of(fit: Fit, name: str) -> tuple[Value, ...]:
     """Parameters of one of the causes of a fit, with standard deviations to first order."""
+    number = [one.effect.name for one in fit.assumed].index(name)
     one, part = fit.assumed[number], fit.part(number)
+    if not one.effect.names:
+        return ()
     z = fit.z[part]
     here = np.array(one.variant.values(one.coefficients(z)))
     moved = [np.array(one.variant.values(one.coefficients(z + _STEP * move))) for move in np.eye(len(z))]
     slope = (np.array(moved) - here).T / _STEP
     sd = np.sqrt(np.maximum(np.diag(slope @ fit.covariance[part, part] @ slope.T), 0.0))
-    return tuple(
-        Value(name, float(value), float(s), unit)
-        for name, value, s, unit in zip(one.effect.names, here, sd, one.effect.units, strict=True)
-    )
+    each = zip(one.effect.names, here.tolist(), sd.tolist(), one.effect.units, strict=True)
+    return tuple(Value(*value) for value in each)
 
 
 def where_it_shows(protocol: Protocol, without: Floats, with_it: Floats) -> Segment:
-    """The segment in which squared errors, over the largest stress of the test, fall most.
-
-    Parameters
-    ----------
-    protocol : Protocol
-    without, with_it : (n,) array
-        Simulated stress [Pa].
-    """
+    """The segment in which squared errors of stresses (n,), over the largest of the test, fall most [Pa]."""
     found = []
     for number in protocol.to_fit:
         test, rows = protocol.tests[number], protocol.rows[number]
         gain = ((test.stress - without[rows]) ** 2 - (test.stress - with_it[rows]) ** 2) / test.peak**2
-        names = segments_of(test)
+        moves = np.gradient(np.abs(test.strain - test.rest)) / test.reach
+        names = np.where(np.abs(moves) < _STILL, "hold", np.where(moves > 0.0, "loading", "unloading"))
         for name in dict.fromkeys(names.tolist()):
             for side in (test.strain >= test.rest, test.strain < test.rest):
-                own = (names == name) & side
-                if own.any():
-                    strain = (float(test.strain[own].min()), float(test.strain[own].max()))
-                    time = None if test.time is None else (float(test.time[own].min()), float(test.time[own].max()))
-                    found.append((float(gain[own].sum()), Segment(test.name, test.mode, name, strain, time)))
+                part = (names == name) & side
+                if part.any():
+                    strain, time = test.strain[part], None if test.time is None else test.time[part]
+                    times = None if time is None else (float(time.min()), float(time.max()))
+                    strains = float(strain.min()), float(strain.max())
+                    found.append((float(gain[part].sum()), Segment(test.name, test.mode, name, strains, times)))
     return max(found, key=lambda one: one[0])[1]
-
-
-def segments_of(test: Test) -> NDArray[np.str_]:
-    """What each row (n,) of a test is part of: loading, unloading or a hold."""
-    strain = np.abs(test.strain - test.rest)
-    moves = np.gradient(strain) / test.reach
-    return np.where(np.abs(moves) < _STILL, "hold", np.where(moves > 0.0, "loading", "unloading"))
 
 
 def smallest_of(about: Linear) -> dict[str, Smallest]:
     """Of each cause, the size of its first number that is seen nearly always; of its places the plainest counts."""
     found: dict[str, Smallest] = {}
-    model = about.fit.model
-    for cause, effect, trials in zip(about.causes, about.effects, about.trials, strict=True):
-        if effect is None:
+    for cause, components in zip(about.causes, about.components, strict=True):
+        effect = components[0].effect
+        if not effect.names:
             continue
-        seen = [float(np.linalg.norm(model.standardised(place.columns[:, :1]))) for place in cause.places]
+        seen = [float(np.linalg.norm(about.fit.model.standardised(place.columns[:, :1]))) for place in cause.places]
         best = int(np.argmax(seen))
-        variant, trial = trials[best]
+        variant, trial = components[best].variant, components[best].trial
         part = belief("specimen.seen") / max(seen[best], 1e-12)
-        nothing, there = (
-            variant.values(c)[0] for c in (variant.nothing, variant.nothing + part * (trial[0] - variant.nothing))
-        )
-        found[effect.name] = Smallest(abs(there - nothing), effect.units[0], effect.names[0])
+        there = variant.nothing + part * (trial[0] - variant.nothing)
+        size = abs(variant.values(there)[0] - variant.values(variant.nothing)[0])
+        found[effect.name] = Smallest(size, effect.units[0], effect.names[0])
     return found
+
+
+def next_measurements(one: Fit, other: Fit) -> tuple[Measurement, ...]:
+    """What could be measured to tell the materials of two fits apart, what tells most first: expected Bayes factors."""
+    tests = one.forward.protocol.tests
+    reach = min(max(test.reach for test in tests), _REACH)
+    lasts = [float(np.ptp(test.time)) for test in tests if test.time is not None]
+    found = []
+    for what, (mode, strain, time) in _tests(reach, max(lasts, default=_DURATION)).items():
+        try:
+            first, second = (
+                fit.forward.modulus(fit.z) * fit.forward.material(fit.assumed, fit.z).stress(mode, strain, time)
+                for fit in (one, other)
+            )
+        except CANNOT_BE:
+            continue
+        away = float(np.abs(strain - REST[mode]).max())
+        path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain)))]) / away
+        test = Test(
+            what, mode, "", True, np.arange(len(strain)), strain, first, time, path, 0.0, 1.0,
+            float(np.abs(first).max()), away, np.eye(3),
+        )  # fmt: skip
+        model = GaussianModel(noise_factor(Protocol((test,))), _SPREAD * second[:, None])
+        found.append(Measurement(what, 0.5 * float(np.sum(model.standardised(first - second) ** 2))))
+    return tuple(sorted(found, key=lambda one: -one.expected_nats))
+
+
+def _tests(reach: float, duration: float) -> dict[str, tuple[str, Floats, Floats]]:
+    """Mode, strain and time of what could be done, as far and about as long as what was done."""
+    up = np.linspace(0.0, 1.0, _ROWS)
+    cycle = np.concatenate([up, up[::-1][1:], -up[1:], -up[::-1][1:]])
+    ramp = np.concatenate([np.linspace(0.0, 1.0, 8), np.ones(_ROWS)])
+    rest = np.concatenate([np.linspace(0.0, 0.02, 8), 0.02 + np.geomspace(0.005, 1.0, _ROWS)])
+    share = np.linspace(0.0, 1.0, len(cycle))
+    return {
+        "tension, slowly": ("axial", 1.0 + reach * up, duration * up),
+        "compression, slowly": ("axial", 1.0 - reach * up, duration * up),
+        "simple shear, slowly": ("shear", reach * up, duration * up),
+        "torsion, slowly": ("torsion", reach * up, duration * up),
+        "a compression that is held": ("axial", 1.0 - reach * ramp, duration * rest),
+        "a shear that is held": ("shear", reach * ramp, duration * rest),
+        "a cycle of tension and compression": ("axial", 1.0 + reach * cycle, duration * share),
+        "the same cycle ten times as fast": ("axial", 1.0 + reach * cycle, 0.1 * duration * share),
+        "half as much again of compression": ("axial", 1.0 - 1.5 * reach * up, duration * up),
+    }

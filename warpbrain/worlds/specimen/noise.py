@@ -36,9 +36,9 @@ def smooth_patterns(protocol: Protocol, reach: float) -> Floats:
     columns = []
     for test, rows in zip(protocol.tests, protocol.rows, strict=True):
         values, vectors = np.linalg.eigh(_alike(test, reach))
-        own = np.zeros((len(protocol), min(_PATTERNS, len(values))))
-        own[rows] = test.peak * vectors[:, -_PATTERNS:] * np.sqrt(np.maximum(values[-_PATTERNS:], 0.0))
-        columns.append(own)
+        of_test = np.zeros((len(protocol), min(_PATTERNS, len(values))))
+        of_test[rows] = test.peak * vectors[:, -_PATTERNS:] * np.sqrt(np.maximum(values[-_PATTERNS:], 0.0))
+        columns.append(of_test)
     return np.concatenate(columns, axis=1)
 
 

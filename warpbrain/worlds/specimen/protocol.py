@@ -13,8 +13,10 @@ Tests of one mode and one specimen whose times go on from one to the next are a 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -32,46 +34,30 @@ REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0, "confined": 1.0, "biaxial": 
 
 @dataclass(frozen=True, eq=False)
 class Test:
-    """One test at n rows.
-
-    Attributes
-    ----------
-    name, mode, specimen : str
-    fitted : bool
-        Whether its role is to be fitted.
-    rows : (n,) int array
-        Of its recording.
-    strain, stress : (n,) array
-        Stretch or shear, and nominal stress [Pa].
-    time : (n,) array or None
-        [s]
-    gone : (n,) array
-        Absolute changes of strain so far, summed, over the largest strain.
-    sigma : float
-        Of a reading [Pa]: as declared, or as rough as the record is.
-    unit : float
-        Pascals of one unit of the recording's response.
-    peak, reach : float
-        Largest stress [Pa] and distance of a strain from rest of the whole record.
-    turn : (3, 3) array
-        From directions of the tissue to those of the machine.
-    """
+    """One test at n rows."""
 
     # not a test of pytest's
     __test__ = False
     name: str
     mode: str
     specimen: str
+    #: Whether its role is to be fitted.
     fitted: bool
+    #: Of its recording (n,).
     rows: Ints
+    #: Stretch or shear (n,), nominal stress (n,) [Pa], and time (n,) [s].
     strain: Floats
     stress: Floats
     time: Floats | None
+    #: Absolute changes of strain so far (n,), summed, over the largest strain.
     strain_path: Floats
+    #: Noise of a reading [Pa]: as declared, or as rough as the record is; pascals of one unit of what was recorded.
     sigma: float
     unit: float
+    #: Largest stress [Pa] and distance of a strain from rest of the whole record.
     peak: float
     reach: float
+    #: From directions of the tissue to those of the machine (3, 3).
     turn: Floats
 
     @property
@@ -93,11 +79,8 @@ class Test:
 
     def at(self, rows: Ints) -> Test:
         """The test at some of its rows, by their places among them."""
-        time = None if self.time is None else self.time[rows]
-        return replace(
-            self, rows=self.rows[rows], strain=self.strain[rows], stress=self.stress[rows], time=time,
-            strain_path=self.strain_path[rows],
-        )  # fmt: skip
+        columns = {name: getattr(self, name)[rows] for name in ("rows", "strain", "stress", "strain_path")}
+        return replace(self, **columns, time=None if self.time is None else self.time[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,25 +94,36 @@ class Chain:
 
 @dataclass(frozen=True, eq=False)
 class Protocol:
-    """All tests.
-
-    Attributes
-    ----------
-    tests : tuple of Test
-    chains : tuple of Chain
-        Whose rows one after the other are those of the tests.
-    rows : tuple of slice
-        Of each test among all rows.
-    """
+    """All tests; rows of its chains one after the other are those of the tests."""
 
     tests: tuple[Test, ...]
-    chains: tuple[Chain, ...]
-    rows: tuple[slice, ...]
 
     def __len__(self) -> int:
         return self.rows[-1].stop
 
-    @property
+    @cached_property
+    def rows(self) -> tuple[slice, ...]:
+        """Of each test among all rows."""
+        ends = np.cumsum([0, *(len(test.strain) for test in self.tests)]).tolist()
+        return tuple(slice(first, last) for first, last in itertools.pairwise(ends))
+
+    @cached_property
+    def chains(self) -> tuple[Chain, ...]:
+        """Of tests of one memory."""
+        groups: list[list[int]] = []
+        for number, test in enumerate(self.tests):
+            if groups and _goes_on(self.tests[groups[-1][-1]], test):
+                groups[-1].append(number)
+            else:
+                groups.append([number])
+        chains = []
+        for group in groups:
+            times = [time for k in group if (time := self.tests[k].time) is not None]
+            strain = np.concatenate([self.tests[k].strain for k in group])
+            chains.append(Chain(tuple(group), strain, np.concatenate(times) if times else None))
+        return tuple(chains)
+
+    @cached_property
     def observed(self) -> Floats:
         """Stress (n,) at all rows [Pa]."""
         return np.concatenate([test.stress for test in self.tests])
@@ -141,61 +135,41 @@ class Protocol:
 
     def mask(self, tests: Sequence[int]) -> Bools:
         """The rows (n,) of some tests."""
-        found = np.zeros(len(self), dtype=bool)
-        for number in tests:
-            found[self.rows[number]] = True
-        return found
+        of_test = np.concatenate([np.full(len(test.strain), k) for k, test in enumerate(self.tests)])
+        return np.isin(of_test, tests)
 
     @property
     def to_fit(self) -> tuple[int, ...]:
         """Numbers of the tests that may be fitted."""
         return tuple(k for k, test in enumerate(self.tests) if test.fitted)
 
-    @property
-    def to_check(self) -> tuple[int, ...]:
-        """Numbers of those that may not."""
-        return tuple(k for k, test in enumerate(self.tests) if not test.fitted)
+    @cached_property
+    def fitted(self) -> Bools:
+        """The rows (n,) of these."""
+        return self.mask(self.to_fit)
 
     @property
     def specimens(self) -> tuple[str, ...]:
         """On which the tests were run."""
         return tuple(dict.fromkeys(test.specimen for test in self.tests))
 
-    @property
+    @cached_property
     def thinned(self) -> Protocol:
         """The same tests at the rows that densities are of."""
-        return protocol(tuple(test.at(_kept(test)) for test in self.tests))
+        return Protocol(tuple(test.at(_kept(test)) for test in self.tests))
 
-    def spread(self, of_thinned: Floats, thinned: Protocol) -> Floats:
+    def spread(self, of_thinned: Floats) -> Floats:
         """Values (m,) of thinned rows at all of them (n,): straight from one to the next."""
         each = [
             np.interp(test.rows, sparse.rows, of_thinned[rows])
-            for test, sparse, rows in zip(self.tests, thinned.tests, thinned.rows, strict=True)
+            for test, sparse, rows in zip(self.tests, self.thinned.tests, self.thinned.rows, strict=True)
         ]
         return np.concatenate(each)
 
 
 def protocol_of(specimen: Specimen, recordings: Sequence[TestRecording]) -> Protocol:
     """The tests of a case at all their rows, in the order of their recordings."""
-    return protocol(tuple(test_of(specimen, recording) for recording in recordings))
-
-
-def protocol(tests: tuple[Test, ...]) -> Protocol:
-    """Tests in chains."""
-    ends = np.cumsum([len(test.strain) for test in tests])
-    rows = tuple(slice(int(end) - len(test.strain), int(end)) for end, test in zip(ends, tests, strict=True))
-    groups: list[list[int]] = []
-    for number, test in enumerate(tests):
-        if groups and _goes_on(tests[groups[-1][-1]], test):
-            groups[-1].append(number)
-        else:
-            groups.append([number])
-    chains = []
-    for group in groups:
-        times = [time for k in group if (time := tests[k].time) is not None]
-        strain = np.concatenate([tests[k].strain for k in group])
-        chains.append(Chain(tuple(group), strain, np.concatenate(times) if times else None))
-    return Protocol(tests, tuple(chains), rows)
+    return Protocol(tuple(_test(specimen, recording) for recording in recordings))
 
 
 def _goes_on(before: Test, after: Test) -> bool:
@@ -203,35 +177,21 @@ def _goes_on(before: Test, after: Test) -> bool:
     return same and before.time is not None and after.time is not None and bool(after.time[0] > before.time[-1])
 
 
-def test_of(specimen: Specimen, recording: TestRecording) -> Test:
+def _test(specimen: Specimen, recording: TestRecording) -> Test:
     """A recording in stress and strain."""
     unit = stress_unit(specimen, recording)
     strain = strain_of(specimen, recording.mode, recording.quantities[0], recording.imposed)
-    stress = unit * recording.response
-    away = np.abs(strain - REST[recording.mode])
+    stress, rows = unit * recording.response, np.arange(len(strain))
+    reach = max(float(np.abs(strain - REST[recording.mode]).max()), 1e-12)
     test = Test(
-        name=recording.name,
-        mode=recording.mode,
-        specimen=recording.specimen,
-        fitted=recording.role == "fit",
-        rows=np.arange(len(strain)),
-        strain=strain,
-        stress=stress,
-        time=recording.time,
-        strain_path=np.zeros(len(strain)),
-        sigma=_reading(specimen, recording, strain, stress),
-        unit=unit,
-        peak=float(np.abs(stress).max()),
-        reach=max(float(away.max()), 1e-12),
-        turn=recording.turn,
-    )
+        recording.name, recording.mode, recording.specimen, recording.role == "fit", rows, strain, stress,
+        recording.time, np.zeros(len(strain)), _reading(specimen, recording, strain, stress), unit,
+        float(np.abs(stress).max()), reach, recording.turn,
+    )  # fmt: skip
     # without the jitter of a reading, which would make every path long
     kept = _kept(test)
-    strain_path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain[kept])))]) / test.reach
-    return replace(test, strain_path=np.interp(test.rows, kept, strain_path))
-
-
-test_of.__test__ = False  # type: ignore[attr-defined]  # not a test of pytest's
+    strain_path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain[kept])))]) / reach
+    return replace(test, strain_path=np.interp(rows, kept, strain_path))
 
 
 def _reading(specimen: Specimen, recording: TestRecording, strain: Floats, stress: Floats) -> float:
@@ -241,15 +201,14 @@ def _reading(specimen: Specimen, recording: TestRecording, strain: Floats, stres
     the stress at a strain is compared, whatever the machine imposed.
     """
     if not recording.force_controlled:
-        return stress_unit(specimen, recording) * recording.sigma if recording.sigma is not None else roughness(stress)
-    rest = REST[recording.mode]
-    stiffness = float(np.abs(stress).max()) / max(float(np.abs(strain - rest).max()), 1e-12)
+        return _roughness(stress) if recording.sigma is None else stress_unit(specimen, recording) * recording.sigma
+    away = float(np.abs(strain - REST[recording.mode]).max())
+    stiffness = float(np.abs(stress).max()) / max(away, 1e-12)
     if recording.sigma is None:
-        return stiffness * roughness(strain)
+        return stiffness * _roughness(strain)
     # strains are linear in what was read
-    quantity = recording.quantities[0]
-    one, none = (strain_of(specimen, recording.mode, quantity, np.array([value])) for value in (recording.sigma, 0.0))
-    return stiffness * abs(float((one - none)[0]))
+    none, one = strain_of(specimen, recording.mode, recording.quantities[0], np.array([0.0, recording.sigma]))
+    return stiffness * abs(float(one - none))
 
 
 def strain_of(specimen: Specimen, mode: str, quantity: str, imposed: Floats) -> Floats:
@@ -263,8 +222,7 @@ def strain_of(specimen: Specimen, mode: str, quantity: str, imposed: Floats) -> 
 def stress_unit(specimen: Specimen, recording: TestRecording) -> float:
     """Nominal stress [Pa] of one unit of the recording's response."""
     radius = radius_of(specimen)
-    area = np.pi * radius**2
-    of_one = {"stress": 1.0, "force": 1.0 / area, "torque": 1.0 / (2.0 / 3.0 * np.pi * radius**3)}
+    of_one = {"stress": 1.0, "force": 1.0 / (np.pi * radius**2), "torque": 1.0 / (2.0 / 3.0 * np.pi * radius**3)}
     return of_one[recording.quantities[1]]
 
 
@@ -274,11 +232,11 @@ def radius_of(specimen: Specimen) -> float:
     return 0.5 * x if specimen.shape == "cylinder" else float(np.sqrt(x * y / np.pi))
 
 
-def roughness(values: Floats) -> float:
+def _roughness(values: Floats) -> float:
     """Standard deviation of what is independent from row to row: second differences, which smooth parts have not."""
     if len(values) < 5:
         return 0.0
-    second = values[2:] - 2.0 * values[1:-1] + values[:-2]
+    second = np.diff(values, 2)
     return float(1.4826 * np.median(np.abs(second - np.median(second))) / np.sqrt(6.0))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
@@ -21,15 +22,14 @@ class Ranked:
 
     Attributes
     ----------
-    name : str
+    name, sentence : str
     kind : Kind
-    sentence : str
     log_evidence : float
         Of the cause alone against nothing.
     probability : float
         That it acts, whatever else does.
-    detectability : float
-        `d` of the effect that was fitted: its length in standard deviations of noise and nuisances.
+    detectability : float or None
+        `d` of the effect, fitted alone: its length in standard deviations of noise and nuisances.
     change : float or None
         Of the held-out error of all rows [Pa] with it alone; negative is better. None where it was not fitted.
     values : tuple of Value
@@ -37,11 +37,11 @@ class Ranked:
     """
 
     name: str
-    kind: Kind
     sentence: str
+    kind: Kind
     log_evidence: float
     probability: float
-    detectability: float
+    detectability: float | None
     change: float | None
     values: tuple[Value, ...]
     region: str
@@ -93,9 +93,8 @@ class SpecimenDiagnosis(Shown):
         Checks that failed, in words.
     p_value, p_left : float
         That nothing is missing, and that nothing is left of the best set of causes; predictive.
-    named : tuple of Ranked
-        With the values of the best set.
-    ranking : tuple of Ranked
+    named, ranking : tuple of Ranked
+        What is named with the values of the best set.
     rejected : dict of str to str
         Causes that were not looked for, and why.
     combinations : tuple of Combination
@@ -153,3 +152,10 @@ class SpecimenDiagnosis(Shown):
     def group(self) -> tuple[str, ...]:
         """Causes that are not told apart, in place of a name; perhaps left, beside names."""
         return () if self.named else self.decision.causes
+
+    @cached_property
+    def sentence(self) -> str:
+        """The verdict for people."""
+        from warpbrain.worlds.specimen.sentences import sentence_of
+
+        return sentence_of(self)

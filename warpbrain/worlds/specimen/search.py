@@ -8,41 +8,108 @@ the log density of the same rows; in which order they were found decides nothing
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpbrain.arrays import Floats
+from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.causes import Kind
-from warpbrain.inference.decide import UNKNOWN
-from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.inference.causes import Cause, Kind, Place
+from warpbrain.inference.hypothesis import Configuration, Hypothesis, Posterior
+from warpbrain.inference.noise import scales
+from warpbrain.inference.subsets import Search, posterior
 from warpbrain.worlds.listener import Listener
-from warpbrain.worlds.specimen.actions import Effect
-from warpbrain.worlds.specimen.fit import Fit, Fitting
-from warpbrain.worlds.specimen.linear import Linear, linearise, log_odds
+from warpbrain.worlds.specimen.effects import Effect
+from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit, fit
+from warpbrain.worlds.specimen.forward import Component
 
 #: Part of the probability that fitted sets have in the end, fits at most, causes of a set at most, and pairs to which a
 #: third cause is added.
 _MASS, _FITS, _CAUSES, _BEAM = 0.99, 14, 4, 30
+_ODDS = {Kind.PHYSICS: "causes.mechanism", Kind.NOT_PHYSICS: "causes.not_physics", Kind.UNKNOWN: "causes.unknown"}
+
+
+def _log_odds(kind: Kind) -> float:
+    """That a cause of a kind acts, before anything was recorded."""
+    # probabilities divide all logarithms by the temperature, but it is evidence alone that is too sharp
+    return calibration().temperature * float(np.log(belief(_ODDS[kind])))
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """All causes that a fit does not have, to first order about it, with columns at the fitted rows.
+
+    `components` are of each place of each cause, at its largest size.
+    """
+
+    fit: Fit
+    causes: tuple[Cause, ...]
+    components: tuple[tuple[Component, ...], ...]
+
+    def posterior(self, beam: int) -> Posterior:
+        """Over sets of these causes beside those of the fit."""
+        values, logs = scales()
+        residual = self.fit.residual[self.fit.rows]
+        return posterior(self.fit.model.with_scale(1.0), residual, self.causes, Search(values, logs, beam=beam))
+
+    def start(self, best: Configuration) -> tuple[tuple[Component, ...], Floats]:
+        """Causes of the fit and of a configuration, and coefficients to begin at."""
+        sizes = beliefs("specimen.sizes").tolist()
+        new = [replace(self.components[m.cause][m.place], size=sizes[m.size]) for m in best.members]
+        columns = [
+            one.size * self.causes[m.cause].places[m.place].columns for one, m in zip(new, best.members, strict=True)
+        ]
+        model = self.fit.model.with_scale(best.scale).with_columns(np.concatenate(columns, axis=1))
+        mean = model.coefficients(self.fit.residual[self.fit.rows])[0]
+        first, *moves = np.split(mean, np.cumsum([len(self.fit.z), *(one.shape[1] for one in columns)])[:-1])
+        parts = [first]
+        for one, move in zip(new, moves, strict=True):
+            c = one.variant.nothing + one.size * move @ (one.trial - one.variant.nothing)
+            parts.append((c - one.variant.mean) / one.sd)
+        return (*self.fit.assumed, *new), np.concatenate(parts)
+
+
+def linearise(fit: Fit, effects: Sequence[Effect]) -> Linear:
+    """All causes that a fit does not have; places where there is no state are left out."""
+    causes, components = [], []
+    for effect in effects:
+        if effect.name in fit.names:
+            continue
+        each = [Component(effect, variant, trial, 1.0) for variant in effect.variants for trial in variant.trials]
+        known = [(one, columns[fit.rows]) for one in each if (columns := _columns(fit, one)) is not None]
+        if known:
+            places = tuple(Place(columns) for _, columns in known)
+            sizes = beliefs("specimen.sizes")
+            causes.append(Cause(effect.name, places, _log_odds(effect.kind), sizes, effect.kind))
+            components.append(tuple(one for one, _ in known))
+    return Linear(fit, tuple(causes), tuple(components))
+
+
+def _columns(fit: Fit, one: Component) -> Floats | None:
+    """What trials of a cause change (n, m) beside all that the fit has; None where there is no state."""
+    forward, variant = fit.forward, one.variant
+    if variant.added is not None:
+        return variant.added(forward.protocol) @ one.trial.T
+    try:
+        with np.errstate(all="ignore"):
+            actions = forward.actions(fit.assumed, fit.z)
+            each = [forward.stress_of([*actions, variant.act(c, forward)], fit.z) for c in one.trial]
+    except CANNOT_BE:
+        return None
+    found = np.column_stack(each) - fit.stress[:, None]
+    return found if np.isfinite(found).all() else None
 
 
 @dataclass(frozen=True, eq=False)
 class CauseSet:
-    """A set of causes.
+    """A set of causes, and the linear model from which it was proposed; its evidence is Laplace's once it was fitted.
 
-    Attributes
-    ----------
-    hypothesis : Hypothesis
-        Its evidence is Laplace's once it was fitted.
-    linear : Linear
-        From which it was proposed.
-    spread : float
-        What other places and sizes than the best add to the log evidence, with the weight of the best; of the causes of
-        the linear model's own fit, and once fitted of all.
-    of_scale : float
-        The same of other scales of the noise, where no cause is added.
-    fit : Fit or None
+    `spread` is what other places and sizes than the best add to the log evidence, with the weight of the best: of the
+    causes of the linear model's own fit, and once fitted of all. `of_scale` is the same of other scales of the noise,
+    where no cause is added.
     """
 
     hypothesis: Hypothesis
@@ -58,95 +125,83 @@ class CauseSet:
 
 
 class Sets:
-    """All sets that were proposed.
+    """All sets of some effects that were proposed, by the names of their causes; `base` is the fit without any."""
 
-    Parameters
-    ----------
-    fitting : Fitting
-    effects : sequence of Effect
-    base : Fit
-        Without any cause.
-    listener : Listener
-    """
-
-    def __init__(self, fitting: Fitting, effects: Sequence[Effect], base: Fit, listener: Listener) -> None:
-        self.fitting, self.effects, self.base, self._listener = fitting, tuple(effects), base, listener
+    def __init__(self, effects: Sequence[Effect], base: Fit, listener: Listener) -> None:
+        self.effects, self.base, self._listener = tuple(effects), base, listener
         self.by_names: dict[frozenset[str], CauseSet] = {}
-        self._about: dict[frozenset[str], Linear] = {}
+        self._about: dict[int, Linear] = {}
         self._propose(base, 0.0)
-        nothing = self.by_names[frozenset()]
-        self.by_names[frozenset()] = replace(nothing, fit=base, spread=0.0)
+        self.by_names[frozenset()] = replace(self.nothing, fit=base, spread=0.0)
         self._search()
+
+    @property
+    def nothing(self) -> CauseSet:
+        """The empty one."""
+        return self.by_names[frozenset()]
 
     def ordered(self) -> list[tuple[CauseSet, float]]:
         """Sets with their probabilities, the most probable first."""
-        found = list(self.by_names.values())
-        chances = calibration().probabilities([one.hypothesis for one in found])
-        return [(found[k], float(chances[k])) for k in np.argsort(-chances, kind="stable")]
+        sets = list(self.by_names.values())
+        chances = calibration().probabilities([one.hypothesis for one in sets])
+        return [(sets[k], float(chances[k])) for k in np.argsort(-chances, kind="stable")]
 
     def about(self, fit: Fit) -> Linear:
         """All other causes, linearised about a fit."""
-        names = fit.names
-        if names not in self._about or self._about[names].fit is not fit:
-            self._about[names] = linearise(fit, self.effects)
-        return self._about[names]
+        if id(fit) not in self._about:
+            self._about[id(fit)] = linearise(fit, self.effects)
+        return self._about[id(fit)]
 
     def fitted(self, names: frozenset[str]) -> Fit | None:
         """The fit of a set, made if it was not; None if none stands."""
         if names not in self.by_names:
             # proposed about the same set with one cause less
-            for name in sorted(names):
-                fit = self.fitted(names - {name})
-                if fit is not None:
-                    self._propose(fit, self.by_names[names - {name}].spread)
+            fits = ((self.fitted(names - {name}), names - {name}) for name in sorted(names))
+            for fewer, kept in fits:
+                if fewer is not None:
+                    self._propose(fewer, self.by_names[kept].spread)
                     break
         found = self.by_names.get(names)
-        if found is None:
-            return None
-        return (found if found.fit is not None else self._fit(found)).fit
+        return None if found is None else found.fit or self._fit(found)
 
     def _search(self) -> None:
         best = frozenset[str]()
         for _ in range(_FITS):
-            first, total = None, 0.0
-            for found, p in self.ordered():
-                if found.fit is None and total < _MASS:
-                    first = first or found
-                total += p
+            ordered = self.ordered()
+            before = itertools.accumulate((p for _, p in ordered), initial=0.0)
+            likely = (one for (one, _), total in zip(ordered, before, strict=False) if total < _MASS)
+            first = next((one for one in likely if one.fit is None), None)
             if first is None:
                 break
             self._fit(first)
-            leading = next(found for found, _ in self.ordered() if found.fit is not None)
+            leading = next(one for one, _ in self.ordered() if one.fit is not None)
             if leading.names != best and leading.fit is not None:
                 best = leading.names
                 self._propose(leading.fit, leading.spread)
 
-    def _fit(self, found: CauseSet) -> CauseSet:
-        hypothesis = found.hypothesis
+    def _fit(self, found: CauseSet) -> Fit | None:
+        hypothesis, linear = found.hypothesis, found.linear
         self._listener.stage(f"fit with {' and '.join(hypothesis.causes)}")
-        assumed, unknown, z = found.linear.start(hypothesis.best)
-        fit = self.fitting.fit(found.linear.fit.forward, assumed, unknown, z, hypothesis.best.scale)
-        if fit is None:
+        best = hypothesis.best
+        made = fit(linear.fit.forward, *linear.start(best), best.scale)
+        if made is None:
             del self.by_names[found.names]
-            return found
+            return None
         # the best places and sizes have their probability among all of them, as the linear model has it
-        own = hypothesis.best
-        weights = sum(float(found.linear.causes[m.cause].log_weights[m.place, m.size]) for m in own.members)
-        spread = hypothesis.log_evidence - own.log_density + weights
-        log_evidence = fit.log_density + spread
+        weights = sum(float(linear.causes[m.cause].log_weights[m.place, m.size]) for m in best.members)
+        spread = hypothesis.log_evidence - best.log_density + weights
+        log_evidence = made.log_density + spread
         # sets with more causes sum over the scale of the noise themselves
         spread -= found.of_scale
-        done = replace(found, hypothesis=replace(hypothesis, log_evidence=log_evidence), spread=spread, fit=fit)
-        self.by_names[found.names] = done
-        return done
+        hypothesis = replace(hypothesis, log_evidence=log_evidence)
+        self.by_names[found.names] = replace(found, hypothesis=hypothesis, spread=spread, fit=made)
+        return made
 
     def _propose(self, fit: Fit, spread: float) -> None:
         """Sets with the causes of a fit and others: those that were not fitted take their evidence from here."""
         linear = self.about(fit)
         kinds = {one.effect.name: one.effect.kind for one in fit.assumed}
-        if UNKNOWN in fit.names:
-            kinds[UNKNOWN] = Kind.UNKNOWN
-        hypotheses = linear.posterior(_BEAM if not kinds else 0).hypotheses
+        hypotheses = linear.posterior(0 if kinds else _BEAM).hypotheses
         nothing = next(one for one in hypotheses if not one.causes)
         of_scale = nothing.log_evidence - nothing.best.log_density
         for one in hypotheses:
@@ -159,6 +214,6 @@ class Sets:
                 causes=(*kinds, *one.causes),
                 kinds=(*kinds.values(), *one.kinds),
                 log_evidence=one.log_evidence + spread,
-                log_prior=one.log_prior + sum(log_odds(kind) for kind in kinds.values()),
+                log_prior=one.log_prior + sum(_log_odds(kind) for kind in kinds.values()),
             )
             self.by_names[names] = CauseSet(whole, linear, spread, of_scale)

@@ -8,6 +8,8 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.inference.decide import GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
 from warpbrain.inference.probability import percent
 from warpbrain.physics.sizes import size_in_words, smallest_in_words
+from warpbrain.physics.words import pascals
+from warpbrain.simulation.specimen import specimen_of
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.glued_ends import ELEMENTS
 from warpbrain.worlds.specimen.protocol import Protocol
@@ -17,70 +19,83 @@ from warpbrain.worlds.specimen.result import Ranked, SpecimenDiagnosis
 _VALUES = 6
 
 
-def sentence_of(found: SpecimenDiagnosis) -> str:
+def sentence_of(diagnosis: SpecimenDiagnosis) -> str:
     """The verdict for people."""
-    doubts = f" {' '.join(found.doubts)}" if found.doubts else ""
-    p = f"p = {found.p_value:.2g}"
-    if found.verdict == NOTHING:
-        seen = "; ".join(f"{name} {smallest_in_words(name, one)}" for name, one in found.smallest.items())
+    return " ".join([_verdict(diagnosis), *diagnosis.doubts])
+
+
+def _verdict(diagnosis: SpecimenDiagnosis) -> str:
+    p, causes = f"p = {diagnosis.p_value:.2g}", diagnosis.decision.causes
+    if diagnosis.verdict == NOTHING:
+        seen = "; ".join(f"{name} {smallest_in_words(name, one)}" for name, one in diagnosis.smallest.items())
         return (
             f"No missing physics is detected ({p}). What these tests would have shown: "
             f"{seen or 'none of those that were looked for'}."
         )
-    sentences = {one.name: one.sentence for one in found.ranking}
-    if found.verdict in (NAMED, NAMED_AND_REST):
-        parts = [f"{one.sentence} ({_size(one)}; probability {percent(one.probability)})" for one in found.named]
-        rest = " Something else is left." if found.verdict == NAMED_AND_REST else ""
-        return f"{' '.join(parts)}{_held_out(found)}{rest}{doubts}"
-    if found.verdict == NOT_PHYSICS:
-        return f"{' '.join(sentences[name] for name in found.decision.causes)} That explains the mismatch best.{doubts}"
-    if found.verdict == GROUP:
-        known = {one.name: one.probability for one in found.ranking}
-        names = ", ".join(f"{name} ({percent(known[name])})" for name in found.decision.causes if name != UNKNOWN)
-        other = ", or what has no name" if UNKNOWN in found.decision.causes else ""
-        return f"Something is missing ({p}): {names}{other}. These tests do not tell which.{doubts}"
-    if found.verdict == UNKNOWN:
-        return f"Something is missing ({p}) that none of the mechanisms explains.{doubts}"
-    perhaps = f", perhaps {' or '.join(found.decision.causes)}" if found.decision.causes else ""
-    return f"Something is missing ({p}), but these tests do not say what{perhaps}.{doubts}"
+    if diagnosis.verdict in (NAMED, NAMED_AND_REST):
+        rest = " Something else is left, which this does not explain." if diagnosis.verdict == NAMED_AND_REST else ""
+        first, *others = map(effect_sentence, diagnosis.named)
+        beside = [f"Beside it: {sentence[0].lower()}{sentence[1:]}" for sentence in others]
+        return f"{' '.join([first, *beside])} {_grounds(diagnosis)}{rest}"
+    if diagnosis.verdict == NOT_PHYSICS:
+        sentences = " ".join(one.sentence for one in diagnosis.ranking if one.name in causes)
+        return f"It is not physics that is missing ({p}). {sentences} That explains the mismatch better."
+    if diagnosis.verdict == UNKNOWN:
+        return (
+            f"Something is missing ({p}) that none of the known mechanisms explains: a smooth change of single tests "
+            "fits better than all of them."
+        )
+    members = [one for one in diagnosis.ranking if one.name in causes and one.name != UNKNOWN]
+    which = "; or ".join(f"{_clause(one)} ({percent(one.probability)})" for one in members)
+    if diagnosis.verdict == GROUP:
+        other = "; or something without a name" if UNKNOWN in causes else ""
+        return f"Something is missing ({p}), and these tests do not tell which of these it is: {which}{other}."
+    perhaps = f" Perhaps: {which}." if members else ""
+    return f"Something is missing ({p}), but these tests cannot say what.{perhaps}"
 
 
-def _held_out(found: SpecimenDiagnosis) -> str:
-    before, after = (found.scores[name].heldout or 0.0 for name in ("refitted", "explained"))
-    return f" Tests that were held out: {before:.3g} Pa without, {after:.3g} Pa with it."
+def effect_sentence(one: Ranked) -> str:
+    """What a cause is, how large it was found to be, and in which way it acts."""
+    size = "; ".join([*size_in_words(one.name, one.values)[:_VALUES], *([one.region] if one.region else [])])
+    return f"{one.sentence.rstrip('.')}: {size}." if size else one.sentence
 
 
-def _size(one: Ranked) -> str:
-    sizes = size_in_words(one.name, one.values)[:_VALUES]
-    return "; ".join([*sizes, one.region] if one.region else sizes)
+def _clause(one: Ranked) -> str:
+    return f"{one.sentence[0].lower()}{one.sentence[1:].rstrip('.')}"
+
+
+def _grounds(diagnosis: SpecimenDiagnosis) -> str:
+    before, after = (pascals(diagnosis.scores[name].heldout or 0.0) for name in ("refitted", "explained"))
+    chances = " and ".join(percent(one.probability) for one in diagnosis.named)
+    probable, it = ("Its probability is", "it") if len(diagnosis.named) == 1 else ("Their probabilities are", "them")
+    return (
+        f"{probable} {chances}; tests that were held out are predicted to {after} with {it}, to {before} without {it}."
+    )
 
 
 def assumptions_of(fit: Fit, protocol: Protocol, by_test: bool) -> tuple[str, ...]:
     """What was taken for granted."""
-    case, thinned, glued = fit.forward.case, fit.forward.protocol, fit.forward.declared.glued
-    assert case.specimen is not None
-    found = [*case.assumptions]
-    found.append(
-        f"Errors are of all {len(protocol)} recorded rows of {len(protocol.tests)} tests, as nominal stress; "
-        f"probabilities are of {len(thinned)} of them."
-    )
-    if any(len(chain.tests) > 1 for chain in protocol.chains):
-        found.append("Tests whose times go on are one history: tissue remembers the earlier ones.")
-    found.append(
-        f"The noise of a test is {100 * belief('specimen.reading'):g} % of its largest stress or its roughness, and "
-        f"{100 * belief('specimen.shared'):g} % that a stretch of the curve has in common, times {fit.scale:.2f}, as "
-        "was found."
-    )
+    case, glued = fit.forward.case, fit.forward.factor
+    remembering = any(len(chain.tests) > 1 for chain in protocol.chains)
     if np.any(glued != 1.0):
-        found.append(
+        ends = (
             f"Stress is that of the homogeneous state times {glued.min():.3g} to {glued.max():.3g}, the factor of "
             f"glued ends: finite elements ({ELEMENTS}) of the law that was arrived at, elastic; memory is taken "
             "to have the same factor."
         )
-    elif case.specimen.grips == "glued":
-        found.append("The state is taken for homogeneous, though the ends are glued.")
+    elif specimen_of(case).grips == "glued":
+        ends = "The state is taken for homogeneous, though the ends are glued."
     else:
-        found.append("Ends slide without friction: the state is homogeneous.")
-    found.append(f"Allowed to explain differences first: {', '.join(fit.forward.nuisances.names)}.")
-    found.append("Held out: each test in turn." if by_test else "Held out: each quarter of the only test in turn.")
-    return tuple(found)
+        ends = "Ends slide without friction: the state is homogeneous."
+    return (
+        *case.assumptions,
+        f"Errors are of all {len(protocol)} recorded rows of {len(protocol.tests)} tests, as nominal stress; "
+        f"probabilities are of {len(protocol.thinned)} of them.",
+        *(["Tests whose times go on are one history: tissue remembers the earlier ones."] if remembering else []),
+        f"The noise of a test is {100 * belief('specimen.reading'):g} % of its largest stress or its roughness, and "
+        f"{100 * belief('specimen.shared'):g} % that a stretch of the curve has in common, times {fit.scale:.2f}, as "
+        "was found.",
+        ends,
+        f"Allowed to explain differences first: {', '.join(fit.forward.names)}.",
+        "Held out: each test in turn." if by_test else "Held out: each quarter of the only test in turn.",
+    )

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 from warpbrain.errors import InputError
-from warpbrain.worlds.specimen.diagnose import SpecimenOptions
 
 
 @dataclass(frozen=True)
@@ -16,7 +15,7 @@ class DiagnosisOptions:
     Parameters
     ----------
     candidates : tuple of str or None
-        Kinds of mechanisms to look for; None: all.
+        Causes to look for; None: all.
     alpha : float
         Probability of a false alarm.
     seed : int
@@ -24,9 +23,9 @@ class DiagnosisOptions:
     draws : int
         Of residuals in which nothing is missing.
     mesh_error : bool
-        Whether the error of the mesh is computed on elements of half the size.
+        Of bodies: whether the error of the mesh is computed on elements of half the size.
     without_nuisances : bool
-        Credit mechanisms also with what nuisances could explain: an ablation, for comparisons.
+        Of bodies: credit mechanisms also with what nuisances could explain: an ablation, for comparisons.
     ends : bool
         Of specimens: whether glued ends are computed; otherwise states are taken for homogeneous, as test evaluations
         do.
@@ -50,8 +49,3 @@ class DiagnosisOptions:
             raise InputError(f"alpha = {self.alpha:g}: expected a number between 0 and 0.5")
         if self.draws < 1.0 / self.alpha:
             raise InputError(f"draws = {self.draws}: too few for alpha = {self.alpha:g}")
-
-    @property
-    def of_specimen(self) -> SpecimenOptions:
-        """The same of a specimen."""
-        return SpecimenOptions(self.candidates, self.alpha, self.seed, self.draws, self.ends)

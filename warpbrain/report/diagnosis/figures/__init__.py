@@ -1,1 +1,0 @@
-"""The still figures of a diagnosis."""

@@ -1,0 +1,116 @@
+"""`report.html`: one file that says what a diagnosis found; it needs no network. Its words are in `page.html`."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
+from warpbrain.inference.probability import percent
+from warpbrain.report.diagnosis import text
+from warpbrain.report.diagnosis.anatomy import Anatomy, map_figure, residuals_figure, view_of
+from warpbrain.report.diagnosis.figures import agreement_figure, confusion_figure, curves_figure
+from warpbrain.report.diagnosis.files import Recorded
+from warpbrain.report.generative.page import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY
+from warpbrain.report.page import document
+from warpbrain.report.page.tables import table
+from warpbrain.report.page.viewer import viewer
+from warpbrain.worlds.specimen.result import SpecimenDiagnosis
+
+#: Ground and text of each verdict's badge; the word says it too.
+_BADGES = {
+    NOTHING: (GREEN, "#ffffff"),
+    NAMED: (BLUE, "#ffffff"),
+    NAMED_AND_REST: (BLUE, "#ffffff"),
+    GROUP: (SKY, BLACK),
+    UNKNOWN: (PURPLE, BLACK),
+    NOT_PHYSICS: (ORANGE, BLACK),
+    CANNOT_SAY: (QUIET, "#ffffff"),
+}
+
+
+def write_page(path: Path, diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any]) -> None:
+    """Write the page of a diagnosis; arguments as of `page_of`."""
+    document.write_document(path, page_of(diagnosis, summary))
+
+
+def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any]) -> str:
+    """The page.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis or SpecimenDiagnosis
+    summary : dict
+        Its `diagnosis.json`.
+    """
+    sections: list[document.Section] = []
+
+    def section(title: str, caller: Callable[[], str]) -> str:
+        sections.append(document.Section(title, str(caller()).strip()))
+        return ""
+
+    environment = Environment(
+        loader=PackageLoader("warpbrain.report.diagnosis", "."), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    environment.filters |= {"percent": percent, "table": _table}
+    recorded = Recorded.of(diagnosis) if isinstance(diagnosis, Diagnosis) else None
+    environment.get_template("page.html").render(
+        section=section,
+        summary=summary,
+        pictures=defaultdict(str, _pictures(diagnosis, summary, recorded)),
+        text=text,
+        next=[[one["what"], f"{one['expected_nats']:.1f}"] for one in summary["next_measurement"]],
+        aside=[] if recorded is None else recorded.aside,
+        chances={one["mechanism"]: one["probability"] for one in summary["ranking"]},
+    )
+    top = document.header(summary["case"]["title"], summary["verdict"], [summary["sentence"]], _facts(summary))
+    return document.document(
+        f"{summary['verdict']}: {summary['case']['title']}", top, sections, _BADGES[summary["verdict"]]
+    )
+
+
+def _table(rows: Iterable[Sequence[Any]], head: Sequence[str], numbers: Sequence[int] = (), caption: str = "") -> str:
+    """A table as HTML, in whose cells nothing is markup; nothing of none."""
+    cells = [[document.text(cell) for cell in row] for row in rows]
+    return table(head, cells, numbers, caption) if cells else ""
+
+
+def _pictures(
+    diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], recorded: Recorded | None
+) -> dict[str, str]:
+    """Figures and the 3-D view by name; of what was not recorded there are none."""
+    if recorded is None or not isinstance(diagnosis, Diagnosis):
+        return {"curves": curves_figure(diagnosis)} if isinstance(diagnosis, SpecimenDiagnosis) else {}
+    anatomy = Anatomy(diagnosis, summary)
+    pictures, points = {"map": map_figure(anatomy)}, recorded.lengths.any() and not recorded.vectors.aside.all()
+    if points:
+        pictures["residuals"] = residuals_figure(anatomy, recorded)
+    if recorded.counted.any():
+        pictures["agreement"] = agreement_figure(summary, recorded)
+    view = view_of(anatomy, recorded if points else None)
+    pictures["view"] = viewer(view, "what is left", "Arrows go from the computed to the observed place.")
+    if summary["confusion"]["rows"]:
+        pictures["confusion"] = confusion_figure(summary["confusion"]["rows"])
+    return pictures
+
+
+def _facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    facts = [("p, nothing missing", f"{summary['p_value']:.2g}")]
+    if named := summary["mechanisms"]:
+        facts.insert(0, ("mechanism", document.text(" and ".join(one["mechanism"] for one in named))))
+        facts.append(("probability", " and ".join(percent(one["probability"]) for one in named)))
+    suffix, factor, unit = text.unit_of(summary)
+    held = summary["fit"][f"heldout_rmse_{suffix}"]
+    errors = [f"{factor * held[state]:.3g}" for state in ("refitted", "explained") if held[state] is not None]
+    if errors:
+        facts.append(("held-out error", f"{' → '.join(errors)} {unit}"))
+    if improvement := summary["fit"]["improvement"]:
+        low, high = (100.0 * value for value in improvement["interval_95"])
+        facts.append(("of it gone (95 %)", f"{100.0 * improvement['part']:.0f} % ({low:.0f} to {high:.0f})"))
+    return facts
