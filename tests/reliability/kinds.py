@@ -93,7 +93,7 @@ def _subset(_place: Path) -> Trying:
     every = subsets.tries.every_subset()
 
     def trying(seed: int) -> Tried:
-        one = subsets.tries.one_try(*every[seed])
+        one = subsets.tries.one_try(*every[seed % len(every)])
         what = f"{one.case} --tissue {one.tissue}, {', '.join(one.recordings) or 'no recordings'}"
         return Tried(what, one.verdict or "a sentence", None, one.defect)
 
