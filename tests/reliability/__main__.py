@@ -21,9 +21,10 @@ def main() -> int:
     from reliability.running import try_all
     from reliability.table import table_of
 
+    counts = ", ".join(f"{name} {kind.promised}" for name, kind in KINDS.items())
     parser = argparse.ArgumentParser(prog="python -m reliability", description=__doc__)
-    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"default: all of {', '.join(KINDS)}")
-    parser.add_argument("--tries", type=int, help="of each kind; default: as many as are promised")
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"default: all; {counts}")
+    parser.add_argument("--tries", type=int, help="of each kind; default: its number above")
     parser.add_argument("--seed", type=int, default=0, help="of the first try; each has the next")
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--seconds", type=float, help="what has not ended by then is given up")
