@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 from command import warpbrain
-
 from reliability.kinds import KINDS
+
 from subsets.tries import TISSUES, every_subset, one_try, subsets
 from warpbrain.cases.shipped import find_case
 from warpbrain.cases.writing import write_case
