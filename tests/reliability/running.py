@@ -32,7 +32,8 @@ def try_all(
     """Try what `out` has not yet, until so many seconds have passed; returns whether anything was wrong."""
     end = time.monotonic() + (seconds or 1e6)
     start_warp_quietly()
-    known = {(one["kind"], one["seed"]) for one in tries_in([out])} if out.exists() else set()
+    out.touch()
+    known = {(one["kind"], one["seed"]) for one in tries_in([out])}
     queue: list[tuple[float, str, int]] = []
     trying: dict[str, Trying] = {}
     wrong = False

@@ -19,6 +19,7 @@ def kind(trying, **named):
 def test_each_try_is_a_line_and_done_once(tmp_path, monkeypatch):
     monkeypatch.setitem(KINDS, "sound", kind(lambda seed: Tried("change", "computed", 10.0**-seed)))
     out = tmp_path / "tries.jsonl"
+    assert not try_all(["sound"], 0, 0, 2, None, out) and tries_in([out]) == []
     assert not try_all(["sound"], 2, 0, 2, None, out)
     assert not try_all(["sound"], None, 0, 2, None, out)
     assert sorted(one["seed"] for one in tries_in([out])) == [0, 1, 2, 3] and len(out.read_text().splitlines()) == 4
