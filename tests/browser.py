@@ -19,6 +19,18 @@ console.error = console.warn = (...said) => window.wrong.push(said.join(" "));
 window.requestAnimationFrame = (draw) => setTimeout(draw, 0);
 </script>"""
 
+#: A name that runs where it is taken for markup.
+EVIL = "<img src=x onerror='window.ran=1'></script><script>window.ran=1</script>"
+_RAN = "<script>setTimeout(() => { document.body.dataset.ran = String(window.ran); }, 300);</script>"
+
+
+def runs(page, tmp_path):
+    """Whether anything of an evil name ran."""
+    assert page.count("window.ran=1") > 3
+    document = opened(page.replace("</body>", _RAN + "</body>"), tmp_path)
+    assert 'data-ran="1"' in document or 'data-ran="undefined"' in document
+    return 'data-ran="1"' in document
+
 
 def opened(page, tmp_path):
     """The document after its scripts ran."""

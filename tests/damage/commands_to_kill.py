@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from unittest.mock import patch
 
-import numpy as np
 from folders import block, write_recorded
+from not_drawn import nothing_drawn
 from sinking_block import write_sinking
 from synthetic import WHITE, beads, truth
 from synthetic import block as layered
 
 from warpbrain.cases.writing import write_case
-from warpbrain.report.rendering.scene import NAMES
 
 _GREY, _WHITE = (f"hyperelastic/{anatomy}" for anatomy in ("grey matter", "white matter"))
 _PRIORS = (
@@ -52,7 +51,8 @@ class Command:
     def prepared(self) -> Iterator[None]:
         """Bodies are not rendered and curves not drawn, which take most of the time; meshes built are blocks."""
         with ExitStack() as stack:
-            for target, stand_in in (*_PICTURES, *(_BUILDING if self.name == "cases build" else ())):
+            stack.enter_context(nothing_drawn())
+            for target, stand_in in _BUILDING if self.name == "cases build" else ():
                 stack.enter_context(patch(target, stand_in))
             yield
 
@@ -95,17 +95,6 @@ def commands(place: Path) -> list[Command]:
     ]  # fmt: skip
 
 
-def _white(_scene: object, _cameras: object, size: tuple[int, int]) -> dict[str, np.ndarray]:
-    return {name: np.full((size[1], size[0], 3), 255, np.uint8) for name in NAMES}
-
-
-def _not_drawn(_figure: object, path: Path) -> None:
-    from warpbrain.atomic import whole_file
-
-    with whole_file(path) as scratch:
-        scratch.write_bytes(b"\x89PNG" + bytes(5000) + b"IEND\xaeB`\x82")
-
-
 def _nothing(*_values: object, **_named: object) -> None:
     return None
 
@@ -114,10 +103,6 @@ def _examples(mesh: object) -> object:
     return mesh
 
 
-_PICTURES: tuple[tuple[str, Callable[..., object]], ...] = (
-    ("warpbrain.report.picture.render", _white),
-    ("warpbrain.report.views.save", _not_drawn),
-)
 _PIPELINE = "warpbrain.cases.building.pipeline."
 _BUILDING: tuple[tuple[str, Callable[..., object]], ...] = (
     *((_PIPELINE + name, _nothing) for name in ("template_anatomy", "discretise", "first_pass", "fit_size")),

@@ -1,4 +1,4 @@
-"""Case folders damaged at random: read, or refused in one line; `python -m damage` does more of it."""
+"""Case folders damaged at random: read, or refused in one line; `python -m reliability damage` does more of it."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Commands killed at random moments, and on a full disk; `python -m damage --kill 200` does more of it."""
+"""Commands killed at random moments, and on a full disk; `python -m reliability kill-run` and others do more of it."""
 
 import os
 

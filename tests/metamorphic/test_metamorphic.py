@@ -1,4 +1,4 @@
-"""The same body gives the same results, wherever it lies and however it is written (`python -m metamorphic`)."""
+"""The same body gives the same results, wherever it lies and however it is written: `python -m reliability same-run`"""
 
 from dataclasses import replace
 

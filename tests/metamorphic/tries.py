@@ -42,6 +42,8 @@ class Difference:
         Of a diagnosis whose verdict is another one: the gap of probability between the two likeliest sets of causes.
     bound : float
         What `size` may be, if it is not that of `BOUNDS`.
+    ended : str
+        How the case before the change ended: ``computed``, what was named, or the class of the error.
     """
 
     seed: int
@@ -50,8 +52,8 @@ class Difference:
     size: float
     told: str = ""
     margin: float = float("nan")
-
     bound: float = 0.0
+    ended: str = "computed"
 
     @property
     def wrong(self) -> bool:
@@ -66,7 +68,7 @@ def one_try(seed: int, kind: str, change: str | None = None, tolerance: float = 
     case = drawn_case(seed, cells=(3, 3) if kind == "diagnose" else (2, 3))
     if kind == "diagnose" and rng.random() < 0.5:
         # what acts is left out
-        case = replace(case, mechanisms=())
+        case = replace(case, mechanisms=(), boundaries=case.boundaries[:1])
     if kind != "run" and rng.random() < 0.3 and CHANGES[change] is not split:
         # of files whose noise is not declared each has its own
         case = replace(case, recordings=tuple(replace(one, sigma=None) for one in case.recordings))
@@ -80,7 +82,8 @@ def one_try(seed: int, kind: str, change: str | None = None, tolerance: float = 
     before, after = results
     if isinstance(before, str) or isinstance(after, str):
         alike = isinstance(before, str) and isinstance(after, str)
-        return Difference(seed, change, kind, 0.0, "" if alike else f"{before}; {after}"[:500])
+        ended = before.partition(":")[0] if isinstance(before, str) else "computed"
+        return Difference(seed, change, kind, 0.0, "" if alike else f"{before}; {after}"[:500], ended=ended)
     if kind == "run":
         size = float(np.abs(changed.back(after) - before).max() / np.abs(before).max())
         return Difference(seed, change, kind, size, bound=BOUNDS["run"] * tolerance / TOLERANCE)
@@ -107,9 +110,10 @@ def _diagnosed(seed: int, change: str, before: Diagnosis, after: Diagnosis) -> D
     chances = [{one.kind: one.probability for one in found.ranking} for found in (before, after)]
     size = max(abs(chances[0].get(k, 0.0) - chances[1].get(k, 0.0)) for k in chances[0].keys() | chances[1].keys())
     if before.verdict == after.verdict:
-        return Difference(seed, change, "diagnose", size)
+        return Difference(seed, change, "diagnose", size, ended=before.verdict)
     first, second = sorted((one.probability for one in before.combinations), reverse=True)[:2]
-    return Difference(seed, change, "diagnose", size, f"{before.verdict}; {after.verdict}", first - second)
+    told = f"{before.verdict}; {after.verdict}"
+    return Difference(seed, change, "diagnose", size, told, first - second, ended=before.verdict)
 
 
 _RESULTS = {"estimate": _estimated, "diagnose": _diagnose}

@@ -1,11 +1,14 @@
 """The table of a sweep: what is read is what was written, and a line that is damaged is not."""
 
+import json
+
 import numpy as np
 import pytest
 
 from warpbrain.errors import InputError
 from warpbrain.estimation.sweep import SweepPoint
 from warpbrain.report.sweep import read_sweep, write_sweep
+from warpbrain.report.sweep_picture import estimated_in
 
 HEADER = ["k grey", "k white", "mu grey", "mu white", "rms [m or N]", "no equilibrium; inputs abc", "checksum"]
 POINTS = [
@@ -23,6 +26,32 @@ def path(tmp_path):
 def test_what_is_read_is_what_was_written(path):
     assert read_sweep(path, HEADER, 2) == ({point.k: point for point in POINTS}, 0)
     assert read_sweep(path.parent / "none.csv", HEADER, 2) == ({}, 0)
+
+
+def test_an_estimate_beside_a_sweep(tmp_path):
+    path = tmp_path / "estimate.json"
+    assert estimated_in(path) == {}
+    one = {"tissue": "gel", "name": "shear modulus", "estimate": 900.0, "interval_95": [800.0, 1000.0]}
+    path.write_text(json.dumps({"parameters": [one, {"tissue": "gel", "name": "exponent"}]}))
+    assert estimated_in(path) == {"gel": (900.0, 800.0, 1000.0)}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "", "{", "[]", "3", "{}", '{"parameters": 1}', '{"parameters": ["x"]}', '{"parameters": [{}]}',
+        '{"parameters": [{"name": "shear modulus"}]}',
+        *(
+            f'{{"parameters": [{{"name": "shear modulus", "tissue": "gel", "estimate": 900, "interval_95": {ends}}}]}}'
+            for ends in ("null", "[1, 2]", "[800]", '["a", "b"]', "[800, 1e999]", "[NaN, NaN]")
+        ),
+    ],
+)  # fmt: skip
+def test_a_damaged_estimate_beside_a_sweep(tmp_path, content):
+    path = tmp_path / "estimate.json"
+    path.write_text(content)
+    with pytest.raises(InputError, match=r"estimate\.json: not an estimate to draw beside the sweep \(.*\)"):
+        estimated_in(path)
 
 
 def test_a_sweep_of_something_else(path):

@@ -1,9 +1,15 @@
-"""Shipped cases with some of their recordings end in a verdict or a sentence; `python -m subsets` does it with all."""
+"""Shipped cases with some of their recordings end in a verdict or a sentence; `python -m reliability subsets` does it
+with all."""
+
+from dataclasses import replace
 
 import pytest
+from command import warpbrain
+from reliability.kinds import KINDS
 
-from subsets.tries import TISSUES, one_try, subsets
+from subsets.tries import TISSUES, every_subset, one_try, subsets
 from warpbrain.cases.shipped import find_case
+from warpbrain.cases.writing import write_case
 
 
 def test_all_subsets():
@@ -13,6 +19,19 @@ def test_all_subsets():
 def test_without_recordings_it_is_a_sentence():
     ended = one_try("0684", "single", ())
     assert "recording" in ended.refused and not ended.defect
+
+
+@pytest.mark.slow
+def test_every_case_without_recordings_is_a_sentence(tmp_path):
+    every = every_subset()
+    assert len(every) == KINDS["subsets"].promised
+    bare = [(name, tissue) for name, tissue, recordings in every if not recordings]
+    assert len(bare) == 56
+    for name, tissue in bare:
+        case = write_case(tmp_path / f"{name}-{tissue}", replace(find_case(name, tissue), recordings=()))
+        ran = warpbrain("diagnose", "--case", case, "--out", tmp_path / "out", "--quiet")
+        assert ran.status == 2 and "recording" in ran.err and ran.err.count("\n") == 1
+        assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 
-from warpbrain.cases.shipped import find_case
+from warpbrain.cases.shipped import SHIPPED, find_case
 from warpbrain.cases.writing import write_case
 from warpbrain.recordings.recording import Recording
 
@@ -57,15 +59,35 @@ def subsets(recordings: Sequence[Recording]) -> Iterator[tuple[Recording, ...]]:
         yield from itertools.combinations(recordings, count)
 
 
+def every_subset() -> list[tuple[str, str, tuple[Recording, ...]]]:
+    """Name of a shipped case, tissue, and some of its recordings; those that take longest first."""
+    found = [
+        (name, tissue, some)
+        for name in SHIPPED
+        for tissue in TISSUES
+        for some in subsets(find_case(name, tissue).recordings)
+    ]
+    return sorted(found, key=lambda entry: -len(entry[2]))
+
+
 def one_try(name: str, tissue: str, recordings: tuple[Recording, ...], options: Sequence[str] = ()) -> Ended:
-    """Diagnose a shipped case with some of its recordings, as a user would: in a process of its own."""
+    """Diagnose a shipped case with some of its recordings, as a user would: in a process of its own.
+
+    Without PyVista, as on compute servers, pictures are stood in for.
+    """
     case = replace(find_case(name, tissue), recordings=recordings)
     with tempfile.TemporaryDirectory() as place:
         write_case(Path(place) / "case", case)
         out = Path(place) / "out"
-        command = [sys.executable, "-m", "warpbrain", "diagnose", "--case", "case", "--out", str(out), "--quiet"]
+        program = "warpbrain" if find_spec("pyvista") else "not_drawn"
+        command = [sys.executable, "-m", program, "diagnose", "--case", "case", "--out", str(out), "--quiet"]
+        # paths that this process was given may be relative to where it began
+        searched = os.pathsep.join(map(os.path.abspath, sys.path))
         began = time.perf_counter()
-        ran = subprocess.run([*command, *options], cwd=place, capture_output=True, text=True, check=False)
+        ran = subprocess.run(
+            [*command, "--device", "cpu", *options],
+            cwd=place, env={**os.environ, "PYTHONPATH": searched}, capture_output=True, text=True, check=False,
+        )  # fmt: skip
         known = name, tissue, tuple(recording.name for recording in recordings), time.perf_counter() - began
         errors = [line for line in ran.stderr.splitlines() if not line.startswith("Warp CUDA warning")]
         if ran.returncode == 0 and (out / "diagnosis.json").exists() and not errors:

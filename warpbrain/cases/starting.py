@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -192,9 +190,7 @@ def start_from_mesh(
     """
     _check_folder(folder, overwrite)
     given = parse_names(names)
-    # meshio prints lines of its own where it gives up; the error says it
-    with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-        named = read_regions(file, frame.unit, array)
+    named = read_regions(file, frame.unit, array)
     raw = named.mesh
     check_volume_in(f"{file}: the mesh", raw.volume, frame.unit)
     pieces = int(components(raw.tetrahedra).max()) + 1

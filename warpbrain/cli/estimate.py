@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -251,7 +250,7 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
     from warpbrain.gp.trained import find_model
     from warpbrain.report.fingerprints import fingerprint_of
     from warpbrain.report.sweep import TABLE, columns, read_sweep, sweep_lines, write_sweep
-    from warpbrain.report.sweep_picture import write_sweep_picture
+    from warpbrain.report.sweep_picture import estimated_in, write_sweep_picture
     from warpbrain.terminal.result_folder import results_in
 
     record: Record = options.record
@@ -262,6 +261,7 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
     parameters = Parameters.of(case)
     header = columns(parameters, fingerprint_of(case, model.name, model.variant))
     path = out / TABLE
+    estimated = estimated_in(out / "estimate.json")
     if options.overwrite:
         path.unlink(missing_ok=True)
     known, damaged = read_sweep(path, header, len(parameters.tissues))
@@ -283,10 +283,8 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
     finally:
         progress.clear()
     say(*sweep_lines(finished), sep="\n")
-    estimate_file = out / "estimate.json"
-    estimate = json.loads(estimate_file.read_text(encoding="utf-8")) if estimate_file.exists() else None
     # beside an estimate, and of points that were there before
     with results_in(out, record, replace=False):
-        write_sweep_picture(out / "sweep.png", finished, case.title, estimate)
+        write_sweep_picture(out / "sweep.png", finished, case.title, estimated)
         record.files += [TABLE, "sweep.png"]
         say("", f"written to {out}: {TABLE}, sweep.png", sep="\n")

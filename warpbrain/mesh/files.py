@@ -112,8 +112,6 @@ def read_raw(path: Path) -> Any:
             return reader(path)
     except MeshError as error:
         raise error.within(str(path)) from error
-    except SystemExit as error:  # meshio leaves the program on some unreadable files
-        raise MeshError(f"{path}: not a mesh that meshio can read") from error
     except Exception as error:  # its readers raise whatever their parsers do
         if isinstance(error, OSError) and is_full(error):
             # some formats are read from a copy

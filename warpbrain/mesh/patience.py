@@ -1,13 +1,14 @@
-"""Limits on what the reading of a file may take: some readers wait for ever for the end of one that is cut off, or ask
-for all the memory that a counter in it speaks of."""
+"""Limits on what the reading of a file may take and do: some readers wait for ever for the end of one that is cut off,
+ask for all the memory that a counter in it speaks of, print, or leave the program."""
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from types import FrameType
 
@@ -22,13 +23,25 @@ MEMORY, MEMORY_PER_BYTE = 1 << 30, 40
 def patience(path: Path) -> Iterator[None]:
     """Raise `TimeoutError` or `MemoryError` in the block if it takes more than reading a file of that size can.
 
+    What the block prints is lost, and where it leaves the program `ValueError` is raised: meshio does both where it
+    gives up.
+
     Time is what this process computes, so that a busy machine makes no file wrong; it works in the main thread on
     systems with timers, which is where commands read. Memory is bounded where there are limits of the address space.
     Elsewhere there is no limit.
     """
     size = path.stat().st_size
-    with _time(SECONDS + SECONDS_PER_MEGABYTE * size / 1e6), _memory(MEMORY + MEMORY_PER_BYTE * size):
-        yield
+    said = io.StringIO()
+    try:
+        with (
+            redirect_stdout(said),
+            redirect_stderr(said),
+            _time(SECONDS + SECONDS_PER_MEGABYTE * size / 1e6),
+            _memory(MEMORY + MEMORY_PER_BYTE * size),
+        ):
+            yield
+    except SystemExit:
+        raise ValueError("its reader gave up") from None
 
 
 @contextmanager

@@ -81,7 +81,7 @@ def read_state(result: Path) -> SavedState:
         at = {name: np.asarray(values, dtype=np.float64) for name, values in file.point_data.items()}
         of_cells = {name: values[0] for name, values in file.cell_data.items()}
         mesh = TetMesh(file.points / MILLIMETRES, cells, of_cells["tissue"])
-    except (Exception, SystemExit) as error:  # whatever its parsers raise; meshio leaves the program on some files
+    except Exception as error:  # whatever its parsers raise
         detail = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(f"{path}: no body of tetrahedra that can be read ({detail})") from None
     u = at.get("displacement", at.get("displacement_mean"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.errors import InputError
 from warpbrain.estimation.sweep import Sweep
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
@@ -16,7 +19,36 @@ from warpbrain.report.comparison import SHOWN
 _SWEEP, _BEST, _ESTIMATE = "#0072B2", "#D55E00", "#000000"
 
 
-def write_sweep_picture(path: Path, sweep: Sweep, title: str, estimate: Mapping[str, Any] | None = None) -> None:
+#: Of a tissue: estimate of its shear modulus, lower and upper end of its interval [Pa].
+Estimated = tuple[float, float, float]
+
+
+def estimated_in(path: Path) -> dict[str, Estimated]:
+    """Shear moduli of tissues, by name, that an `estimate.json` says; none if there is no such file.
+
+    Raises
+    ------
+    InputError
+        If it is not what `describe_estimate` says.
+    """
+    if not path.exists():
+        return {}
+    found: dict[str, Estimated] = {}
+    try:
+        for one in json.loads(path.read_text(encoding="utf-8"))["parameters"]:
+            if one["name"] != "shear modulus":
+                continue
+            middle, low, high = float(one["estimate"]), *map(float, one["interval_95"])
+            if not 0.0 < low <= middle <= high < math.inf:
+                raise ValueError(f"{one['tissue']}: found {middle:g} in {low:g} to {high:g} Pa")
+            found[one["tissue"]] = middle, low, high
+    except (OSError, LookupError, TypeError, ValueError, RecursionError) as error:
+        detail = " ".join(str(error).split())[:200]
+        raise InputError(f"{path}: not an estimate to draw beside the sweep ({detail})") from None
+    return found
+
+
+def write_sweep_picture(path: Path, sweep: Sweep, title: str, estimated: Mapping[str, Estimated]) -> None:
     """Draw the error over the shear moduli of one tissue, or of the first two.
 
     Parameters
@@ -25,8 +57,8 @@ def write_sweep_picture(path: Path, sweep: Sweep, title: str, estimate: Mapping[
         PNG file.
     sweep : Sweep
     title : str
-    estimate : mapping, optional
-        What `describe_estimate` said of the same case.
+    estimated : mapping
+        Of the same case: see `estimated_in`.
     """
     import matplotlib
 
@@ -35,9 +67,9 @@ def write_sweep_picture(path: Path, sweep: Sweep, title: str, estimate: Mapping[
 
     figure, axes = plt.subplots(figsize=(6.4, 5.2))
     if len(sweep.parameters.tissues) == 1:
-        _draw_curve(axes, sweep, estimate)
+        _draw_curve(axes, sweep, estimated)
     else:
-        _draw_surface(figure, axes, sweep, estimate)
+        _draw_surface(figure, axes, sweep, estimated)
     axes.set_title(title, parse_math=False, fontsize=10)
     axes.legend(fontsize=9, loc="upper right")
     figure.tight_layout()
@@ -50,15 +82,7 @@ def _moduli(sweep: Sweep) -> Floats:
     return np.array([[law.shear_modulus for law in sweep.parameters.laws(point.theta)] for point in sweep.points])
 
 
-def _estimated(estimate: Mapping[str, Any] | None, tissue: str) -> tuple[float, float, float] | None:
-    """Estimate and interval of a tissue's shear modulus [Pa]."""
-    for one in [] if estimate is None else estimate["parameters"]:
-        if one["tissue"] == tissue and one["name"] == "shear modulus":
-            return one["estimate"], *one["interval_95"]
-    return None
-
-
-def _draw_curve(axes: Any, sweep: Sweep, estimate: Mapping[str, Any] | None) -> None:
+def _draw_curve(axes: Any, sweep: Sweep, estimated: Mapping[str, Estimated]) -> None:
     factor, unit = SHOWN[sweep.unit]
     moduli = _moduli(sweep)[:, 0]
     errors = np.array([np.nan if point.error is None else factor * point.error for point in sweep.points])
@@ -66,7 +90,7 @@ def _draw_curve(axes: Any, sweep: Sweep, estimate: Mapping[str, Any] | None) -> 
     axes.plot(moduli[order], errors[order], "o-", color=_SWEEP, markersize=5, label="sweep")
     best = int(np.nanargmin(errors))
     axes.plot(moduli[best], errors[best], "s", color=_BEST, markersize=9, label="best of the sweep")
-    found = _estimated(estimate, sweep.parameters.tissues[0])
+    found = estimated.get(sweep.parameters.tissues[0])
     if found is not None:
         axes.axvline(found[0], color=_ESTIMATE, label="estimate")
         axes.axvspan(found[1], found[2], color=_ESTIMATE, alpha=0.15, linewidth=0, label="95 % interval")
@@ -75,7 +99,7 @@ def _draw_curve(axes: Any, sweep: Sweep, estimate: Mapping[str, Any] | None) -> 
     axes.set_ylabel(f"RMSE at the fitted recordings [{unit}]")
 
 
-def _draw_surface(figure: Any, axes: Any, sweep: Sweep, estimate: Mapping[str, Any] | None) -> None:
+def _draw_surface(figure: Any, axes: Any, sweep: Sweep, estimated: Mapping[str, Estimated]) -> None:
     factor, unit = SHOWN[sweep.unit]
     # of more than two tissues: the plane through the best point
     inside = [point for point in sweep.points if point.k[2:] == sweep.best.k[2:]]
@@ -96,7 +120,7 @@ def _draw_surface(figure: Any, axes: Any, sweep: Sweep, estimate: Mapping[str, A
         axes.scatter(flat[~solved, 0], flat[~solved, 1], s=14, marker="x", color="0.3", label="no equilibrium")
     best = _moduli(Sweep(sweep.parameters, sweep.unit, (sweep.best,)))[0]
     axes.plot(best[0], best[1], "s", color=_BEST, markeredgecolor="white", markersize=10, label="best of the sweep")
-    along, upwards = (_estimated(estimate, tissue) for tissue in sweep.parameters.tissues[:2])
+    along, upwards = (estimated.get(tissue) for tissue in sweep.parameters.tissues[:2])
     if along is not None and upwards is not None:
         (x, *ends_x), (y, *ends_y) = along, upwards
         across = [[x - ends_x[0]], [ends_x[1] - x]], [[y - ends_y[0]], [ends_y[1] - y]]

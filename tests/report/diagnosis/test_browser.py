@@ -4,8 +4,12 @@ import html
 import itertools
 import json
 import re
+import shutil
 
-from browser import LISTEN, needs_browser, opened
+from browser import EVIL, LISTEN, needs_browser, opened, runs
+
+from warpbrain.report.diagnosis.html import page_of
+from warpbrain.report.diagnosis.saved import read_saved
 
 pytestmark = needs_browser
 
@@ -79,3 +83,13 @@ def test_without_webgl_the_page_says_so(diagnosed, tmp_path):
     page = page.replace("<head>", "<head>" + LISTEN + blind)
     document = opened(page.replace("</body>", look + "</body>"), tmp_path)
     assert 'data-wrong="0"' in document and 'data-shown="block"' in document
+
+
+def test_nothing_of_a_name_runs(diagnosed, tmp_path):
+    folder = shutil.copytree(diagnosed, tmp_path / "named")
+    for file in ("diagnosis.json", "points.csv"):
+        text = (folder / file).read_text(encoding="utf-8")
+        for name in ("gel", "beads", "others"):
+            text = text.replace(name, name + EVIL)
+        (folder / file).write_text(text, encoding="utf-8")
+    assert not runs(page_of(read_saved(folder)), tmp_path)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 from dataclasses import replace
 from pathlib import Path
 
@@ -61,9 +59,7 @@ def _read_specimen(context: Context) -> Specimen | None:
 
 def _read_mesh(context: Context, path: Path, tissue: str | None) -> MeshInFile | None:
     try:
-        # meshio prints lines of its own where it gives up; the error says it
-        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            found = read_mesh_file(path, context.frame.unit, tissue)
+        found = read_mesh_file(path, context.frame.unit, tissue)
     except MeshError as error:
         for message in error.messages:
             context.problems.add(path, "", message.removeprefix(f"{path}: "))

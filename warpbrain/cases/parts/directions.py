@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 from pathlib import Path
 
 import numpy as np
@@ -66,9 +64,7 @@ def _from_array(path: Path, mesh: TetMesh, problems: Problems) -> Floats | None:
 
 def _from_mesh(path: Path, mesh: TetMesh, problems: Problems) -> Floats | None:
     try:
-        # meshio prints lines of its own where it gives up; the error says it
-        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            other = read_mesh(path)
+        other = read_mesh(path)
     except MeshError as error:
         problems.add(path, "", str(error).removeprefix(f"{path}: "))
         return None

@@ -1,0 +1,50 @@
+"""Where nothing is rendered and no file of a curve is drawn, which is most of the time of a small case and needs
+libraries that compute servers lack: `PYTHONPATH=tests python -m not_drawn diagnose ...` is `warpbrain diagnose ...`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from warpbrain.atomic import whole_file
+from warpbrain.cli import main
+from warpbrain.report.rendering.scene import NAMES
+
+
+@contextmanager
+def nothing_drawn() -> Iterator[None]:
+    """Pictures are white, cuts through bodies empty."""
+    with ExitStack() as stack:
+        for target, stand_in in _STAND_INS:
+            stack.enter_context(patch(target, stand_in))
+        yield
+
+
+def _white(_scene: object, _cameras: object, size: tuple[int, int]) -> dict[str, np.ndarray]:
+    return {name: np.full((size[1], size[0], 3), 255, np.uint8) for name in NAMES}
+
+
+def _saved(_figure: object, path: Path) -> None:
+    with whole_file(path) as scratch:
+        scratch.write_bytes(b"\x89PNG" + bytes(5000) + b"IEND\xaeB`\x82")
+
+
+def _empty(view: Any, name: str, _axis: int, _place: float) -> dict[str, object]:
+    return {"name": name, "points": "", "triangles": "", "moves": None, "values": [""] * len(view.fields)}
+
+
+_STAND_INS: tuple[tuple[str, Callable[..., object]], ...] = (
+    ("warpbrain.report.picture.render", _white),
+    ("warpbrain.report.views.save", _saved),
+    ("warpbrain.report.page.scene._cut", _empty),
+)
+
+if __name__ == "__main__":
+    with nothing_drawn():
+        sys.exit(main(sys.argv[1:]))
