@@ -10,10 +10,11 @@ import numpy as np
 
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.inference.probability import percent
+from warpbrain.mesh import TetMesh
 from warpbrain.recordings.recording import PointsRecording
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, in_three_dimensions
-from warpbrain.report.estimate_picture import agreement_figure, densities_figure
+from warpbrain.report.estimate_picture import agreement_figure, densities_figure, deviation_figure
 from warpbrain.report.explained import Explained, explained, number
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.page.document import Section, document, header, listed, section, text, write_document
@@ -79,6 +80,7 @@ def write_estimate_page(
         section("What else may act", _causes(said)),
         _recordings(said, posterior),
         before_and_after(drawn, pictures if isinstance(pictures, str) else ""),
+        _deviation(whole, state),
         in_three_dimensions(state.mesh, state.u, fields, moved_of(posterior), places),
         section("What the model leaves out", listed(left_out(model_of(posterior.case)))),
         _doubts(said),
@@ -192,6 +194,23 @@ def _recordings(said: Mapping[str, Any], posterior: Posterior) -> Section:
             inlined(lambda narrow: agreement_figure(posterior, narrow), "Observed beside predicted components.", words)
         )
     return section("What was recorded", *parts)
+
+
+def _deviation(whole: TetMesh, state: SavedState) -> Section:
+    """Where the displacement is known, and where not."""
+    title = "How well the displacement is known"
+    if state.deviation is None:
+        return section(title)
+    sizes = np.linalg.norm(state.u, axis=1)
+    at = int(state.deviation.argmax())
+    words = (
+        f"Standard deviation of the displacement: at most {MILLIMETRES * state.deviation[at]:.2g} mm, where the body "
+        f"moves by {MILLIMETRES * sizes[at]:.2g} mm. It is what is not known of the tissue, to first order about this "
+        "state: what else may act is not in it, nor the error of the mesh. With --image it is displacement_sd.nii.gz."
+    )
+    return section(
+        title, inlined(lambda narrow: deviation_figure(whole, state, narrow), "Three cuts with the deviation.", words)
+    )
 
 
 def _doubts(said: Mapping[str, Any]) -> Section:

@@ -24,6 +24,11 @@ from warpbrain.report.files import MIDDLES, MILLIMETRES
 FILES = ("result.vtu", "state.vtu", "fields.vtu")
 #: What is known of a place in the body, as `trust` says it; zero is outside of it.
 SEEN, UNSEEN, LEFT = 1, 2, 3
+TRUST = {
+    SEEN: "recordings see a force, and nothing is left",
+    UNSEEN: "recordings see nothing",
+    LEFT: "recordings and the declared case disagree",
+}
 
 
 @dataclass(frozen=True, eq=False)
