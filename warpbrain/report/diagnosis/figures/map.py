@@ -63,6 +63,6 @@ def map_figure(summary: dict[str, Any], anatomy: Anatomy) -> str:
         "How strongly a force at each place would explain the mismatch. The largest score, "
         f"{summary['map']['largest']:.1f}, {verdict} above the threshold of {threshold:.1f} that pays for looking at "
         f"{summary['map']['places']} places (bar; green line). Dashed: the ball that was located. Hatched: a force of "
-        f"{blind:.2g} N would not be found."
+        f"{blind:.2g} N would not be found. With --image both are trust.nii.gz."
     )
     return inlined(draw, "Three cuts with the score of a force at every place.", caption)
