@@ -13,17 +13,16 @@ from warpbrain.inference.probability import percent
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.recording import PointsRecording
 from warpbrain.report import views
-from warpbrain.report.body_sections import before_and_after, in_three_dimensions
+from warpbrain.report.body_sections import before_and_after, fields_of, in_three_dimensions
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure, deviation_figure
 from warpbrain.report.explained import Explained, explained, number
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.page.document import Section, document, header, listed, section, text, write_document
 from warpbrain.report.page.figures import inlined
-from warpbrain.report.page.scene import Field
 from warpbrain.report.page.tables import table
 from warpbrain.report.picture import Moved, Pictures
 from warpbrain.report.run_page import BADGES, remarks, versions
-from warpbrain.report.state_files import SavedState
+from warpbrain.report.state_files import LEFT, TRUST, UNSEEN, SavedState
 from warpbrain.report.summary import left_out
 from warpbrain.simulation.of_case import model_of
 
@@ -70,9 +69,6 @@ def write_estimate_page(
     """
     case, judged = said["case"], judged_of(said)
     whole = posterior.case.mesh
-    known = MILLIMETRES * (np.zeros(len(state.u)) if state.deviation is None else state.deviation)
-    fields = [Field("uncertainty", "standard deviation of the displacement [mm]", known, 0.0,
-                    float(known.max()) or 1.0, None, "that of the tissue, to first order")]  # fmt: skip
     drawn = None if isinstance(pictures, str) else pictures
     places = views.places(whole, views.resected_elements(whole))
     sections = [
@@ -81,7 +77,7 @@ def write_estimate_page(
         _recordings(said, posterior),
         before_and_after(drawn, pictures if isinstance(pictures, str) else ""),
         _deviation(whole, state),
-        in_three_dimensions(state.mesh, state.u, fields, moved_of(posterior), places),
+        in_three_dimensions(state.mesh, state.u, fields_of(state), moved_of(posterior), places),
         section("What the model leaves out", listed(left_out(model_of(posterior.case)))),
         _doubts(said),
         section("What was assumed", listed(case["assumptions"]), _prior(said)),
@@ -201,13 +197,21 @@ def _deviation(whole: TetMesh, state: SavedState) -> Section:
     title = "How well the displacement is known"
     if state.deviation is None:
         return section(title)
-    sizes = np.linalg.norm(state.u, axis=1)
     at = int(state.deviation.argmax())
+    moves = float(np.linalg.norm(state.u[at]))
     words = (
         f"Standard deviation of the displacement: at most {MILLIMETRES * state.deviation[at]:.2g} mm, where the body "
-        f"moves by {MILLIMETRES * sizes[at]:.2g} mm. It is what is not known of the tissue, to first order about this "
-        "state: what else may act is not in it, nor the error of the mesh. With --image it is displacement_sd.nii.gz."
+        f"moves by {MILLIMETRES * moves:.2g} mm. It is what is not known of the tissue, to first order about this "
+        "state: what else may act is not in it, nor the error of the mesh."
     )
+    if state.trust is not None:
+        volumes = state.mesh.node_volumes
+        unseen, left = (100.0 * volumes[state.trust == value].sum() / volumes.sum() for value in (UNSEEN, LEFT))
+        words += (
+            f" Hatched: {TRUST[UNSEEN]} of a force there, {unseen:.0f} % of the body. Within the line: {TRUST[LEFT]}, "
+            f"{left:.0f} % of it."
+        )
+    words += " With --image: displacement_sd.nii.gz" + (" and trust.nii.gz." if state.trust is not None else ".")
     return section(
         title, inlined(lambda narrow: deviation_figure(whole, state, narrow), "Three cuts with the deviation.", words)
     )

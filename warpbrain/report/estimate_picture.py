@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Ints
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.estimation.prediction import Prediction
 from warpbrain.mesh import TetMesh, boundary_faces
@@ -17,7 +17,8 @@ from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.page.figures import NARROW, TEXT, panels
-from warpbrain.report.state_files import SavedState
+from warpbrain.report.slices import cut, level_line
+from warpbrain.report.state_files import LEFT, UNSEEN, SavedState
 
 #: Of Okabe and Ito, who can be told apart by everybody and in grey print.
 PRIOR, POSTERIOR, GROSS = "#E69F00", "#0072B2", "#D55E00"
@@ -96,6 +97,8 @@ def agreement_figure(posterior: Posterior, narrow: bool) -> Any:
 def deviation_figure(whole: TetMesh, state: SavedState, narrow: bool) -> Any:
     """Three cuts with the standard deviation of the displacement, as `displacement_sd.nii.gz` has it.
 
+    Hatched where recordings see nothing, within a line where they and the case disagree, as `trust.nii.gz` has it.
+
     Parameters
     ----------
     whole : TetMesh
@@ -113,11 +116,35 @@ def deviation_figure(whole: TetMesh, state: SavedState, narrow: bool) -> Any:
     places = views.places(whole, views.resected_elements(whole))
     for panel, view, place in zip(axes, views.VIEWS, places, strict=True):
         drawn = views.draw_values(panel, state.mesh, values, view, place, top)
+        if state.trust is not None:
+            _draw_trust(panel, state.mesh, state.trust, view, place)
         panel.set_title(views.heading(whole, view, place), fontsize=TEXT)
     bar = figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.9 if narrow else 0.5, aspect=40, pad=0.02)
     bar.set_label("standard deviation of the displacement [mm]", fontsize=TEXT - 1)
     bar.ax.tick_params(labelsize=TEXT - 2)
     return figure
+
+
+def _draw_trust(axes: Any, mesh: TetMesh, trust: Ints, view: views.View, place: float) -> None:
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import PathPatch
+
+    section = cut(mesh.points, mesh.tetrahedra, (trust == LEFT).astype(np.float64), view.axis, place)
+    unseen = (trust == UNSEEN)[mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
+    if unseen.any():
+        polygons = [polygon for polygon, hidden in zip(section.polygons, unseen, strict=True) if hidden]
+        axes.add_artist(
+            PathPatch(
+                views.path_of(polygons),
+                facecolor="none",
+                edgecolor="white",
+                hatch="//////",
+                linewidth=0.0,
+                zorder=2.0,
+            )
+        )
+    segments = views.in_view(level_line(section, 0.5))
+    axes.add_collection(LineCollection(list(segments), colors=GROSS, linewidths=2.2, zorder=2.5))
 
 
 def _save(path: Path, figure: Any, posterior: Posterior) -> None:

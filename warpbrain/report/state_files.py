@@ -11,6 +11,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.atomic import whole_file
+from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.errors import InputError
 from warpbrain.estimation.posterior import Posterior
@@ -115,13 +116,16 @@ def _trust(at: Mapping[str, Floats]) -> Ints | None:
     return np.where(at["significant"] > 0.0, LEFT, seen)
 
 
-def write_estimated_state(path: Path, posterior: Posterior) -> None:
+def write_estimated_state(path: Path, posterior: Posterior, where: ScoreMap | None = None) -> None:
     """Write the most probable state of an estimate as VTU with coordinates in mm.
 
     Point arrays: ``displacement`` [mm] and ``displacement_sd`` of its components [mm]: what is not known of the tissue,
-    to first order about that state.
+    to first order about that state. With a map of what is left ``significant`` and ``blind``, too, as in `map.vtu`.
     """
-    _write(path, file_of_estimate(posterior))
+    file = file_of_estimate(posterior)
+    if where is not None:
+        file.point_data |= _seen(where, posterior.case.remaining[0])
+    _write(path, file)
 
 
 def file_of_estimate(posterior: Posterior) -> Any:
@@ -142,18 +146,21 @@ def write_diagnosed_state(path: Path, diagnosis: Diagnosis) -> None:
 
     Point arrays: ``displacement`` [mm], ``significant`` and ``blind`` as in `map.vtu`.
     """
-    from scipy.spatial import cKDTree
-
-    where, refit = diagnosis.map, diagnosis.best.refit
+    refit = diagnosis.best.refit
     state = diagnosis.base.at if refit is None else refit.state
     mesh = state.system.model.mesh
+    _write(path, _file(mesh, {"displacement": MILLIMETRES * state.u, **_seen(diagnosis.map, mesh)}))
+
+
+def _seen(where: ScoreMap, mesh: TetMesh) -> dict[str, Any]:
+    """What the map says at each node: whether what is left is significant, and whether recordings see no force."""
+    from scipy.spatial import cKDTree
+
     nearest = cKDTree(where.sites).query(mesh.points)[1]
-    arrays = {
-        "displacement": MILLIMETRES * state.u,
+    return {
         "significant": (where.scores[nearest] > where.threshold).astype(np.uint8),
         "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
     }
-    _write(path, _file(mesh, arrays))
 
 
 def _file(mesh: TetMesh, arrays: dict[str, Any]) -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -82,6 +82,13 @@ def places(mesh: TetMesh, resected: Bools) -> tuple[float, float, float]:
 def in_view(coordinates: Floats) -> Floats:
     """Picture coordinates [mm] of in-plane coordinates [m]: the horizontal axis is turned, as radiologists hold it."""
     return np.array(coordinates) * (-MILLIMETRES, MILLIMETRES)
+
+
+def path_of(polygons: Sequence[Floats]) -> Any:
+    """Polygons of a cut as one path of a picture."""
+    from matplotlib.path import Path
+
+    return Path.make_compound_path(*(Path(in_view(p), closed=False) for p in polygons))
 
 
 def scale_length(mesh: TetMesh) -> float:

@@ -10,7 +10,7 @@ from warpbrain.report.diagnosis.saved import Anatomy
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.generative.page import GREEN
 from warpbrain.report.slices import Cut, cut, level_line
-from warpbrain.report.views import View, bare, draw_outline, in_view, scale_length
+from warpbrain.report.views import View, bare, draw_outline, in_view, path_of, scale_length
 
 #: Ground of the tissue, of what is significant, and lines of the hatching.
 TISSUE, TINT, HATCHING = "#f1eeea", "#cfe6dc", "#9a938b"
@@ -23,16 +23,16 @@ def draw_slice(axes: Any, anatomy: Anatomy, view: View, place: float, threshold:
 
     mesh = anatomy.mesh
     section = cut(mesh.points, mesh.tetrahedra, np.asarray(anatomy.fields["score"]), view.axis, place)
-    axes.add_artist(PathPatch(_path(section.polygons), facecolor=TISSUE, edgecolor=TISSUE, linewidth=0.3))
+    axes.add_artist(PathPatch(path_of(section.polygons), facecolor=TISSUE, edgecolor=TISSUE, linewidth=0.3))
     significant = section.values > threshold
     if significant.any():
         inside = [polygon for polygon, here in zip(section.polygons, significant, strict=True) if here]
-        axes.add_artist(PathPatch(_path(inside), facecolor=TINT, edgecolor=TINT, linewidth=0.3))
+        axes.add_artist(PathPatch(path_of(inside), facecolor=TINT, edgecolor=TINT, linewidth=0.3))
     blind = np.asarray(anatomy.fields["blind"])[mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
     if blind.any():
         hidden = [polygon for polygon, here in zip(section.polygons, blind, strict=True) if here]
         axes.add_artist(
-            PathPatch(_path(hidden), facecolor="none", edgecolor=HATCHING, hatch="//////", linewidth=0.0, zorder=2.0)
+            PathPatch(path_of(hidden), facecolor="none", edgecolor=HATCHING, hatch="//////", linewidth=0.0, zorder=2.0)
         )
     segments = in_view(level_line(section, threshold))
     axes.add_collection(LineCollection(list(segments), colors=GREEN, linewidths=2.2))
@@ -69,12 +69,6 @@ def centre_of(summary: dict[str, Any], anatomy: Anatomy) -> Any:
     points = anatomy.mesh.points
     # beside the midline, where a hemisphere is; elsewhere off planes that nodes of a regular mesh lie in
     return 0.5 * (points.min(axis=0) + points.max(axis=0)) + np.array([0.12, 0.003, 0.003]) * np.ptp(points, axis=0)
-
-
-def _path(polygons: list[Any]) -> Any:
-    from matplotlib.path import Path
-
-    return Path.make_compound_path(*(Path(in_view(p), closed=False) for p in polygons))
 
 
 def millimetres(value: float) -> str:
