@@ -10,24 +10,28 @@ import numpy as np
 
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.inference.probability import percent
-from warpbrain.mesh import TetMesh
 from warpbrain.recordings.recording import PointsRecording
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, fields_of, in_three_dimensions
-from warpbrain.report.estimate_picture import agreement_figure, densities_figure, deviation_figure
+from warpbrain.report.estimate_picture import agreement_figure, densities_figure
 from warpbrain.report.explained import Explained, explained, number
-from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.known_displacement import known_displacement
 from warpbrain.report.page.document import Section, document, header, listed, section, text, write_document
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.tables import table
 from warpbrain.report.picture import Moved, Pictures
 from warpbrain.report.run_page import BADGES, remarks, versions
-from warpbrain.report.state_files import LEFT, TRUST, UNSEEN, SavedState
+from warpbrain.report.state_files import SavedState
 from warpbrain.report.summary import left_out
 from warpbrain.simulation.of_case import model_of
 
 #: Causes that are less probable are not listed.
 _LIKELY = 0.01
+#: What the standard deviation of the displacement is of.
+_KNOWN = (
+    "It is what is not known of the tissue, to first order about this state: what else may act is not in it, nor the "
+    "error of the mesh."
+)
 _METHODS = {"laplace": "Laplace's approximation", "chain": "a Markov chain"}
 
 
@@ -76,7 +80,7 @@ def write_estimate_page(
         section("What else may act", _causes(said)),
         _recordings(said, posterior),
         before_and_after(drawn, pictures if isinstance(pictures, str) else ""),
-        _deviation(whole, state),
+        known_displacement(state, whole, places, _KNOWN),
         in_three_dimensions(state.mesh, state.u, fields_of(state), moved_of(posterior), places),
         section("What the model leaves out", listed(left_out(model_of(posterior.case)))),
         _doubts(said),
@@ -190,31 +194,6 @@ def _recordings(said: Mapping[str, Any], posterior: Posterior) -> Section:
             inlined(lambda narrow: agreement_figure(posterior, narrow), "Observed beside predicted components.", words)
         )
     return section("What was recorded", *parts)
-
-
-def _deviation(whole: TetMesh, state: SavedState) -> Section:
-    """Where the displacement is known, and where not."""
-    title = "How well the displacement is known"
-    if state.deviation is None:
-        return section(title)
-    at = int(state.deviation.argmax())
-    moves = float(np.linalg.norm(state.u[at]))
-    words = (
-        f"Standard deviation of the displacement: at most {MILLIMETRES * state.deviation[at]:.2g} mm, where the body "
-        f"moves by {MILLIMETRES * moves:.2g} mm. It is what is not known of the tissue, to first order about this "
-        "state: what else may act is not in it, nor the error of the mesh."
-    )
-    if state.trust is not None:
-        volumes = state.mesh.node_volumes
-        unseen, left = (100.0 * volumes[state.trust == value].sum() / volumes.sum() for value in (UNSEEN, LEFT))
-        words += (
-            f" Hatched: {TRUST[UNSEEN]} of a force there, {unseen:.0f} % of the body. Within the line: {TRUST[LEFT]}, "
-            f"{left:.0f} % of it."
-        )
-    words += " With --image: displacement_sd.nii.gz" + (" and trust.nii.gz." if state.trust is not None else ".")
-    return section(
-        title, inlined(lambda narrow: deviation_figure(whole, state, narrow), "Three cuts with the deviation.", words)
-    )
 
 
 def _doubts(said: Mapping[str, Any]) -> Section:

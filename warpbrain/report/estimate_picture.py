@@ -8,17 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Floats, Ints
+from warpbrain.arrays import Floats
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.estimation.prediction import Prediction
-from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.mesh import boundary_faces
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.page.figures import NARROW, TEXT, panels
-from warpbrain.report.slices import cut, level_line
-from warpbrain.report.state_files import LEFT, UNSEEN, SavedState
+from warpbrain.report.page.figures import NARROW
 
 #: Of Okabe and Ito, who can be told apart by everybody and in grey print.
 PRIOR, POSTERIOR, GROSS = "#E69F00", "#0072B2", "#D55E00"
@@ -92,59 +90,6 @@ def agreement_figure(posterior: Posterior, narrow: bool) -> Any:
     for column, unit in enumerate(units):
         _draw_pairs(axes[column], [one for one in shown if one.unit == unit], unit, 1 if narrow else 2)
     return figure
-
-
-def deviation_figure(whole: TetMesh, state: SavedState, narrow: bool) -> Any:
-    """Three cuts with the standard deviation of the displacement, as `displacement_sd.nii.gz` has it.
-
-    Hatched where recordings see nothing, within a line where they and the case disagree, as `trust.nii.gz` has it.
-
-    Parameters
-    ----------
-    whole : TetMesh
-        The anatomy before anything was resected, which says where to cut.
-    state : SavedState
-        With a deviation.
-    narrow : bool
-        For a narrow window.
-    """
-    assert state.deviation is not None
-    values = MILLIMETRES * state.deviation
-    top = max(float(values.max()), 1e-6)
-    figure, axes = panels(narrow, 3.4, 3)
-    drawn: Any = None
-    places = views.places(whole, views.resected_elements(whole))
-    for panel, view, place in zip(axes, views.VIEWS, places, strict=True):
-        drawn = views.draw_values(panel, state.mesh, values, view, place, top)
-        if state.trust is not None:
-            _draw_trust(panel, state.mesh, state.trust, view, place)
-        panel.set_title(views.heading(whole, view, place), fontsize=TEXT)
-    bar = figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.9 if narrow else 0.5, aspect=40, pad=0.02)
-    bar.set_label("standard deviation of the displacement [mm]", fontsize=TEXT - 1)
-    bar.ax.tick_params(labelsize=TEXT - 2)
-    return figure
-
-
-def _draw_trust(axes: Any, mesh: TetMesh, trust: Ints, view: views.View, place: float) -> None:
-    from matplotlib.collections import LineCollection
-    from matplotlib.patches import PathPatch
-
-    section = cut(mesh.points, mesh.tetrahedra, (trust == LEFT).astype(np.float64), view.axis, place)
-    unseen = (trust == UNSEEN)[mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
-    if unseen.any():
-        polygons = [polygon for polygon, hidden in zip(section.polygons, unseen, strict=True) if hidden]
-        axes.add_artist(
-            PathPatch(
-                views.path_of(polygons),
-                facecolor="none",
-                edgecolor="white",
-                hatch="//////",
-                linewidth=0.0,
-                zorder=2.0,
-            )
-        )
-    segments = views.in_view(level_line(section, 0.5))
-    axes.add_collection(LineCollection(list(segments), colors=GROSS, linewidths=2.2, zorder=2.5))
 
 
 def _save(path: Path, figure: Any, posterior: Posterior) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +14,13 @@ from warpbrain.arrays import Floats, Ints
 from warpbrain.atomic import whole_file
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.patience import patience
 from warpbrain.mesh.vtu import read_vtu, write_vtu
 from warpbrain.report.files import MIDDLES, MILLIMETRES
+from warpbrain.worlds.body.displacement_spread import displacement_deviation
 
 #: Files that hold a deformed body, in the order in which they are looked for: of `run`, of `estimate` and `diagnose`,
 #: and of `ensemble`.
@@ -144,12 +146,17 @@ def file_of_estimate(posterior: Posterior) -> Any:
 def write_diagnosed_state(path: Path, diagnosis: Diagnosis) -> None:
     """Write the last state of a diagnosis, with all that is named, as VTU with coordinates in mm.
 
-    Point arrays: ``displacement`` [mm], ``significant`` and ``blind`` as in `map.vtu`.
+    Point arrays: ``displacement`` [mm], ``displacement_sd`` of its components [mm] as of `displacement_deviation`,
+    where that state can be linearised, ``significant`` and ``blind`` as in `map.vtu`.
     """
     refit = diagnosis.best.refit
     state = diagnosis.base.at if refit is None else refit.state
     mesh = state.system.model.mesh
-    _write(path, _file(mesh, {"displacement": MILLIMETRES * state.u, **_seen(diagnosis.map, mesh)}))
+    arrays = {"displacement": MILLIMETRES * state.u, **_seen(diagnosis.map, mesh)}
+    # a state at the edge of what is stable has an equilibrium, and none beside it
+    with contextlib.suppress(SolveError):
+        arrays["displacement_sd"] = MILLIMETRES * displacement_deviation(diagnosis.best, diagnosis.base)
+    _write(path, _file(mesh, arrays))
 
 
 def _seen(where: ScoreMap, mesh: TetMesh) -> dict[str, Any]:

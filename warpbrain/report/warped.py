@@ -22,7 +22,7 @@ from warpbrain.images.writing import write_displacement, write_transform, write_
 from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.slicer import BACK, DEVIATION, FORTH, TRUST_MAP, write_slicer_scene
-from warpbrain.report.state_files import TRUST, SavedState
+from warpbrain.report.state_files import LEFT, TRUST, SavedState
 
 #: Edges of voxels, and how far they reach beyond the body, where there is no image [mm].
 _SPACING, _MARGIN = 2.0, 40.0
@@ -239,6 +239,7 @@ def _trust_lines(state: SavedState) -> list[str]:
     if state.deviation is not None:
         lines.append(
             f"sd        standard deviation of the displacement: up to {MILLIMETRES * state.deviation.max():.2g} mm"
+            + (", more where something is left" if state.trust is not None and (state.trust == LEFT).any() else "")
         )
     if state.trust is not None:
         volumes = state.mesh.node_volumes

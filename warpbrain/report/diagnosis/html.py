@@ -12,6 +12,7 @@ from warpbrain.report.diagnosis.figures.confusion import confusion_figure
 from warpbrain.report.diagnosis.figures.curves import curves_figure
 from warpbrain.report.diagnosis.figures.map import map_figure
 from warpbrain.report.diagnosis.figures.residuals import residuals_figure
+from warpbrain.report.diagnosis.figures.slices import centre_of
 from warpbrain.report.diagnosis.saved import Rows, Saved, read_saved, unit_of
 from warpbrain.report.diagnosis.scene import view_of
 from warpbrain.report.diagnosis.tables import (
@@ -25,9 +26,11 @@ from warpbrain.report.diagnosis.tables import (
 from warpbrain.report.diagnosis.text import when_in_words
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.generative.page import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY
+from warpbrain.report.known_displacement import known_displacement
 from warpbrain.report.page.document import Section, document, header, listed, section, text, write_document
 from warpbrain.report.page.tables import table
 from warpbrain.report.page.viewer import viewer
+from warpbrain.report.views import VIEWS
 
 #: Ground and text of each verdict's badge; the word says it too.
 _BADGES = {
@@ -40,6 +43,11 @@ _BADGES = {
     CANNOT_SAY: (QUIET, "#ffffff"),
 }
 
+#: What the standard deviation of the displacement is of.
+_KNOWN = (
+    "It is what is not known of tissue, of the case's loads and of what is named, to first order about the state with "
+    "all that is named: what is left without a name is not in it, nor the error of the mesh."
+)
 _CANDIDATES = (
     '<p class="note">d says how visible an effect of the size that was fitted is in these data, in standard deviations '
     "of noise and all that is no physics: below about 4 nothing is found. Held-out error: its change against the "
@@ -70,6 +78,7 @@ def page_of(saved: Saved) -> str:
         section("In three dimensions", _view(saved)),
         section("Candidates", _CANDIDATES, candidates_table(summary)),
         _where(saved),
+        _known(saved),
         _apart(summary),
         section("What to measure next", _next(summary)),
         section("What these data would have shown", *(smallest if summary["smallest_detectable"] else ())),
@@ -129,6 +138,14 @@ def _view(saved: Saved) -> str:
     rows = saved.rows if saved.rows is not None and _has_points(saved.rows) else None
     note = "Arrows go from the computed to the observed place."
     return viewer(view_of(saved.summary, saved.anatomy, rows), "what is left", note)
+
+
+def _known(saved: Saved) -> Section:
+    if saved.state is None or saved.anatomy is None:
+        return section("How well the displacement is known")
+    centre = centre_of(saved.summary, saved.anatomy)
+    places = [float(centre[view.axis]) for view in VIEWS]
+    return known_displacement(saved.state, saved.anatomy.mesh, places, _KNOWN)
 
 
 def _where(saved: Saved) -> Section:

@@ -17,6 +17,7 @@ from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.vtu import read_vtu
 from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.state_files import SavedState, read_state
 
 #: States of a case in the order in which they are shown, and their names for people.
 STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what is named"}
@@ -145,12 +146,15 @@ class Saved:
         None of a specimen.
     rows, curves : Rows or None
         What was recorded of a body, and of a specimen.
+    state : SavedState or None
+        The last state, as `state.vtu` has it.
     """
 
     summary: dict[str, Any]
     anatomy: Anatomy | None
     rows: Rows | None
     curves: Rows | None
+    state: SavedState | None = None
 
 
 def read_saved(folder: Path) -> Saved:
@@ -170,7 +174,13 @@ def read_saved(folder: Path) -> Saved:
         raise InputError(f"{path}: no JSON: {error}") from None
     if not (isinstance(summary, dict) and "verdict" in summary):
         raise InputError(f"{path}: verdict: missing: it is no diagnosis")
-    return Saved(summary, _anatomy(folder / "map.vtu"), _rows(folder / "points.csv"), _rows(folder / "curves.csv"))
+    return Saved(
+        summary,
+        _anatomy(folder / "map.vtu"),
+        _rows(folder / "points.csv"),
+        _rows(folder / "curves.csv"),
+        read_state(folder / "state.vtu") if (folder / "state.vtu").is_file() else None,
+    )
 
 
 def _anatomy(path: Path) -> Anatomy | None:
