@@ -44,7 +44,7 @@ def known_displacement(state: SavedState, whole: TetMesh, places: Sequence[float
         volumes = state.mesh.node_volumes
         unseen, left = (100.0 * volumes[state.trust == value].sum() / volumes.sum() for value in (UNSEEN, LEFT))
         words += (
-            f" Hatched: {TRUST[UNSEEN]} of a force there, {unseen:.0f} % of the body. Within the line: {TRUST[LEFT]}, "
+            f" Hatched: {TRUST[UNSEEN]} of a force there, {unseen:.0f} % of the body. Dotted: {TRUST[LEFT]}, "
             f"{left:.0f} % of it."
         )
     words += " With --image: displacement_sd.nii.gz" + (" and trust.nii.gz." if state.trust is not None else ".")
@@ -69,16 +69,18 @@ def _figure(state: SavedState, whole: TetMesh, places: Sequence[float], narrow: 
 
 
 def _draw_trust(axes: Any, mesh: TetMesh, trust: Ints, view: views.View, place: float) -> None:
-    """Hatch what recordings do not see, and draw a line around where they and the case disagree."""
+    """Hatch what recordings do not see; dots, and a line around them, where they and the case disagree."""
     from matplotlib.collections import LineCollection
     from matplotlib.patches import PathPatch
 
     section = cut(mesh.points, mesh.tetrahedra, (trust == LEFT).astype(np.float64), view.axis, place)
-    unseen = (trust == UNSEEN)[mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
-    if unseen.any():
-        outline = views.path_of([polygon for polygon, hidden in zip(section.polygons, unseen, strict=True) if hidden])
-        axes.add_artist(
-            PathPatch(outline, facecolor="none", edgecolor="white", hatch="//////", linewidth=0.0, zorder=2.0)
-        )
+    of_elements = mesh.tetrahedra[section.elements]
+    for value, hatch, colour in ((UNSEEN, "//////", "white"), (LEFT, "....", VERMILLION)):
+        inside = (trust == value)[of_elements].mean(axis=1) > 0.5
+        if inside.any():
+            shape = views.path_of([polygon for polygon, here in zip(section.polygons, inside, strict=True) if here])
+            axes.add_artist(
+                PathPatch(shape, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.0, zorder=2.0)
+            )
     segments = views.in_view(level_line(section, 0.5))
     axes.add_collection(LineCollection(list(segments), colors=VERMILLION, linewidths=2.2, zorder=2.5))
