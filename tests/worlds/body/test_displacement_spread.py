@@ -41,7 +41,7 @@ def test_a_larger_cause_moves_nodes_by_its_column(small_diagnosis, verify):
         "displacement of all nodes by a cause that is larger by a little, largest error",
         "equilibria with a smaller and a larger one",
         np.abs(found - expected).max() / np.abs(expected).max(),
-        0.01,
+        0.001,
     )
 
 
