@@ -104,7 +104,7 @@ def read_body(context: Context) -> tuple[float, float]:
     """Density [kg/m3] and Poisson ratio."""
     table = context.table(BODY, needed=False)
     density = float(table.get("density", _PAPERS_DENSITY))
-    if not table.has("density"):
+    if not table.has("density") and "specimen" not in context.tables:
         context.problems.remark(
             table.file,
             f"[body] density: not given: the {_PAPERS_DENSITY:g} kg/m3 of the paper's Table 4 are taken; brain has "
