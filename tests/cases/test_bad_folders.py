@@ -84,6 +84,16 @@ def test_a_mesh_in_another_unit(tmp_path, unit, factor, expected):
     assert re.search(expected, only(tmp_path))
 
 
+def test_a_density_that_is_not_given_is_said(tmp_path):
+    case = read_case(write_folder(tmp_path, ("density = 1000.0\n", "")))
+    assert case.density == 1211.5
+    [remark] = case.remarks
+    assert remark.endswith(
+        "case.toml: [body] density: not given: the 1211.5 kg/m3 of the paper's Table 4 are taken; "
+        "brain has 1040 (ICRU Report 44, 1989)"
+    )
+
+
 def test_a_density_in_another_unit(tmp_path):
     message = only(write_folder(tmp_path, ("density = 1000.0", "density = 1.04")))
     assert message == (

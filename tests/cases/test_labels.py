@@ -373,6 +373,7 @@ def test_presets_name_labels_as_the_programs_do():
     assert (names[1035], names[2004], names[12140], names[24]) == (
         *("grey matter", "white matter", "grey matter", "ignore"),
     )
+    assert (names[29], names[61], names[14120]) == ("ignore", "ignore", "white matter")
     assert preset("synthseg").names.items() <= names.items()
     assert preset("simnibs").names[2] == "grey matter"
     with pytest.raises(InputError, match="--preset: found 'itk', expected one of freesurfer, synthseg"):
@@ -392,6 +393,25 @@ def test_labels_of_a_preset_are_each_named_once():
                 first, _, last = str(label).partition("-")
                 numbers += range(int(first), int(last or first) + 1)
         assert len(numbers) == len(set(numbers)) == len(preset(name).names), name
+
+
+def test_a_range_names_the_labels_that_there_are():
+    there = {2: 1.0, 1003: 1.0, 1017: 1.0, 2035: 1.0, 3000: 1.0}
+    arguments = ["2=white,1000-2035=gray", "3000-4035 = white"]
+    assert parse_names(arguments) == {2: "white matter"}
+    assert parse_names(arguments, there) == {
+        **dict.fromkeys((2, 3000), "white matter"),
+        **dict.fromkeys((1003, 1017, 2035), "grey matter"),
+    }
+    for argument, said in (
+        ("500-510=resection", "there is no label in 500-510, but 2, 1003"),
+        ("1000-1010=grey,1003=white", "label 1003 is named twice"),
+        ("20-10=grey", "20-10=grey: the range ends before it begins"),
+        ("0-10=grey", "label 0 is always outside"),
+        ("1-2-3=grey", "expected LABEL=NAME pairs"),
+    ):
+        with pytest.raises(InputError, match=f"--tissue: {said}"):
+            parse_names([argument], there)
 
 
 @pytest.mark.parametrize(("name", "meant"), [("gry", "grey matter"), ("whit", "white matter"), ("lesoin", "lesion")])

@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -111,6 +112,7 @@ def test_what_the_load_is_too_much_for_is_said_before_it_starts(tmp_path):
     ran = ensemble(write_recorded(tmp_path / "case", SOFT, STIFF, heavy), "--samples", 2, "--out", tmp_path / "out")
     before, note, after = ran.out.partition("  note      the load may be too much for ")
     assert note and after.startswith("2 of 2 samples (0, 1): in a linear estimate it presses tissue to nothing")
+    assert re.search(r"to nothing; all bear \d\d? % of it\. They may fail", after)
     assert "workers" not in before and "workers" in after
 
 

@@ -10,7 +10,7 @@ from command import Ran, warpbrain
 from synthetic import GREY, WHITE, beads, block, truth
 
 from warpbrain.cases.writing import write_case
-from warpbrain.report.state_files import read_state
+from warpbrain.report.state_files import SEEN, UNSEEN, read_state
 
 QUICK = ("--samples", "25", "--no-causes")
 
@@ -65,17 +65,22 @@ def test_tables_files_and_figures(folder, tmp_path):
     assert len(rows) == 1 + 60 + 40
     state = read_state(out)
     assert 0.0 < state.deviation.max() < np.linalg.norm(state.u, axis=1).max()
+    # nothing is left where nothing else acts; beads are inside, and a force on the base that is held moves none
+    assert set(np.unique(state.trust)) == {SEEN, UNSEEN}
     for picture in ("posterior.png", "predicted.png", "residuals.png", "deformation.png"):
         assert (out / picture).stat().st_size > 5000
     page = (out / "report.html").read_text(encoding="utf-8")
     assert not re.findall(r'(?:src|srcset|href)="(?!data:|#)', page) and not re.search(r">(nan|None|inf)<", page)
-    assert re.findall(r"<h2>(.*?)</h2>", page)[:4] == [
+    assert re.findall(r"<h2>(.*?)</h2>", page)[:5] == [
         "Tissue",
         "What else may act",
         "What was recorded",
         "Before and after",
+        "How well the displacement is known",
     ]
-    assert re.search(r"<dt>grey, shear modulus</dt><dd>[\d.]+ Pa \(", page) and "uncertainty" in page
+    assert (
+        re.search(r"<dt>grey, shear modulus</dt><dd>[\d.]+ Pa \(", page) and "Hatched: recordings see nothing" in page
+    )
 
 
 def nothing_else_acts(printed, said):

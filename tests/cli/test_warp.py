@@ -5,6 +5,7 @@ import json
 import re
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
@@ -14,6 +15,9 @@ import pytest
 from command import run, warpbrain
 from folders import write_folder
 from landmark_files import fcsv, markup
+
+from warpbrain.report.state_files import LEFT, TRUST, UNSEEN, read_state
+from warpbrain.report.warped import read_asked, write_warped
 
 nibabel = pytest.importorskip("nibabel")
 
@@ -130,14 +134,44 @@ def test_the_scene_loads_what_is_there(folder, warped, monkeypatch):
     slicer = MagicMock()
     slicer.util.loadVolume.side_effect = lambda name: Path(name)
     monkeypatch.setitem(sys.modules, "slicer", slicer)
-    monkeypatch.setitem(sys.modules, "vtk", SimpleNamespace(vtkAssignAttribute=SimpleNamespace(POINT_DATA=0)))
+    made = {}
+    slicer.mrmlScene.AddNewNodeByClass.side_effect = lambda kind, name: made.setdefault(name, MagicMock())
+    vtk = SimpleNamespace(vtkAssignAttribute=SimpleNamespace(POINT_DATA=0), vtkVector3d=lambda x, y, z: [x, y, z])
+    monkeypatch.setitem(sys.modules, "vtk", vtk)
     runpy.run_path(str(warped / "load_in_slicer.py"))
     calls = {
         name: [Path(call.args[0]) for call in getattr(slicer.util, name).call_args_list]
         for name in ("loadVolume", "loadLabelVolume", "loadModel", "loadMarkups", "loadTransform")
     }
-    assert [len(paths) for paths in calls.values()] == [2, 1, 2, 2, 1]
+    assert [len(paths) for paths in calls.values()] == [2, 1, 2, 4, 1]
     assert all(path.is_file() for paths in calls.values() for path in paths)
+    # electrodes.tsv is no format of Slicer: its points are made, before and after
+    _, before, after = moved_of(warped)
+    for when, expected in (("before", before[-1]), ("after", after[-1])):
+        ((position, label),) = (c.args for c in made[f"sub-1_electrodes.tsv {when}"].AddControlPoint.call_args_list)
+        assert label == "LA1"
+        np.testing.assert_allclose(position, expected)
+
+
+def test_the_scene_loads_maps_of_where_not_to_believe_it(folder, warped, tmp_path, monkeypatch):
+    state = read_state(warped)
+    trust = np.where(state.mesh.points[:, 2] > 0.015, LEFT, UNSEEN)
+    known = replace(state, deviation=np.full(len(trust), 1e-4), trust=trust)
+    asked = read_asked(folder / "T1.nii.gz", None, [])
+    lines, files = write_warped(tmp_path, known, asked)
+    assert {"displacement_sd.nii.gz", "trust.nii.gz"} <= set(files)
+    assert any("standard deviation of the displacement: up to 0.1 mm" in line for line in lines)
+    volume = np.asarray(nibabel.load(tmp_path / "trust.nii.gz").dataobj)
+    assert set(np.unique(volume)) == {0, UNSEEN, LEFT}
+    slicer = MagicMock()
+    monkeypatch.setitem(sys.modules, "slicer", slicer)
+    monkeypatch.setitem(sys.modules, "vtk", MagicMock())
+    runpy.run_path(str(tmp_path / "load_in_slicer.py"))
+    volumes = [Path(call.args[0]).name for call in slicer.util.loadVolume.call_args_list]
+    assert volumes == ["displacement_sd.nii.gz", "T1.nii.gz", "T1-after.nii.gz"]
+    table = slicer.mrmlScene.AddNewNodeByClass.return_value
+    assert [call.args[0] for call in table.SetColor.call_args_list] == [0, *TRUST]
+    assert table.SetColor.call_args_list[-1].args[1] == TRUST[LEFT]
 
 
 def test_labels_may_have_the_name_of_a_transform(folder, warped, tmp_path):

@@ -6,7 +6,7 @@ import pytest
 from folders import write_folder
 
 from warpbrain.cases.reading import read_case
-from warpbrain.ensemble.bearing import least_stretch, overloaded
+from warpbrain.ensemble.bearing import Overload, least_stretch, overloaded
 from warpbrain.ensemble.sample import Sample
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material
@@ -39,4 +39,10 @@ def test_bisection_finds_what_one_by_one_finds(model):
         if sample.materials is not None and least_stretch(replace(model, materials=sample.materials), "cpu") <= 0.0
     ]
     assert 0 < len(each) < 7
-    assert overloaded(model, samples, "cpu") == each
+    load = overloaded(model, samples, "cpu")
+    assert list(load.numbers) == each
+    # under that part of the load, as with tissue as much stiffer, the softest is just pressed to nothing
+    softest = of(*(mu / load.share for mu in moduli[2]))
+    assert 0.0 < load.share < 1.0
+    assert least_stretch(replace(model, materials=softest), "cpu") == pytest.approx(0.0, abs=0.03)
+    assert overloaded(model, samples[-2:], "cpu") == Overload((), 1.0)

@@ -112,12 +112,13 @@ def start_from_labels(
     _check_folder(folder, overwrite)
     if size is not None and not 0 < size < np.inf:
         raise InputError(f"--size: found {size:g}, expected a positive length [mm]")
-    chosen = parse_names(names)
+    parse_names(names)  # what is wrong with them is known before anything is read
     usual = Preset({}, {}) if program is None else preset(program)
     require_extra(("mmgpy", "nibabel", "scipy", "meshio"))
     progress(f"reading {labels}")
     image = read_labels(labels)
     volumes = image.volumes()
+    chosen = parse_names(names, volumes)
     for label in sorted(usual.unsure.keys() & volumes.keys() - chosen.keys()):
         raise InputError(f"{labels}: label {label}: {usual.unsure[label]}: say which with --tissue {label}=NAME")
     known = {label: name for label, name in usual.names.items() if label in volumes}
@@ -189,7 +190,7 @@ def start_from_mesh(
         If the folder is not empty or the mesh cannot be used; nothing is written then.
     """
     _check_folder(folder, overwrite)
-    given = parse_names(names)
+    parse_names(names)  # what is wrong with them is known before anything is read
     named = read_regions(file, frame.unit, array)
     raw = named.mesh
     check_volume_in(f"{file}: the mesh", raw.volume, frame.unit)
@@ -199,6 +200,7 @@ def start_from_mesh(
     numbers = np.unique(raw.tissue).tolist()
     if numbers[0] < 0:
         raise BuildError(f"{file}: expected tissue labels of 0 or more, found {numbers[0]}")
+    given = parse_names(names, numbers)
     if absent := [str(label) for label in given if label not in numbers]:
         raise InputError(f"--tissue: the mesh has no tissue {', '.join(absent)}; it has {', '.join(map(str, numbers))}")
     called = _names_in(file, named.names, given)

@@ -71,6 +71,7 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.report.diagnosis.page import write_page
     from warpbrain.report.diagnosis.text import diagnosis_lines
     from warpbrain.report.files import write_summary
+    from warpbrain.report.state_files import read_state
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.quiet import start_warp_quietly
     from warpbrain.terminal.result_folder import choose_folder, results_in
@@ -106,7 +107,8 @@ def _run(options: argparse.Namespace) -> None:
             record.files.append("explained")
         # after all that it speaks of: whoever finds it finds the others
         write_summary(out / "diagnosis.json", said)
-        write_page(out / "report.html", found, said)
+        state = None if case.specimen is not None else read_state(out / "state.vtu")
+        write_page(out / "report.html", found, said, state)
         if images is not None:
             record.files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
         say("", f"written to {out}: {', '.join(record.files)}", sep="\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -238,12 +239,15 @@ def _warn(model: Model, samples: list[Sample], options: argparse.Namespace, say:
     from warpbrain.ensemble.bearing import overloaded
 
     device = None if options.dask is not None else options.device
-    soft = overloaded(model, samples, device)
+    load = overloaded(model, samples, device)
+    soft = load.numbers
     if soft:
         which = ", ".join(str(number) for number in soft[:_NAMED]) + (", ..." if len(soft) > _NAMED else "")
+        borne = f"; all bear {100.0 * load.share:.2g} % of it" if math.isfinite(load.share) else ""
         say(
             f"  note      the load may be too much for {len(soft)} of {len(samples)} samples ({which}): in a linear "
-            "estimate it presses tissue to nothing. They may fail; percentiles are then of the rest (docs/ensembles.md)"
+            f"estimate it presses tissue to nothing{borne}. They may fail; percentiles are then of the rest "
+            "(docs/ensembles.md)"
         )
 
 

@@ -15,6 +15,7 @@ from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
+    from warpbrain.diagnosis.locating import ScoreMap
     from warpbrain.estimation.options import EstimationOptions
     from warpbrain.estimation.posterior import Posterior
     from warpbrain.recordings.registration import Registration
@@ -187,16 +188,16 @@ def _estimate(
         posterior = Estimation(case, model, settings, options.device, listener).run()
     finally:
         progress.clear()
-    averaged = None
+    averaged = where = None
     if options.causes or (options.causes is None and len(case.mesh.points) <= _LARGEST):
-        averaged = _averaged(posterior, options.device, on_stage)
+        averaged, where = _what_else(posterior, options.device, on_stage)
     elif options.causes is None:
         say("", f"what else may act is left out on more than {_LARGEST} nodes; --causes computes it", sep="\n")
     say("", *estimate_lines(posterior, averaged), sep="\n")
     described = describe_estimate(posterior, find_device(options.device).alias, averaged)
     with results_in(out, record, options.overwrite):
         write_predictions(out / "predictions.csv", posterior)
-        write_estimated_state(out / "state.vtu", posterior)
+        write_estimated_state(out / "state.vtu", posterior, where)
         estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)
         estimate_picture.write_observed_against_predicted(out / "predicted.png", posterior)
         estimate_picture.write_residuals(out / "residuals.png", posterior)
@@ -227,20 +228,27 @@ def _illustrate(out: Path, posterior: Posterior, said: dict[str, Any], say: Call
     return ["deformation.png", "report.html"]
 
 
-def _averaged(posterior: Posterior, device: str | None, on_stage: Callable[[str], None]) -> AveragedTissue | None:
-    """Tissue averaged over what may act; None if that cannot be known of this case, which is said."""
+def _what_else(
+    posterior: Posterior, device: str | None, on_stage: Callable[[str], None]
+) -> tuple[AveragedTissue | None, ScoreMap | None]:
+    """Tissue averaged over what may act, and where something is left; None if that cannot be known, which is said."""
+    import numpy as np
     from numpy.linalg import LinAlgError
 
+    from warpbrain.diagnosis.locating import map_of_search
+    from warpbrain.diagnosis.options import DiagnosisOptions
     from warpbrain.worlds.body.averaged_tissue import averaged_tissue
     from warpbrain.worlds.body.screened import screened
     from warpbrain.worlds.listener import Listener
 
     prior, mesh_error = posterior.best.problem.mode.gaussian, posterior.options.discretisation is not None
     try:
-        return averaged_tissue(screened(posterior.case, device, Listener(on_stage), prior, mesh_error=mesh_error))
+        search = screened(posterior.case, device, Listener(on_stage), prior, mesh_error=mesh_error)
+        where = map_of_search(search, DiagnosisOptions().draws, np.random.default_rng(posterior.options.seed))
+        return averaged_tissue(search), where
     except (InputError, SolveError, LinAlgError) as error:
         on_stage(f"what else may act is not known: {error}")
-        return None
+        return None, None
 
 
 def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:

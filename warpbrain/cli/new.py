@@ -27,7 +27,8 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
         action="extend",
         default=[],
         metavar="LABEL=NAME",
-        help="what each label is, such as 2=white,3=grey,4=ventricle; 'ventricle' is an open cavity, 'ignore' outside",
+        help="what each label is, such as 2=white,3=grey,4=ventricle or a range, 1000-2035=grey; "
+        "'ventricle' is an open cavity, 'ignore' outside",
     )
     labels = parser.add_argument_group("with --labels")
     labels.add_argument(

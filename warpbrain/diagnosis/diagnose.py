@@ -12,7 +12,7 @@ from warpbrain.diagnosis.checking import check_errors
 from warpbrain.diagnosis.confirming import Confirming, HeldOutErrors
 from warpbrain.diagnosis.course import size_over_time
 from warpbrain.diagnosis.held_out import distance
-from warpbrain.diagnosis.locating import ScoreMap, score_map
+from warpbrain.diagnosis.locating import ScoreMap, map_of_search
 from warpbrain.diagnosis.measuring import next_measurements
 from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of
 from warpbrain.diagnosis.ranking import Ranking, about_base
@@ -50,8 +50,6 @@ from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 _LISTED = 20
 #: Why a cause was not weighed.
 _INVISIBLE = "nothing that was recorded would tell of it, however large it were"
-#: Size of a patch of the map, in spacings of the scan.
-_PATCH = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +120,6 @@ class Diagnosing:
             mechanisms=options.candidates,
             timed=self.seconds.of,
         )
-        spacing = search.spacing
         confirming = Confirming(search, options.draws, random)
         nothing = search.nothing
         with self.seconds.of("significance"):
@@ -142,13 +139,11 @@ class Diagnosing:
             ranking = Ranking(search, confirming)
             ranked = ranking.all()
         with self.seconds.of("where"):
-            model, residual = nothing.marginal.model, nothing.residual
-            draws = model.draws(options.draws, random)
-            where = score_map(search.base.at, model, residual, draws, _PATCH * spacing, spacing, options.alpha)
+            where = map_of_search(search, options.draws, random, options.alpha)
             unknown = self._traits(checked.decision, search, best, where)
         with self.seconds.of("what would be seen"):
-            confusion = imitations(search.causes, model)
-            seen = smallest(search.causes, model, confusion)
+            confusion = imitations(search.causes, nothing.marginal.model)
+            seen = smallest(search.causes, nothing.marginal.model, confusion)
         self.listener.stage("what to measure next")
         with self.seconds.of("next measurement"):
             measurements = _next(search, ranked)

@@ -16,8 +16,12 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.unknown import force_patches
+
+#: Size of a patch of the map, in spacings of the scan.
+_PATCH = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +91,24 @@ def ball_of(sites: Floats, weights: Floats) -> tuple[Floats, float]:
     order = np.argsort(apart)
     at = min(int(np.searchsorted(np.cumsum(weights[order]), 0.9 * weights.sum())), len(order) - 1)
     return centre, float(apart[order][at])
+
+
+def map_of_search(search: HypothesisSearch, draws: int, random: np.random.Generator, alpha: float = 0.05) -> ScoreMap:
+    """The map of what is left of the recordings of a case if nothing acts but what it declares, its tissue fitted.
+
+    Parameters
+    ----------
+    search : HypothesisSearch
+    draws : int
+        Of recordings if nothing else acts.
+    random : Generator
+    alpha : float
+    """
+    nothing = search.nothing
+    model = nothing.marginal.model
+    rows = model.draws(draws, random)
+    length = _PATCH * search.spacing
+    return score_map(search.base.at, model, nothing.residual, rows, length, search.spacing, alpha)
 
 
 def score_map(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,30 +35,50 @@ def least_stretch(model: Model, device: str | None = None) -> float:
     return float(np.linalg.eigvalsh(0.5 * (F + F.transpose(0, 2, 1))).min())
 
 
-def overloaded(model: Model, samples: Sequence[Sample], device: str | None = None) -> list[int]:
-    """Numbers of the samples that are too soft for the load, by `least_stretch`.
+@dataclass(frozen=True)
+class Overload:
+    """Samples that are too soft for the load, by `least_stretch`.
+
+    Attributes
+    ----------
+    numbers : tuple of int
+    share : float
+        Part of the load that leaves some tissue of every element of the softest one, in that estimate; 1 if none is
+        too soft, nan if it has no linear estimate.
+    """
+
+    numbers: tuple[int, ...]
+    share: float
+
+
+def overloaded(model: Model, samples: Sequence[Sample], device: str | None = None) -> Overload:
+    """Samples that are too soft for the load, and what part of it all of them bear.
 
     Samples are taken in the order of their stiffness and the first that bears the load is found by bisection: a few
     linear solves, however many samples there are.
 
     Raises
     ------
-    InputError, SolveError
+    InputError
         As `least_stretch`.
     """
     known = [(_stiffness(sample), sample) for sample in samples if sample.materials is not None]
     ordered = [sample for _, sample in sorted(known, key=lambda one: one[0])]
+
+    def stretch_of(sample: Sample) -> float:
+        assert sample.materials is not None
+        try:
+            return least_stretch(replace(model, materials=sample.materials), device)
+        except SolveError:
+            return float("nan")
+
     first, last = 0, len(ordered)
     while first < last:
         middle = (first + last) // 2
-        materials = ordered[middle].materials
-        assert materials is not None
-        try:
-            bears = least_stretch(replace(model, materials=materials), device) > 0.0
-        except SolveError:
-            bears = False
-        first, last = (first, middle) if bears else (middle + 1, last)
-    return sorted(sample.number for sample in ordered[:first])
+        first, last = (first, middle) if stretch_of(ordered[middle]) > 0.0 else (middle + 1, last)
+    # the stretch is one less what grows with the load
+    share = 1.0 / (1.0 - stretch_of(ordered[0])) if first else 1.0
+    return Overload(tuple(sorted(sample.number for sample in ordered[:first])), share)
 
 
 def _stiffness(sample: Sample) -> float:

@@ -17,6 +17,7 @@ from warpbrain.report.page.document import Section, section, text
 from warpbrain.report.page.scene import Arrows, Field, View
 from warpbrain.report.page.viewer import viewer
 from warpbrain.report.picture import Moved, Pictures, annotations_of, arrow_colours, heading, round_factor
+from warpbrain.report.state_files import LEFT, SavedState
 from warpbrain.report.views import RESECTED, tissue_colours
 
 #: A large displacement is shown this long in a view, as a part of the size of the body.
@@ -92,6 +93,19 @@ def _data(image: Any) -> str:
     stream = io.BytesIO()
     Image.fromarray(image).save(stream, format="JPEG", quality=90, subsampling=0)
     return f"data:image/jpeg;base64,{base64.b64encode(stream.getvalue()).decode()}"
+
+
+def fields_of(state: SavedState) -> list[Field]:
+    """What is known of a displacement at each place, as far as the result knows it."""
+    fields = []
+    if state.deviation is not None:
+        known = MILLIMETRES * state.deviation
+        highest = float(known.max()) or 1.0
+        fields.append(Field("standard deviation", "standard deviation of the displacement [mm]", known, 0.0, highest))
+    if state.trust is not None:
+        label = "1: recordings see it, 2: they do not, 3: something is left there"
+        fields.append(Field("trust", label, state.trust.astype(np.float64), 1.0, float(LEFT)))
+    return fields
 
 
 def in_three_dimensions(

@@ -12,13 +12,12 @@ from warpbrain.estimation.posterior import Posterior
 from warpbrain.inference.probability import percent
 from warpbrain.recordings.recording import PointsRecording
 from warpbrain.report import views
-from warpbrain.report.body_sections import before_and_after, in_three_dimensions
+from warpbrain.report.body_sections import before_and_after, fields_of, in_three_dimensions
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure
 from warpbrain.report.explained import Explained, explained, number
-from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.known_displacement import known_displacement
 from warpbrain.report.page.document import Section, document, header, listed, section, text, write_document
 from warpbrain.report.page.figures import inlined
-from warpbrain.report.page.scene import Field
 from warpbrain.report.page.tables import table
 from warpbrain.report.picture import Moved, Pictures
 from warpbrain.report.run_page import BADGES, remarks, versions
@@ -28,6 +27,11 @@ from warpbrain.simulation.of_case import model_of
 
 #: Causes that are less probable are not listed.
 _LIKELY = 0.01
+#: What the standard deviation of the displacement is of.
+_KNOWN = (
+    "It is what is not known of the tissue, to first order about this state: what else may act is not in it, nor the "
+    "error of the mesh."
+)
 _METHODS = {"laplace": "Laplace's approximation", "chain": "a Markov chain"}
 
 
@@ -69,9 +73,6 @@ def write_estimate_page(
     """
     case, judged = said["case"], judged_of(said)
     whole = posterior.case.mesh
-    known = MILLIMETRES * (np.zeros(len(state.u)) if state.deviation is None else state.deviation)
-    fields = [Field("uncertainty", "standard deviation of the displacement [mm]", known, 0.0,
-                    float(known.max()) or 1.0, None, "that of the tissue, to first order")]  # fmt: skip
     drawn = None if isinstance(pictures, str) else pictures
     places = views.places(whole, views.resected_elements(whole))
     sections = [
@@ -79,7 +80,8 @@ def write_estimate_page(
         section("What else may act", _causes(said)),
         _recordings(said, posterior),
         before_and_after(drawn, pictures if isinstance(pictures, str) else ""),
-        in_three_dimensions(state.mesh, state.u, fields, moved_of(posterior), places),
+        known_displacement(state, whole, places, _KNOWN),
+        in_three_dimensions(state.mesh, state.u, fields_of(state), moved_of(posterior), places),
         section("What the model leaves out", listed(left_out(model_of(posterior.case)))),
         _doubts(said),
         section("What was assumed", listed(case["assumptions"]), _prior(said)),

@@ -5,68 +5,110 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
 
 from warpbrain.atomic import whole_file
+from warpbrain.images.moving_points import PointFile
 from warpbrain.images.reading import Image
 from warpbrain.mesh.vtu import write_vtu
+from warpbrain.recordings.electrodes import is_electrodes
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.state_files import SavedState
+from warpbrain.report.state_files import LEFT, SEEN, TRUST, UNSEEN, SavedState
 
 #: Names of the transforms: what they do to an image.
 FORTH, BACK = "transform-before-to-after.nii.gz", "transform-after-to-before.nii.gz"
+#: Maps of where not to believe the displacement.
+DEVIATION, TRUST_MAP = "displacement_sd.nii.gz", "trust.nii.gz"
 SCRIPT = "load_in_slicer.py"
 SURFACES = ("surface-before.vtu", "surface-after.vtu")
+#: Red, green and blue of what `trust.nii.gz` says.
+_COLOURS = {SEEN: (0.0, 0.62, 0.45), UNSEEN: (0.6, 0.6, 0.6), LEFT: (0.84, 0.37, 0.0)}
 
-_TEXT = '''\
+_TEXT = Template('''\
 """Loads a result of warpbrain into 3D Slicer. In its Python console:
 
-    exec(open("{path}", encoding="utf-8").read())
+    exec(open("$path", encoding="utf-8").read())
 """
 
+import csv
 import os
 
 import slicer
 import vtk
 
 # the folder of the files, if they were moved since they were written
-FOLDER = globals().get("WARPBRAIN_FOLDER", {folder})
-VOLUMES = {volumes}
-LABELS = {labels}
-SURFACES = {surfaces}
-POINTS = {points}
-TRANSFORM = {transform}
+FOLDER = globals().get("WARPBRAIN_FOLDER", $folder)
+VOLUMES = $volumes
+LABELS = $labels
+DEVIATION = $deviation
+TRUST = $trust
+SURFACES = $surfaces
+MARKUPS = $markups
+ELECTRODES = $electrodes
+TRANSFORM = $transform
 # the largest displacement [mm]
-LARGEST = {largest}
+LARGEST = $largest
+BEFORE, AFTER = (0.0, 0.6, 0.9), (1.0, 0.5, 0.0)
+VIRIDIS = "vtkMRMLColorTableNodeFileViridis.txt"
 
 
 def place(name):
     return name if os.path.isabs(name) else os.path.join(FOLDER, name)
 
 
+def coloured(nodes, colour):
+    # a file may hold several markups
+    for node in nodes if isinstance(nodes, (list, tuple)) else [nodes]:
+        node.CreateDefaultDisplayNodes()
+        node.GetDisplayNode().SetSelectedColor(*colour)
+
+
+# what is loaded last is shown: the images
+for name in DEVIATION:
+    slicer.util.loadVolume(place(name)).GetDisplayNode().SetAndObserveColorNodeID(VIRIDIS)
 volumes = [slicer.util.loadVolume(place(name)) for name in VOLUMES]
 for name in LABELS:
     slicer.util.loadLabelVolume(place(name))
+for name, meanings in TRUST:
+    table = slicer.mrmlScene.AddNewNodeByClass("vtkMRMLColorTableNode", "trust")
+    table.SetTypeToUser()
+    table.SetNumberOfColors(1 + len(meanings))
+    table.SetColor(0, "outside of the body", 0.0, 0.0, 0.0, 0.0)
+    for value, meaning, red, green, blue in meanings:
+        table.SetColor(value, meaning, red, green, blue, 1.0)
+    slicer.util.loadLabelVolume(place(name)).GetDisplayNode().SetAndObserveColorNodeID(table.GetID())
 for name, opacity in SURFACES:
     model = slicer.util.loadModel(place(name))
     display = model.GetDisplayNode()
     display.SetActiveScalar("displacement_size", vtk.vtkAssignAttribute.POINT_DATA)
-    display.SetAndObserveColorNodeID("vtkMRMLColorTableNodeFileViridis.txt")
+    display.SetAndObserveColorNodeID(VIRIDIS)
     display.SetScalarVisibility(True)
     display.SetScalarRangeFlag(slicer.vtkMRMLDisplayNode.UseManualScalarRange)
     display.SetScalarRange(0.0, LARGEST)
     display.SetOpacity(opacity)
     display.SetVisibility2D(True)
-for name, colour in POINTS:
-    slicer.util.loadMarkups(place(name)).GetDisplayNode().SetSelectedColor(*colour)
+for before, after in MARKUPS:
+    coloured(slicer.util.loadMarkups(place(before)), BEFORE)
+    coloured(slicer.util.loadMarkups(place(after)), AFTER)
+# Slicer reads no electrodes.tsv: their places are in moved.csv
+for name in ELECTRODES:
+    with open(place("moved.csv"), newline="", encoding="utf-8") as stream:
+        rows = [row for row in csv.DictReader(stream) if row["file"] == name]
+    for prefix, when, colour in (("", "before", BEFORE), ("moved_", "after", AFTER)):
+        points = slicer.mrmlScene.AddNewNodeByClass("vtkMRMLMarkupsFiducialNode", name + " " + when)
+        for row in rows:
+            position = [float(row[prefix + axis + "_mm"]) for axis in "xyz"]
+            points.AddControlPoint(vtk.vtkVector3d(*position), row["label"])
+        coloured(points, colour)
 # moves volumes, models and points alike from before to after, once they are put under it
 slicer.util.loadTransform(place(TRANSFORM))
 if len(volumes) > 1:
     slicer.util.setSliceViewerLayers(background=volumes[0], foreground=volumes[1], foregroundOpacity=0.5)
 slicer.util.resetThreeDViews()
-'''
+''')
 
 
 def write_slicer_scene(
@@ -75,6 +117,7 @@ def write_slicer_scene(
     image: Image | None,
     image_after: str | None,
     labels_after: str | None,
+    points: Sequence[PointFile],
     files: Sequence[str],
 ) -> list[str]:
     """Write the surfaces and the script beside files that are there already.
@@ -87,6 +130,8 @@ def write_slicer_scene(
         Before.
     image_after, labels_after : str or None
         Names of the files of the warped image and labels.
+    points : sequence of PointFile
+        Before.
     files : sequence of str
         Names of all files.
 
@@ -99,18 +144,27 @@ def write_slicer_scene(
     faces = state.mesh.boundary
     nodes, numbers = np.unique(faces, return_inverse=True)
     for name, moved in zip(SURFACES, (0.0, 1.0), strict=True):
-        points = MILLIMETRES * (state.mesh.points + moved * state.u)[nodes]
-        _write_surface(folder / name, points, numbers.reshape(-1, 3), size[nodes])
-    points_after = [name for name in files if name.lower().endswith(("-after.mrk.json", "-after.json", "-after.fcsv"))]
+        corners = MILLIMETRES * (state.mesh.points + moved * state.u)[nodes]
+        _write_surface(folder / name, corners, numbers.reshape(-1, 3), size[nodes])
     volumes = [] if image is None else [image.path.resolve().as_posix()]
     volumes += [] if image_after is None else [image_after]
-    script = _TEXT.format(
+    markups = [file for file in points if not is_electrodes(file.path)]
+    script = _TEXT.substitute(
         path=(folder / SCRIPT).resolve().as_posix(),
         folder=json.dumps(folder.resolve().as_posix()),
         volumes=json.dumps([name for name in volumes if not name.lower().endswith((".mgz", ".mgh"))]),
-        labels=json.dumps([name for name in (labels_after, "trust.nii.gz") if name in files]),
+        labels=json.dumps([] if labels_after is None else [labels_after]),
+        deviation=json.dumps([name for name in files if name == DEVIATION]),
+        trust=json.dumps(
+            [
+                [name, [[value, meaning, *_COLOURS[value]] for value, meaning in TRUST.items()]]
+                for name in files
+                if name == TRUST_MAP
+            ]
+        ),
         surfaces=json.dumps([[SURFACES[0], 0.3], [SURFACES[1], 1.0]]),
-        points=json.dumps([[name, [1.0, 0.5, 0.0]] for name in points_after]),
+        markups=json.dumps([[file.path.resolve().as_posix(), file.moved_name] for file in markups]),
+        electrodes=json.dumps([file.path.name for file in points if is_electrodes(file.path)]),
         transform=json.dumps(FORTH),
         largest=json.dumps(max(float(size.max()), 1e-6)),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,19 +12,26 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.atomic import whole_file
+from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.patience import patience
 from warpbrain.mesh.vtu import read_vtu, write_vtu
 from warpbrain.report.files import MIDDLES, MILLIMETRES
+from warpbrain.worlds.body.displacement_spread import displacement_deviation
 
 #: Files that hold a deformed body, in the order in which they are looked for: of `run`, of `estimate` and `diagnose`,
 #: and of `ensemble`.
 FILES = ("result.vtu", "state.vtu", "fields.vtu")
 #: What is known of a place in the body, as `trust` says it; zero is outside of it.
 SEEN, UNSEEN, LEFT = 1, 2, 3
+TRUST = {
+    SEEN: "recordings see a force, and nothing is left",
+    UNSEEN: "recordings see nothing",
+    LEFT: "recordings and the declared case disagree",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,13 +118,16 @@ def _trust(at: Mapping[str, Floats]) -> Ints | None:
     return np.where(at["significant"] > 0.0, LEFT, seen)
 
 
-def write_estimated_state(path: Path, posterior: Posterior) -> None:
+def write_estimated_state(path: Path, posterior: Posterior, where: ScoreMap | None = None) -> None:
     """Write the most probable state of an estimate as VTU with coordinates in mm.
 
     Point arrays: ``displacement`` [mm] and ``displacement_sd`` of its components [mm]: what is not known of the tissue,
-    to first order about that state.
+    to first order about that state. With a map of what is left ``significant`` and ``blind``, too, as in `map.vtu`.
     """
-    _write(path, file_of_estimate(posterior))
+    file = file_of_estimate(posterior)
+    if where is not None:
+        file.point_data |= _seen(where, posterior.case.remaining[0])
+    _write(path, file)
 
 
 def file_of_estimate(posterior: Posterior) -> Any:
@@ -135,20 +146,28 @@ def file_of_estimate(posterior: Posterior) -> Any:
 def write_diagnosed_state(path: Path, diagnosis: Diagnosis) -> None:
     """Write the last state of a diagnosis, with all that is named, as VTU with coordinates in mm.
 
-    Point arrays: ``displacement`` [mm], ``significant`` and ``blind`` as in `map.vtu`.
+    Point arrays: ``displacement`` [mm], ``displacement_sd`` of its components [mm] as of `displacement_deviation`,
+    where that state can be linearised, ``significant`` and ``blind`` as in `map.vtu`.
     """
-    from scipy.spatial import cKDTree
-
-    where, refit = diagnosis.map, diagnosis.best.refit
+    refit = diagnosis.best.refit
     state = diagnosis.base.at if refit is None else refit.state
     mesh = state.system.model.mesh
+    arrays = {"displacement": MILLIMETRES * state.u, **_seen(diagnosis.map, mesh)}
+    # a state at the edge of what is stable has an equilibrium, and none beside it
+    with contextlib.suppress(SolveError):
+        arrays["displacement_sd"] = MILLIMETRES * displacement_deviation(diagnosis.best, diagnosis.base)
+    _write(path, _file(mesh, arrays))
+
+
+def _seen(where: ScoreMap, mesh: TetMesh) -> dict[str, Any]:
+    """What the map says at each node: whether what is left is significant, and whether recordings see no force."""
+    from scipy.spatial import cKDTree
+
     nearest = cKDTree(where.sites).query(mesh.points)[1]
-    arrays = {
-        "displacement": MILLIMETRES * state.u,
+    return {
         "significant": (where.scores[nearest] > where.threshold).astype(np.uint8),
         "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
     }
-    _write(path, _file(mesh, arrays))
 
 
 def _file(mesh: TetMesh, arrays: dict[str, Any]) -> Any:

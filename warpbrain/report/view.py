@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from warpbrain.report import views
-from warpbrain.report.body_sections import in_three_dimensions
+from warpbrain.report.body_sections import fields_of, in_three_dimensions
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.generative.page import QUIET
 from warpbrain.report.page.document import document, header, write_document
-from warpbrain.report.page.scene import Field
 from warpbrain.report.picture import Moved, scene_of
-from warpbrain.report.state_files import LEFT, SavedState
+from warpbrain.report.state_files import SavedState
 
 _NO_POINTS = Moved(*np.zeros((3, 0, 3)))
 
@@ -34,16 +33,8 @@ def window(state: SavedState, exaggeration: float | None, off_screen: bool) -> A
 
 def write_view_page(path: Path, state: SavedState, exaggeration: float | None) -> None:
     """Write the body as one HTML file; `exaggeration` is chosen if it is None."""
-    fields = []
-    if state.deviation is not None:
-        known = MILLIMETRES * state.deviation
-        highest = float(known.max()) or 1.0
-        fields.append(Field("standard deviation", "standard deviation of the displacement [mm]", known, 0.0, highest))
-    if state.trust is not None:
-        label = "1: recordings see it, 2: they do not, 3: something is left there"
-        fields.append(Field("trust", label, state.trust.astype(np.float64), 1.0, float(LEFT)))
     places = views.places(state.mesh, views.resected_elements(state.mesh))
-    body = in_three_dimensions(state.mesh, state.u, fields, _NO_POINTS, places, exaggeration)
+    body = in_three_dimensions(state.mesh, state.u, fields_of(state), _NO_POINTS, places, exaggeration)
     largest = MILLIMETRES * float(np.linalg.norm(state.u, axis=1).max())
     facts = [("largest displacement", f"{largest:.3g} mm"), ("nodes", f"{len(state.mesh.points)}")]
     top = header(str(state.path), "a deformed body", [], facts)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,14 +19,23 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.atomic import whole_file
-from warpbrain.mesh import TetMesh
+from warpbrain.mesh import TetMesh, boundary_faces
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.slices import Cut, outline
+from warpbrain.report.slices import Cut, cut, outline
 
 Ints = NDArray[np.int32]
 
-#: Of tissue in pictures: that of its name; other names have the remaining ones in the order of their numbers.
-COLOUR_OF = {"grey matter": "#b9aea6", "white matter": "#efe8df"}
+#: Of tissue in pictures: that of its name; names that the presets of labels do not give have the remaining ones, in the
+#: order of their numbers.
+COLOUR_OF = {
+    "grey matter": "#b9aea6",
+    "white matter": "#efe8df",
+    "brain stem": "#d3b8a8",
+    "lesion": "#b5651d",
+    "tumour core": "#7b4b94",
+    "enhancing tumour": "#4b2a63",
+    "oedema": "#8fb3c9",
+}
 TISSUE_COLOURS = ("#b9aea6", "#efe8df", "#d3b8a8", "#c9d3c0", "#c5c3d8", "#d9cfa8")
 RESECTED = "#d9483b"
 TISSUE_EDGE = "#4d4640"
@@ -75,6 +84,13 @@ def in_view(coordinates: Floats) -> Floats:
     return np.array(coordinates) * (-MILLIMETRES, MILLIMETRES)
 
 
+def path_of(polygons: Sequence[Floats]) -> Any:
+    """Polygons of a cut as one path of a picture."""
+    from matplotlib.path import Path
+
+    return Path.make_compound_path(*(Path(in_view(p), closed=False) for p in polygons))
+
+
 def scale_length(mesh: TetMesh) -> float:
     """Length of the scale bar [mm]: 1, 2 or 5 and zeros, 20 for a brain."""
     sixth = MILLIMETRES * float(np.ptp(mesh.points, axis=0).max()) / 6.0
@@ -111,6 +127,20 @@ def draw_tissue(axes: Any, section: Cut, colours: NDArray[np.str_], rim: float =
     shown = colours[section.elements].tolist()
     polygons = [in_view(p) for p in section.polygons]
     axes.add_collection(PolyCollection(polygons, facecolors=shown, edgecolors=shown, linewidths=rim))
+
+
+def draw_values(axes: Any, mesh: TetMesh, values: Floats, view: View, place: float, top: float) -> Any:
+    """Draw a framed cut coloured by nodal values (n,), from 0 to `top`; returns what a colour bar is made of."""
+    from matplotlib.collections import PolyCollection
+
+    section = cut(mesh.points, mesh.tetrahedra, values, view.axis, place)
+    polygons = [in_view(p) for p in section.polygons]
+    drawn = PolyCollection(polygons, array=section.values, cmap="viridis", edgecolors="face", linewidths=0.4)
+    drawn.set_clim(0.0, top)
+    axes.add_collection(drawn)
+    draw_outline(axes, boundary_faces(mesh.tetrahedra), mesh.points, view, place)
+    frame(axes, mesh, view)
+    return drawn
 
 
 def draw_outline(

@@ -21,8 +21,8 @@ from warpbrain.images.resampling import resampled
 from warpbrain.images.writing import write_displacement, write_transform, write_volume
 from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.slicer import BACK, FORTH, write_slicer_scene
-from warpbrain.report.state_files import LEFT, SEEN, UNSEEN, SavedState
+from warpbrain.report.slicer import BACK, DEVIATION, FORTH, TRUST_MAP, write_slicer_scene
+from warpbrain.report.state_files import LEFT, TRUST, SavedState
 
 #: Edges of voxels, and how far they reach beyond the body, where there is no image [mm].
 _SPACING, _MARGIN = 2.0, 40.0
@@ -37,12 +37,6 @@ _INSIDE = 0.5
 _CUT_OFF = 0.001
 #: From which on it is said that a point and the transform of the voxels disagree [mm].
 _APART = 0.05
-#: What the values of `trust.nii.gz` mean.
-TRUST = {
-    SEEN: "recordings see a force, and nothing is left",
-    UNSEEN: "recordings see nothing",
-    LEFT: "recordings and the declared case disagree",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +136,7 @@ def write_warped(
     if moved:
         files += write_moved(folder, moved)
     image_after, labels_after = (None if each is None else _after(each.path) for each in (asked.image, asked.labels))
-    files += write_slicer_scene(folder, state, asked.image, image_after, labels_after, files)
+    files += write_slicer_scene(folder, state, asked.image, image_after, labels_after, asked.points, files)
     said = [*_lines(asked, field, inside, back, moved), *_partly_outside(asked, state.mesh), *_trust_lines(state)]
     return said, files
 
@@ -228,14 +222,14 @@ def _write_maps(folder: Path, state: SavedState, inside: VoxelsInside) -> list[s
     files = []
     if state.deviation is not None:
         deviation = MILLIMETRES * inside.interpolate(state.deviation[:, None])[:, 0]
-        write_volume(folder / "displacement_sd.nii.gz", inside.image(deviation), inside.grid)
-        files.append("displacement_sd.nii.gz")
+        write_volume(folder / DEVIATION, inside.image(deviation), inside.grid)
+        files.append(DEVIATION)
     if state.trust is not None:
         nearest = np.take_along_axis(
             state.mesh.tetrahedra[inside.elements], inside.weights.argmax(axis=1)[:, None], axis=1
         )[:, 0]
-        write_volume(folder / "trust.nii.gz", inside.image(state.trust[nearest]).astype(np.uint8), inside.grid)
-        files.append("trust.nii.gz")
+        write_volume(folder / TRUST_MAP, inside.image(state.trust[nearest]).astype(np.uint8), inside.grid)
+        files.append(TRUST_MAP)
     return files
 
 
@@ -245,6 +239,7 @@ def _trust_lines(state: SavedState) -> list[str]:
     if state.deviation is not None:
         lines.append(
             f"sd        standard deviation of the displacement: up to {MILLIMETRES * state.deviation.max():.2g} mm"
+            + (", more where something is left" if state.trust is not None and (state.trust == LEFT).any() else "")
         )
     if state.trust is not None:
         volumes = state.mesh.node_volumes

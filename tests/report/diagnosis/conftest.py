@@ -9,6 +9,7 @@ from warpbrain.report.diagnosis.description import describe
 from warpbrain.report.diagnosis.files import write_covariance, write_map, write_points
 from warpbrain.report.diagnosis.page import write_page
 from warpbrain.report.files import write_summary
+from warpbrain.report.state_files import read_state, write_diagnosed_state
 
 
 @pytest.fixture(scope="session")
@@ -20,8 +21,9 @@ def summary(small_diagnosis) -> dict:
 def diagnosed(small_diagnosis, summary, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("diagnosed")
     write_map(folder / "map.vtu", small_diagnosis)
+    write_diagnosed_state(folder / "state.vtu", small_diagnosis)
     write_points(folder / "points.csv", small_diagnosis)
     write_covariance(folder / "covariance.npz", small_diagnosis)
     write_summary(folder / "diagnosis.json", summary)
-    write_page(folder / "report.html", small_diagnosis, summary)
+    write_page(folder / "report.html", small_diagnosis, summary, read_state(folder / "state.vtu"))
     return folder

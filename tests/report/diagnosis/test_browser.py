@@ -4,12 +4,10 @@ import html
 import itertools
 import json
 import re
-import shutil
 
 from browser import EVIL, LISTEN, needs_browser, opened, runs
 
-from warpbrain.report.diagnosis.html import page_of
-from warpbrain.report.diagnosis.saved import read_saved
+from warpbrain.report.diagnosis.page import page_of
 
 pytestmark = needs_browser
 
@@ -85,11 +83,9 @@ def test_without_webgl_the_page_says_so(diagnosed, tmp_path):
     assert 'data-wrong="0"' in document and 'data-shown="block"' in document
 
 
-def test_nothing_of_a_name_runs(diagnosed, tmp_path):
-    folder = shutil.copytree(diagnosed, tmp_path / "named")
-    for file in ("diagnosis.json", "points.csv"):
-        text = (folder / file).read_text(encoding="utf-8")
-        for name in ("gel", "beads", "others"):
-            text = text.replace(name, name + EVIL)
-        (folder / file).write_text(text, encoding="utf-8")
-    assert not runs(page_of(read_saved(folder)), tmp_path)
+def test_nothing_of_a_name_runs(small_diagnosis, summary, tmp_path):
+    text, evil = json.dumps(summary), json.dumps(EVIL)[1:-1]
+    for name in ("gel", "beads", "others"):
+        text = text.replace(name, name + evil)
+    assert evil in text
+    assert not runs(page_of(small_diagnosis, json.loads(text)), tmp_path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -70,25 +70,40 @@ class Assignment:
     outside: tuple[int, ...] = ()
 
 
-def parse_names(arguments: Sequence[str]) -> dict[int, str]:
-    """Names by label, from arguments such as ``"2=grey,41=grey"``, in the order given.
+def parse_names(arguments: Sequence[str], there: Collection[int] | None = None) -> dict[int, str]:
+    """Names by label, from arguments such as ``"2=grey,1000-2035=grey"``, in the order given.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+    there : collection of int, optional
+        Labels that there are: a range names those of them that are in it. Not known yet without it, and ranges are
+        checked only.
 
     Raises
     ------
     InputError
-        For anything that is not LABEL=NAME, a label named twice, and a name that could be meant in two ways.
+        For anything that is not LABEL=NAME or FIRST-LAST=NAME, a label named twice, a range in which there is no label,
+        and a name that could be meant in two ways.
     """
     names: dict[int, str] = {}
     for pair in (piece.strip() for argument in arguments for piece in argument.split(",")):
-        label, equals, name = (part.strip() for part in pair.partition("="))
-        if not equals or not re.fullmatch("[0-9]{1,9}", label):
+        labels, equals, name = (part.strip() for part in pair.partition("="))
+        if not equals or not (ends := re.fullmatch("([0-9]{1,9})(?:-([0-9]{1,9}))?", labels)):
             raise InputError(f"--tissue: expected LABEL=NAME pairs such as 2=grey,3=white, found '{pair}'")
-        number = int(label)
-        if number == 0:
+        first, last = int(ends[1]), int(ends[2] or ends[1])
+        if first == 0:
             raise InputError("--tissue: label 0 is always outside the body, it cannot be named")
-        if number in names:
-            raise InputError(f"--tissue: label {number} is named twice, '{names[number]}' and '{name}'")
-        names[number] = usual_name(name)
+        if last < first:
+            raise InputError(f"--tissue: {labels}={name}: the range ends before it begins")
+        usual = usual_name(name)
+        named = [first] if ends[2] is None else sorted(n for n in there or () if first <= n <= last)
+        if there is not None and not named:
+            raise InputError(f"--tissue: there is no label in {labels}, but {_listed(sorted(there))}")
+        for number in named:
+            if number in names:
+                raise InputError(f"--tissue: label {number} is named twice, '{names[number]}' and '{name}'")
+            names[number] = usual
     return names
 
 

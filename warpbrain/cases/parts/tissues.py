@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from warpbrain.cases.case import Tissue
+from warpbrain.cases.case_template import DENSITY
 from warpbrain.cases.format.table import Reading
 from warpbrain.cases.format.tables import BODY, PRIOR, PRIOR_GROUPS, TISSUE
 from warpbrain.cases.parts.context import Context
@@ -14,6 +15,8 @@ from warpbrain.values import short
 
 #: Densities [kg/m3] that a tissue, gel or foam can have: wide, and too narrow for g/cm3.
 LIGHTEST, HEAVIEST = 20.0, 30000.0
+#: Of a case that says none [kg/m3].
+_PAPERS_DENSITY = 1211.5
 
 
 def read_tissues(context: Context) -> dict[int, Tissue]:
@@ -100,7 +103,13 @@ def _law(table: Reading) -> tuple[Law | None, bool]:
 def read_body(context: Context) -> tuple[float, float]:
     """Density [kg/m3] and Poisson ratio."""
     table = context.table(BODY, needed=False)
-    density = float(table.get("density", 1211.5))
+    density = float(table.get("density", _PAPERS_DENSITY))
+    if not table.has("density") and "specimen" not in context.tables:
+        context.problems.remark(
+            table.file,
+            f"[body] density: not given: the {_PAPERS_DENSITY:g} kg/m3 of the paper's Table 4 are taken; brain has "
+            f"{DENSITY:g} (ICRU Report 44, 1989)",
+        )
     if not LIGHTEST < density < HEAVIEST:
         cure = f"{density:g} g/cm3 is {1000.0 * density:g} kg/m3" if density < LIGHTEST else "is it in kg/m3?"
         table.problem("density", f"found {density:g} kg/m3, which no tissue or gel has", cure)

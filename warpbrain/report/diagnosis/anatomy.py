@@ -146,7 +146,7 @@ def map_figure(anatomy: Anatomy) -> str:
         f"How strongly a force at each place would explain the mismatch. The largest score, {where['largest']:.1f}, "
         f"{'is' if where['significant'] else 'is not'} above the threshold of {threshold:.1f} that pays for looking at "
         f"{where['places']} places (bar; green line). Dashed: the ball that was located. Hatched: a force of "
-        f"{where['blind_above_n']:.2g} N would not be found."
+        f"{where['blind_above_n']:.2g} N would not be found. With --image both are trust.nii.gz."
     )
     return inlined(draw, "Three cuts with the score of a force at every place.", caption)
 

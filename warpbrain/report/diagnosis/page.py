@@ -17,9 +17,12 @@ from warpbrain.report.diagnosis.anatomy import Anatomy, map_figure, residuals_fi
 from warpbrain.report.diagnosis.figures import agreement_figure, confusion_figure, curves_figure
 from warpbrain.report.diagnosis.files import Recorded
 from warpbrain.report.generative.page import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY
+from warpbrain.report.known_displacement import known_displacement
 from warpbrain.report.page import document
 from warpbrain.report.page.tables import table
 from warpbrain.report.page.viewer import viewer
+from warpbrain.report.state_files import SavedState
+from warpbrain.report.views import VIEWS
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 #: Ground and text of each verdict's badge; the word says it too.
@@ -33,13 +36,21 @@ _BADGES = {
     CANNOT_SAY: (QUIET, "#ffffff"),
 }
 
+#: What the standard deviation of the displacement is of.
+_KNOWN = (
+    "It is what is not known of tissue, of the case's loads and of what is named, to first order about the state with "
+    "all that is named: what is left without a name is not in it, nor the error of the mesh."
+)
 
-def write_page(path: Path, diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any]) -> None:
+
+def write_page(
+    path: Path, diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None
+) -> None:
     """Write the page of a diagnosis; arguments as of `page_of`."""
-    document.write_document(path, page_of(diagnosis, summary))
+    document.write_document(path, page_of(diagnosis, summary, state))
 
 
-def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any]) -> str:
+def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None) -> str:
     """The page.
 
     Parameters
@@ -47,6 +58,8 @@ def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any]) -
     diagnosis : Diagnosis or SpecimenDiagnosis
     summary : dict
         Its `diagnosis.json`.
+    state : SavedState, optional
+        Its `state.vtu`: how well the displacement is known.
     """
     sections: list[document.Section] = []
 
@@ -63,7 +76,7 @@ def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any]) -
     environment.get_template("page.html").render(
         section=section,
         summary=summary,
-        pictures=defaultdict(str, _pictures(diagnosis, summary, recorded)),
+        pictures=defaultdict(str, _pictures(diagnosis, summary, recorded, state)),
         text=text,
         next=[[one["what"], f"{one['expected_nats']:.1f}"] for one in summary["next_measurement"]],
         aside=[] if recorded is None else recorded.aside,
@@ -82,7 +95,10 @@ def _table(rows: Iterable[Sequence[Any]], head: Sequence[str], numbers: Sequence
 
 
 def _pictures(
-    diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], recorded: Recorded | None
+    diagnosis: Diagnosis | SpecimenDiagnosis,
+    summary: dict[str, Any],
+    recorded: Recorded | None,
+    state: SavedState | None,
 ) -> dict[str, str]:
     """Figures and the 3-D view by name; of what was not recorded there are none."""
     if recorded is None or not isinstance(diagnosis, Diagnosis):
@@ -93,6 +109,9 @@ def _pictures(
         pictures["residuals"] = residuals_figure(anatomy, recorded)
     if recorded.counted.any():
         pictures["agreement"] = agreement_figure(summary, recorded)
+    if state is not None:
+        places = [float(anatomy.centre[view.axis]) for view in VIEWS]
+        pictures["known"] = known_displacement(state, anatomy.mesh, places, _KNOWN).body
     view = view_of(anatomy, recorded if points else None)
     pictures["view"] = viewer(view, "what is left", "Arrows go from the computed to the observed place.")
     if summary["confusion"]["rows"]:
