@@ -24,7 +24,7 @@ from warpbrain.report.mechanisms.cost import read_costs
 from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
 from warpbrain.report.mechanisms.index import index
 from warpbrain.report.mechanisms.page import page
-from warpbrain.report.mechanisms.pairs import pairs_page
+from warpbrain.report.mechanisms.pairs import pairs_page, pairs_table
 from warpbrain.report.mechanisms.picture import INKS, write_picture
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumSolver
@@ -59,6 +59,7 @@ def main() -> None:
         _write(PAGES / f"{kind}.md", page(kind, effects[kind]))
     _write(PAGES / "index.md", index(effects, costs))
     _write(PAGES / "pairs.md", pairs_page())
+    _write(PAGES / "pairs.csv", pairs_table())
 
 
 def draw(case: Case, kind: str) -> Effect:

@@ -1,5 +1,7 @@
 """The pages of the mechanisms are those of the code, and their pictures of the files as they are."""
 
+import csv
+import io
 from pathlib import Path
 
 import matplotlib.image
@@ -13,7 +15,7 @@ from warpbrain.report.mechanisms.cost import PLAIN, read_costs, reasons, row_of,
 from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
 from warpbrain.report.mechanisms.index import index
 from warpbrain.report.mechanisms.page import page
-from warpbrain.report.mechanisms.pairs import pairs_page
+from warpbrain.report.mechanisms.pairs import pairs_page, pairs_table
 from warpbrain.report.mechanisms.picture import write_picture
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -52,11 +54,12 @@ def test_the_index_has_not_drifted_and_nothing_is_left_behind():
 
 def test_the_table_of_pairs_has_not_drifted():
     assert (PAGES / "pairs.md").read_text(encoding="utf-8") == pairs_page(), MAKE
+    assert (PAGES / "pairs.csv").read_text(encoding="utf-8") == pairs_table(), MAKE
 
 
 def test_every_pair_is_in_the_table_with_what_it_means_or_why_not():
     kinds = list(mechanisms())
-    rows = [row.split(" | ") for row in pairs_page().splitlines() if row.startswith("| [")]
+    [_, *rows] = csv.reader(io.StringIO(pairs_table()))
     assert len(rows) == len(kinds) * (len(kinds) + 1) // 2
     for first, second, formula, said in rows:
         assert formula or said.startswith("Refused"), (first, second)

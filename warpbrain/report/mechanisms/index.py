@@ -10,8 +10,8 @@ from warpbrain.report.mechanisms.effect import Effect
 
 _HEAD = """# Mechanisms
 
-What can act on a brain beside its tissue's own law. A case assumes one by a table of `case.toml`, a run by `--with`,
-and several act together, as [one energy](pairs.md):
+What can act on a brain beside its tissue's law. A case assumes one in `case.toml`, a run by `--with`; several act
+together, as [one energy](pairs.md):
 
 ```toml
 [[mechanism]]
@@ -23,31 +23,22 @@ csf_level = 60.0
 warpbrain run --case 0529 --with gravity:level=60 --with swelling:amount=-3
 ```
 
-Each is one file of [physics/mechanisms](../../warpbrain/physics/mechanisms); these pages are made from the files by
-`python docs/make_mechanisms.py`. How states and motions are differentiated by their numbers:
-[solvers.md](../solvers.md#derivatives).
+Each also takes `ramp = [[time, factor], ...]`, which scales what it does over time (s). Each is one file of
+[physics/mechanisms](../../warpbrain/physics/mechanisms), from which `python docs/make_mechanisms.py` makes these pages; below
+their pictures stand their equations.
 """
 
-_EFFECT = """The effect is the largest that its example has on a displacement of the phantom under a light load,
-`--case phantom-loaded`. Examples are there to be seen: they do not say what matters more in a patient. The cost is that
-of a time step with it beside one without it, as measured {where}.
+_EFFECT = """The effect is the largest on a displacement of the phantom under a light load (`--case phantom-loaded`), by the example of
+each page: it does not say what matters more in a patient. The cost is that of a time step beside one without it,
+{where}.
 """
 
 _COST = """## Cost
 
-Each mechanism's example on `phantom-loaded` (coarse mesh, grey and white matter), times that of the plain model:
-
-    python -m warpbrain.bench mechanisms --out bench/results
-
-A time step is 1 ms, linearised, conjugate gradients to 1e-6; an iteration of Newton's method is that of an equilibrium,
-its line search included. Steps with and without take turns in one process, in processor time on a CPU. Each number is
-the median of the ratios of neighbours in time; that of the plain model beside itself says how far to trust the others.
-A mechanism that makes the matrix worse conditioned, as a stiff membrane does, costs iterations of conjugate gradients,
-which is in these numbers; where fluid flows MINRES takes their place, for displacement and pressure together
-([solvers.md](../solvers.md#linear-systems)).
-
-What is off is not there: a model without mechanisms has no terms to sum, and each phase of its step takes as long as
-before there were mechanisms ([benchmarks.md](../benchmarks.md)).
+Each example on `phantom-loaded` (coarse mesh, grey and white matter), times the plain model: the median of ratios of
+neighbours in time, in processor time on a CPU, by `python -m warpbrain.bench mechanisms --out bench/results`. A step is
+1 ms, conjugate gradients to 1e-6; an iteration of Newton's method includes its line search. *Plain beside plain* says how
+far to trust the others. What is off costs nothing ([benchmarks.md](../benchmarks.md)).
 """
 
 
