@@ -1,4 +1,4 @@
-"""Makes the tables of docs/verification.md, bench/results/verification.md: `python docs/make_verification.py [--without-slow]`.
+"""Makes the tables of docs/verification.md, in bench/results: `python docs/make_verification.py [--without-slow]`.
 
 Runs every test that compares with an independent reference and writes what they measured. If one of them fails the file
 stays as it was. Without the slow ones their rows are missing, and the file says so.

@@ -24,21 +24,21 @@ warpbrain run --case 0529 --with gravity:level=60 --with swelling:amount=-3
 ```
 
 Each also takes `ramp = [[time, factor], ...]`, which scales what it does over time (s). Each is one file of
-[physics/mechanisms](../../warpbrain/physics/mechanisms), from which `python docs/make_mechanisms.py` makes these pages; below
-their pictures stand their equations.
+[physics/mechanisms](../../warpbrain/physics/mechanisms), from which `python docs/make_mechanisms.py` makes these
+pages; below their pictures stand their equations.
 """
 
-_EFFECT = """The effect is the largest on a displacement of the phantom under a light load (`--case phantom-loaded`), by the example of
-each page: it does not say what matters more in a patient. The cost is that of a time step beside one without it,
-{where}.
+_EFFECT = """The effect is the largest on a displacement of the phantom under a light load
+(`--case phantom-loaded`), by the example of each page: it does not say what matters more in a patient. The cost is that
+of a time step beside one without it, {where}.
 """
 
 _COST = """## Cost
 
 Each example on `phantom-loaded` (coarse mesh, grey and white matter), times the plain model: the median of ratios of
 neighbours in time, in processor time on a CPU, by `python -m warpbrain.bench mechanisms --out bench/results`. A step is
-1 ms, conjugate gradients to 1e-6; an iteration of Newton's method includes its line search. *Plain beside plain* says how
-far to trust the others. What is off costs nothing ([benchmarks.md](../benchmarks.md)).
+1 ms, conjugate gradients to 1e-6; an iteration of Newton's method includes its line search. *Plain beside plain* says
+how far to trust the others. What is off costs nothing ([benchmarks.md](../benchmarks.md)).
 """
 
 

@@ -13,15 +13,15 @@ from warpbrain.physics.mechanisms import mechanisms
 _HEAD = """# Mechanisms together
 
 Several mechanisms act together as one energy, made and tabulated here by `python docs/make_mechanisms.py`;
-`tests/physics/test_composition.py` checks every pair, and all at once, against that energy in NumPy: forces and tangents
-in the second of two time steps, to 1e-9.
+`tests/physics/test_composition.py` checks every pair, and all at once, against that energy in NumPy: forces and
+tangents in the second of two time steps, to 1e-9.
 """
 
 _TABLE = """## All pairs
 
-[pairs.csv](pairs.csv) has the total potential of each pair, and what is refused, with the reason: where a case is read, where
-`--with` is given (exit status 2) and where a model is made, so in ensembles, estimates and diagnoses too. `u` is the
-displacement, `V` the volume of an element, `sum` is over the elements.
+[pairs.csv](pairs.csv) has the total potential of each pair, and what is refused, with the reason: where a case is
+read, where `--with` is given (exit status 2) and where a model is made, so in ensembles, estimates and diagnoses too.
+`u` is the displacement, `V` the volume of an element, `sum` is over the elements.
 
 ```{csv-table}
 :file: pairs.csv
