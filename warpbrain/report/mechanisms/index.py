@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import Costs, machine, ratio, reasons, row_of, table
+from warpbrain.report.mechanisms.cost import Costs, machine, ratio, reasons, row_of
 from warpbrain.report.mechanisms.effect import Effect
 
 _HEAD = """# Mechanisms
@@ -41,6 +41,14 @@ neighbours in time, in processor time on a CPU, by `python -m warpbrain.bench me
 how far to trust the others. What is off costs nothing ([benchmarks.md](../benchmarks.md)).
 """
 
+_TABLE = """[cost.csv](cost.csv):
+
+```{csv-table}
+:file: cost.csv
+:header-rows: 1
+```
+"""
+
 
 def index(effects: Mapping[str, Effect], measured: Sequence[Costs]) -> str:
     """The whole page.
@@ -65,6 +73,5 @@ def index(effects: Mapping[str, Effect], measured: Sequence[Costs]) -> str:
             cost,
         ]
         lines.append(f"| {' | '.join(cells)} |")
-    lines += ["", _EFFECT.format(where=where), _COST, *table(measured, list(mechanisms())), ""]
-    long = reasons(measured)
-    return "\n".join([*lines, *(["What makes steps long:", "", *long, ""] if long else [])])
+    lines += ["", _EFFECT.format(where=where), _COST]
+    return "\n".join([*lines, *reasons(measured), "", _TABLE])

@@ -25,7 +25,7 @@ def page(kind: str, effect: Effect) -> str:
     module = sys.modules[mechanism.__module__]
     source = f"../../{module.__name__.replace('.', '/')}.py"
     doc = (module.__doc__ or "").strip().splitlines()
-    lines = [f"# {kind}", "", f"*{mechanism.sentence}* {doc[0]}", "", *_table(mechanism), ""]
+    lines = [f"# {kind}", "", f"*{mechanism.sentence}* {doc[0]}", "", *_parameters(mechanism), ""]
     lines += [*_picture(mechanism, effect), "", *confusions(mechanism), *derivatives(mechanism), ""]
     lines += [f"[{source.rsplit('/', 1)[1]}]({source}), [cost](index.md#cost), [together with others](pairs.md)", ""]
     if len(doc) > 1:
@@ -62,13 +62,18 @@ def derivatives(mechanism: type[Mechanism]) -> list[str]:
     return lines
 
 
-def _table(mechanism: type[Mechanism]) -> list[str]:
-    lines = ["| key | unit | | expected | typical | source |", "|---|---|---|---|---|---|"]
+def _parameters(mechanism: type[Mechanism]) -> list[str]:
+    lines = []
     for name, says in mechanism.parameters().items():
-        expected = "" if says.expectation is None else str(says.expectation)
         unit = "`units`" if says.kind == "position" else says.unit
-        doc = mechanism.described(name)
-        lines.append(f"| `{name}` | {unit} | {doc} | {expected} | {says.typical} | {says.source} |")
+        parts = [f"- `{name}`{f' [{unit}]' if unit else ''}: {mechanism.described(name)}"]
+        if says.expectation is not None:
+            parts.append(f"Expected: {says.expectation}.")
+        if says.typical:
+            parts.append(f"Typical: {says.typical}.")
+        if says.source:
+            parts.append(f"Source: {says.source}.")
+        lines.append(" ".join(parts))
     return lines
 
 
@@ -76,7 +81,9 @@ def _picture(mechanism: type[Mechanism], effect: Effect) -> list[str]:
     state = f"{effect.steps} ms after the load came, from rest" if effect.steps else "in equilibrium"
     place = ", ".join(f"{x:.0f}" for x in effect.place)
     return [
-        f"    warpbrain run {effect.command} --with {mechanism.example}",
+        "```sh",
+        f"warpbrain run {effect.command} --with {mechanism.example}",
+        "```",
         "",
         f"![{mechanism.kind}: what it does to the phantom](../figures/mechanism-{mechanism.kind}.png)",
         "",
