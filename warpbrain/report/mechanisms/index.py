@@ -35,10 +35,9 @@ of a time step beside one without it, {where}.
 
 _COST = """## Cost
 
-Each example on `phantom-loaded` (coarse mesh, grey and white matter), times the plain model: the median of ratios of
-neighbours in time, in processor time on a CPU, by `python -m warpbrain.bench mechanisms --out bench/results`. A step is
-1 ms, conjugate gradients to 1e-6; an iteration of Newton's method includes its line search. *Plain beside plain* says
-how far to trust the others. What is off costs nothing ([benchmarks.md](../benchmarks.md)).
+Each example on `phantom-loaded` (coarse mesh, grey and white matter), times the plain model, by `python -m
+warpbrain.bench mechanisms --out bench/results`: a time step of 1 ms, and an iteration of Newton's method. *Plain beside
+plain* says how far to trust the others. What is off costs nothing ([benchmarks.md](../benchmarks.md)).
 """
 
 _TABLE = """[cost.csv](cost.csv):

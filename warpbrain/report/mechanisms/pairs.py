@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import inspect
 import io
 
 from warpbrain.physics import potential
@@ -12,9 +11,9 @@ from warpbrain.physics.mechanisms import mechanisms
 
 _HEAD = """# Mechanisms together
 
-Several mechanisms act together as one energy, made and tabulated here by `python docs/make_mechanisms.py`;
-`tests/physics/test_composition.py` checks every pair, and all at once, against that energy in NumPy: forces and
-tangents in the second of two time steps, to 1e-9.
+Several mechanisms act together as one energy ([potential.py](../../warpbrain/physics/potential.py)), tabulated here by
+`python docs/make_mechanisms.py`. `tests/physics/test_composition.py` checks every pair, and all at once, against that
+energy in NumPy: forces and tangents in the second of two time steps, to 1e-9.
 """
 
 _TABLE = """## All pairs
@@ -32,8 +31,9 @@ read, where `--with` is given (exit status 2) and where a model is made, so in e
 
 def pairs_page() -> str:
     """The whole page."""
-    rule = inspect.cleandoc(potential.__doc__ or "").split("\n\n", 1)[1]
-    lines = [_HEAD, rule, "", "| place | mechanisms |", "|---|---|"]
+    rule = len((potential.__doc__ or "").strip().splitlines())
+    lines = [_HEAD, *("```{literalinclude} ../../warpbrain/physics/potential.py", ":language: text"), f":lines: 3-{rule}"]
+    lines += ["```", "", "| place | mechanisms |", "|---|---|"]
     for place, meaning in potential.PLACES.items():
         there = [f"[{kind}]({kind}.md)" for kind, m in mechanisms().items() if m.enters.place == place]
         if there:
