@@ -45,7 +45,7 @@ def confusions(mechanism: type[Mechanism]) -> list[str]:
         lines.append("It does not act on elements `tet10` and `tet10-mixed`.")
     if mechanism.needs:
         return [*lines, f"Told apart by {', '.join(mechanism.needs)}."]
-    return [*lines, *(["One deformed state tells them apart."] if others else [])]
+    return lines
 
 
 def derivatives(mechanism: type[Mechanism]) -> list[str]:
