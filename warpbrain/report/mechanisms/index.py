@@ -29,8 +29,8 @@ pages; below their pictures stand their equations.
 """
 
 _EFFECT = """The effect is the largest on a displacement of the phantom under a light load
-(`--case phantom-loaded`), by the example of each page: it does not say what matters more in a patient. The cost is that
-of a time step beside one without it, {where}.
+(`--case phantom-loaded`), by the example of each page: it does not say what matters more in a patient. Where nothing is
+said to tell a mechanism apart, one deformed state does. The cost is that of a time step beside one without it, {where}.
 """
 
 _COST = """## Cost

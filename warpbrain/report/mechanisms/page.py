@@ -79,7 +79,6 @@ def _parameters(mechanism: type[Mechanism]) -> list[str]:
 
 def _picture(mechanism: type[Mechanism], effect: Effect) -> list[str]:
     state = f"{effect.steps} ms after the load came, from rest" if effect.steps else "in equilibrium"
-    place = ", ".join(f"{x:.0f}" for x in effect.place)
     return [
         "```sh",
         f"warpbrain run {effect.command} --with {mechanism.example}",
@@ -87,6 +86,6 @@ def _picture(mechanism: type[Mechanism], effect: Effect) -> list[str]:
         "",
         f"![{mechanism.kind}: what it does to the phantom](../figures/mechanism-{mechanism.kind}.png)",
         "",
-        f"The phantom under 1 N, cut at y = {1000.0 * PLACE:.0f} mm. Right: the displacement added {state} "
-        f"({MAGNIFIED:g} times), at most {effect.largest:.2f} mm, at ({place}) mm.",
+        f"Cut at y = {1000.0 * PLACE:.0f} mm. Right: what is added {state} ({MAGNIFIED:g} times), at most "
+        f"{effect.largest:.2f} mm.",
     ]
