@@ -29,8 +29,9 @@ pages; below their pictures stand their equations.
 """
 
 _EFFECT = """The effect is the largest on a displacement of the phantom under a light load
-(`--case phantom-loaded`), by the example of each page: it does not say what matters more in a patient. Where nothing is
-said to tell a mechanism apart, one deformed state does. The cost is that of a time step beside one without it, {where}.
+(`--case phantom-loaded`), by the example of each page: it does not say what matters more in a patient. Where a
+page does not say what tells a mechanism apart from what it is taken for, one deformed state does. The cost is that of a
+time step beside one without it, {where}.
 """
 
 _COST = """## Cost
@@ -59,7 +60,7 @@ def index(effects: Mapping[str, Effect], measured: Sequence[Costs]) -> str:
         The first is in the overview.
     """
     where = f"on {machine(measured[0])}" if measured else "nowhere yet"
-    lines = [_HEAD, "| | | effect | taken for | told apart by | cost |", "|---|---|---|---|---|---|"]
+    lines = [_HEAD, "| | | effect | taken for | cost |", "|---|---|---|---|---|"]
     for kind, mechanism in mechanisms().items():
         row = row_of(measured[0], kind) if measured else None
         cost = "" if row is None else f"{ratio(row['step']):.2f}"
@@ -68,7 +69,6 @@ def index(effects: Mapping[str, Effect], measured: Sequence[Costs]) -> str:
             mechanism.sentence,
             f"{effects[kind].largest:.2f} mm",
             ", ".join(mechanism.confused_with),
-            ", ".join(mechanism.needs),
             cost,
         ]
         lines.append(f"| {' | '.join(cells)} |")
