@@ -17,7 +17,9 @@ def test_pages_are_short_enough():
 
 @pytest.mark.skipif(shutil.which("wc") is None, reason="wc is not installed")
 def test_words_are_those_of_wc(tmp_path):
-    page = "# A page\n\nTwo words\nand *three* more.\n\n    indented code\n\n| a | b |\n|---|---|\n\n```sh\nrun it\n```\n"
+    page = (
+        "# A page\n\nTwo words\nand *three* more.\n\n    indented code\n\n| a | b |\n|---|---|\n\n```sh\nrun it\n```\n"
+    )
     (tmp_path / "page.md").write_text(page)
     counted = subprocess.run(["wc", "-w", tmp_path / "page.md"], capture_output=True, text=True, check=True).stdout
     assert COUNT["words"](page) == int(counted.split()[0]) == 20

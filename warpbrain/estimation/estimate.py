@@ -10,7 +10,7 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
 from warpbrain.cases.shipped import as_case
-from warpbrain.errors import SolveError
+from warpbrain.errors import SolveError, require_kind
 from warpbrain.estimation.chain import Chain, run_chain
 from warpbrain.estimation.discretisation import Discretisation, DiscretisationError, discretisation_error
 from warpbrain.estimation.finer_mesh import FinerMesh
@@ -97,6 +97,7 @@ def estimate(
     >>> posterior = estimate(find_case("0529", "single"))  # doctest: +SKIP
     >>> [marginal.interval for marginal in posterior.marginals]  # doctest: +SKIP
     """
+    require_kind(options or EstimationOptions(), EstimationOptions, "options", "EstimationOptions(...)")
     return Estimation(as_case(case), prior, options, device, listener).run()
 
 
