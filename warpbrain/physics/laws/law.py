@@ -88,7 +88,7 @@ class Law(abc.ABC):
         return 2.0 * self.shear_modulus * (1.0 + poisson) / (3.0 * (1.0 - 2.0 * poisson))
 
 
-def require_finite(law: str, key: str, *values: float) -> None:
+def require_finite(law: str, key: str, *values: object) -> None:
     """Raise `InputError` if a parameter is NaN or infinite."""
     for value in values:
         if not isinstance(value, Real) or not math.isfinite(value):
