@@ -30,7 +30,7 @@ def page(kind: str, effect: Effect) -> str:
     lines += [f"[{source.rsplit('/', 1)[1]}]({source}), [cost](index.md#cost), [together with others](pairs.md)", ""]
     if len(doc) > 1:
         # the equations stand once, at the head of the file that computes them
-        lines += [f"```{{literalinclude}} {source}", ":language: text", f":lines: 3-{len(doc)}", "```", ""]
+        lines += [f"```{{docstring}} {module.__name__}", "```", ""]
     return "\n".join(lines)
 
 

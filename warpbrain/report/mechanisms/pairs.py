@@ -31,9 +31,7 @@ read, where `--with` is given (exit status 2) and where a model is made, so in e
 
 def pairs_page() -> str:
     """The whole page."""
-    rule = len((potential.__doc__ or "").strip().splitlines())
-    lines = [_HEAD, "```{literalinclude} ../../warpbrain/physics/potential.py", ":language: text", f":lines: 3-{rule}"]
-    lines += ["```", "", "| place | mechanisms |", "|---|---|"]
+    lines = [_HEAD, f"```{{docstring}} {potential.__name__}", "```", "", "| place | mechanisms |", "|---|---|"]
     for place, meaning in potential.PLACES.items():
         there = [f"[{kind}]({kind}.md)" for kind, m in mechanisms().items() if m.enters.place == place]
         if there:
