@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import rslab
 from numpy.typing import NDArray
-from scipy.sparse import bsr_matrix, csr_matrix, diags, eye, kron
-from scipy.sparse.linalg import splu
+from scipy.sparse import bsr_matrix, csr_matrix, diags, eye, kron, tril
 
 from referee.body import Body
 
@@ -38,11 +38,10 @@ class Coarse:
         self._down = self._up.T.tocsr()
         below = (self._down @ (matrix.tocsr() @ self._up)).tocsc().astype(np.float32)
         self._up, self._down = self._up.astype(np.float32), self._down.astype(np.float32)
-        options = {"SymmetricMode": True}
-        self._factors = splu(below, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        self._factors = rslab.ldlt(tril(below, format="csc"), threads=1)
 
     def __call__(self, r: Singles) -> Singles:
-        return self._up @ self._factors.solve(self._down @ r)
+        return self._up @ self._factors.solve_many(np.asfortranarray(self._down @ r))
 
 
 class Linear:

@@ -12,9 +12,10 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
+import rslab
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import LinearOperator, cg, splu
+from scipy.sparse import csc_matrix, tril
+from scipy.sparse.linalg import LinearOperator, cg
 
 from referee.errors import InputError
 from referee.faces import Floats
@@ -113,14 +114,12 @@ class NeoHookeanBody:
     def solver(self, matrix: csc_matrix) -> Callable[[Floats], Floats]:
         """What solves for all dofs (3 n,) or (3 n, k) that are not held; zero at those that are."""
         free = np.flatnonzero(~self.held[0])
-        options = {"SymmetricMode": True}
-        factors = splu(
-            matrix[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
-        )
+        factors = rslab.ldlt(tril(matrix[free][:, free], format="csc"), threads=1)
 
         def solve(force: Floats) -> Floats:
             u = np.zeros_like(force)
-            u[free] = factors.solve(np.ascontiguousarray(force[free]))
+            right = np.asfortranarray(force[free].reshape(len(free), -1))
+            u[free] = factors.solve_many(right).reshape(force[free].shape)
             return u
 
         return solve

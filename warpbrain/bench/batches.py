@@ -16,6 +16,7 @@ from warpbrain.ensemble.memory import bytes_per_slot
 from warpbrain.ensemble.stepping import step_batch
 from warpbrain.ensemble.workers import Here, Prepare, Processes
 from warpbrain.gp.trained import trained
+from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.kernels.tetrahedron import PAIRS
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.of_case import model_of
@@ -157,8 +158,13 @@ def count_bytes(system: System, cg_iterations: float) -> int:
     blocks, forces, matrix = len(PAIRS) * 9 * m, 12 * m, 9 * pairs
     elements = vector + blocks + forces + m
     evaluation = elements + forces + vector + m
+    real = system.precision.numpy.itemsize
+    if blocks_stay(system.device):
+        # right-hand side; the matrix is read once a solve, and an iteration writes four numbers a node, in double
+        beginning = blocks + matrix + (matrix + 7 * vector) + (matrix + 3 * vector)
+        return int(real * (evaluation + beginning + 6 * vector) + cg_iterations * 32 * n)
     # right-hand side, preconditioner, start
     beginning = blocks + matrix + (matrix + 7 * vector) + (3 * vector + inverse) + (matrix + 5 * vector + inverse)
     product = matrix + 2 * vector
     iteration = product + (7 * vector + inverse) + 3 * vector
-    return int(system.precision.numpy.itemsize * (evaluation + beginning + cg_iterations * iteration + 6 * vector))
+    return int(real * (evaluation + beginning + cg_iterations * iteration + 6 * vector))

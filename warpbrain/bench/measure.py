@@ -13,6 +13,7 @@ from warpbrain.bench.table3 import MAIN_LOOP, Row
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.errors import SolveError
+from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.simulation.dynamics import PHASES, Simulator
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.phase_clock import PhaseClock
@@ -179,13 +180,18 @@ def count(system: System, cg_iterations: int) -> tuple[int, int]:
     gather_forces = m * 4 * (4 + vector) + n * vector
     gather_matrix = m * 10 * (4 + block) + pairs * (8 + 4 + 8 + 2 * vector + real) + nnz * block
     multiply = nnz * (4 + block) + nnz * vector + n * (4 + vector)
-    diagonal = n * 2 * block
     right_hand_side = 8 * n * vector
     update = 7 * n * vector
+    total = elements + gather_forces + gather_matrix + multiply + right_hand_side + update
+    # elements by group, gather, product, right-hand side, update
+    launches = len(system.groups) + 4
+    if blocks_stay(system.device):
+        # the matrix once; then what blocks read of each other, four numbers a node
+        total += nnz * (4 + block) + cg_iterations * (nnz * 24 + n * 32)
+        return int(total), launches + 1
     # a CG iteration: product, p.Ap, x and r, preconditioner, r.r and r.z, p
     iteration = multiply + 2 * n * vector + 6 * n * vector + n * (block + 2 * vector) + 4 * n * vector + 3 * n * vector
-    total = elements + gather_forces + gather_matrix + multiply + diagonal + right_hand_side + update
-    total += 2 * n * vector + cg_iterations * iteration + iteration
-    # copies of the state, elements by group, two gathers, product, right-hand side, preconditioner, CG's start, update
-    launches = 2 + len(system.groups) + 5 + 12 + 9 * cg_iterations + 1
+    total += n * 2 * block + 2 * n * vector + cg_iterations * iteration + iteration
+    # preconditioner and CG's start
+    launches += 13 + 9 * cg_iterations
     return int(total), launches

@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 
 from warpbrain.errors import InputError
+from warpbrain.kernels.batched.persistent import kept_bytes
+from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.kernels.tetrahedron import PAIRS
 from warpbrain.simulation.system import System
 
@@ -21,8 +23,12 @@ def bytes_per_slot(system: System) -> int:
     n, m = system.size, system.elements
     elements = m * (len(PAIRS) * 9 + 4 * 3 + 1)
     matrix = len(system.pairs) * 9
-    # u, v, dv, both at the start of the step, prescribed velocity, internal forces, b, z, p, q; the preconditioner
-    vectors = 11 * 3 * n + 6 * n
+    # u, v, dv, both at the start of the step, prescribed velocity, internal forces, b
+    vectors = 8 * 3 * n
+    if blocks_stay(system.device):
+        return system.precision.numpy.itemsize * (elements + matrix + vectors + n) + kept_bytes(n)
+    # z, p, q; the preconditioner
+    vectors += 3 * 3 * n + 6 * n
     sums = 2 * n
     return system.precision.numpy.itemsize * (elements + matrix + vectors + sums)
 

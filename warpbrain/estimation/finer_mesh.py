@@ -23,7 +23,7 @@ from warpbrain.simulation.extrapolated import extrapolated
 from warpbrain.simulation.finer import FinerCase, free_prolongation, restricted
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.sensitivity import SensitivitySolver
-from warpbrain.simulation.symmetric_factors import symmetric_factors
+from warpbrain.simulation.sparse_factors import SparseFactors
 from warpbrain.simulation.system import System
 
 #: Out-of-balance force of a finer state, relative: far below the error that is looked for; and of linear solves for
@@ -183,7 +183,7 @@ class FinerMesh:
             coarse.u.assign(u)
             free = ~coarse.model.constrained.ravel()
             try:
-                self._factors = symmetric_factors(coarse.stiffness().tocsr()[free][:, free]), free
+                self._factors = SparseFactors(coarse.stiffness().tocsr()[free][:, free]), free
             except RuntimeError:
                 return None
         factors, free = self._factors

@@ -40,24 +40,45 @@ class _Noise:
         return np.asarray(np.tril(lower) + np.tril(lower, -1).T)
 
 
-class _Spectrum:
-    """Eigenvalues (q,) of `W^T W`, `W = L^-1 U`, and `W` times its eigenvectors (n, q): the same at all scales."""
+class _Whitened:
+    """Columns (n, q) in coordinates in which the noise is `N(0, I)`: `W = L^-1 U`, and `L^-T W`."""
 
-    def __init__(self, factor: Floats, whitened_columns: Floats) -> None:
-        self._factor = factor
-        values, vectors = np.linalg.eigh(whitened_columns.T @ whitened_columns)
-        self.values, self.directions = np.maximum(values, 0.0), whitened_columns @ vectors
-        if np.finfo(np.float64).eps * values.max(initial=0.0) > _ROUNDED:
-            # a column ten million times as long as the noise: its square has no digits left for the others
-            left, lengths, _ = np.linalg.svd(whitened_columns, full_matrices=False)
-            self.values, self.directions = lengths**2, left * lengths
+    def __init__(self, factor: Floats, columns: Floats) -> None:
+        self._factor, self.columns = factor, columns
 
     @cached_property
     def dual(self) -> Floats:
-        """`L^-T` times the directions (n, q), with which the inverse of the covariance is made."""
+        """`L^-T W` (n, q), with which the inverse of the covariance is made."""
         from scipy.linalg import solve_triangular
 
-        return np.asarray(solve_triangular(self._factor, self.directions, lower=True, trans="T", check_finite=False))
+        return np.asarray(solve_triangular(self._factor, self.columns, lower=True, trans="T", check_finite=False))
+
+
+class _Spectrum:
+    """Eigenvalues (q,) of `W^T W`, and `W` times its eigenvectors (n, q): the same at all scales.
+
+    Parameters
+    ----------
+    whitened : _Whitened
+    lengths : (q,) array
+        Factors on the columns.
+    """
+
+    def __init__(self, whitened: _Whitened, lengths: Floats) -> None:
+        self._whitened = whitened
+        W = whitened.columns * lengths
+        values, vectors = np.linalg.eigh(W.T @ W)
+        self.values, self.directions = np.maximum(values, 0.0), W @ vectors
+        if np.finfo(np.float64).eps * values.max(initial=0.0) > _ROUNDED:
+            # a column ten million times as long as the noise: its square has no digits left for the others
+            left, sizes, right = np.linalg.svd(W, full_matrices=False)
+            self.values, self.directions, vectors = sizes**2, left * sizes, right.T
+        self._combinations = lengths[:, None] * vectors
+
+    @cached_property
+    def dual(self) -> Floats:
+        """`L^-T` times the directions (n, q)."""
+        return np.asarray(self._whitened.dual @ self._combinations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +106,17 @@ class GaussianModel:
         """The same model with another factor on the noise; nothing is factorised again."""
         other = GaussianModel(self.noise_factor, self.columns, scale)
         other.__dict__["_noise"] = self._noise
-        other.__dict__["_whitened_columns"] = self._whitened_columns
+        other.__dict__["_whitened"] = self._whitened
+        other.__dict__["_lengths"] = self._lengths
         other.__dict__["_spectrum"] = self._spectrum
+        return other
+
+    def with_lengths(self, factors: Floats) -> GaussianModel:
+        """The same model with columns so many times (q,) as long; nothing is whitened again."""
+        other = GaussianModel(self.noise_factor, self.columns * factors, self.scale)
+        other.__dict__["_noise"] = self._noise
+        other.__dict__["_whitened"] = self._whitened
+        other.__dict__["_lengths"] = self._lengths * factors
         return other
 
     def of_noise(self, columns: Floats) -> GaussianModel:
@@ -99,7 +129,8 @@ class GaussianModel:
         """The same model with more columns (n, k) of normal coefficients."""
         other = GaussianModel(self.noise_factor, np.column_stack([self.columns, columns]), self.scale)
         other.__dict__["_noise"] = self._noise
-        other.__dict__["_whitened_columns"] = np.column_stack([self._whitened_columns, self._by_noise(columns)])
+        whitened = np.column_stack([self._whitened_columns, self._by_noise(columns)])
+        other.__dict__["_whitened"] = _Whitened(self.noise_factor, whitened)
         return other
 
     def rows(self, rows: Bools) -> GaussianModel:
@@ -135,7 +166,7 @@ class GaussianModel:
         """Diagonal blocks (g, d, d) of `S^-1` of points with the rows (g, d)."""
         B, weights = self._low_rank
         of_noise = self._noise.precision[rows[:, :, None], rows[:, None, :]]
-        return np.asarray((of_noise - (B[rows] * weights) @ np.swapaxes(B[rows], 1, 2)) / self.scale**2)
+        return np.asarray((of_noise - np.einsum("gik,gjk->gij", B[rows] * weights, B[rows])) / self.scale**2)
 
     def precision_times(self, rows: Floats) -> Floats:
         """`S^-1` times rows (n,) or (n, b)."""
@@ -143,12 +174,21 @@ class GaussianModel:
         return np.asarray((self._noise.precision @ rows - B @ (weights * (B.T @ rows).T).T) / self.scale**2)
 
     @cached_property
+    def _whitened(self) -> _Whitened:
+        return _Whitened(self.noise_factor, self._by_noise(self.columns))
+
+    @cached_property
+    def _lengths(self) -> Floats:
+        """Factors (q,) on the whitened columns."""
+        return np.ones(self.columns.shape[1])
+
+    @property
     def _whitened_columns(self) -> Floats:
-        return self._by_noise(self.columns)
+        return self._whitened.columns * self._lengths
 
     @cached_property
     def _spectrum(self) -> _Spectrum:
-        return _Spectrum(self.noise_factor, self._whitened_columns)
+        return _Spectrum(self._whitened, self._lengths)
 
     def _by_noise(self, rows: Floats) -> Floats:
         """`L^-1` of rows (n,) or (n, b)."""

@@ -137,7 +137,8 @@ class _Group:
 class _Search:
     """The inflation of each point, and the inverse of the covariance with them, as updates of that with none.
 
-    With the rows R of all gross errors, `P = P_0 - P_0[:, R] (Delta_R^-1 + P_0[R, R])^-1 P_0[R, :]` (Woodbury).
+    With the rows R of all gross errors, `P = P_0 - P_0[:, R] (Delta_R^-1 + P_0[R, R])^-1 P_0[R, :]` (Woodbury) is
+    `P_0 - Z Z^T`, to which points are added as by Cholesky's method.
     """
 
     def __init__(self, model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> None:
@@ -151,72 +152,90 @@ class _Search:
             numbers = np.flatnonzero(sizes == size)
             rows = np.array([points[number] for number in numbers.tolist()])
             self._groups.append(_Group(numbers, rows, model.noise_blocks(rows), model.precision_blocks(rows)))
-        self._weighted = model.precision_times(residual)
+        self._sound = model.precision_times(residual)
         self._log_sound = float(model.log_density(residual))
-        # of points that have been inflated: columns of `P_0`, the inverse of their noise and its log determinant
-        self._changed: dict[int, tuple[Floats, Floats, float]] = {}
-        self._update()
+        self._begin()
 
     def change(self, number: int, kind: int) -> None:
         """Give a point another inflation."""
+        before = int(self.kinds[number])
         self.kinds[number] = kind
-        self._prepare(number)
-        self._update()
+        if before == 0:
+            self._inflate([number])
+        else:
+            self.begin_with(self.kinds)
 
     def begin_with(self, kinds: Ints) -> None:
         """Give all points their inflations at once."""
         self.kinds = kinds.copy()
-        for number in np.flatnonzero(kinds).tolist():
-            self._prepare(number)
-        self._update()
+        self._begin()
+        self._inflate(np.flatnonzero(kinds).tolist())
 
-    def _prepare(self, number: int) -> None:
-        if number not in self._changed:
-            rows = self._points[number]
-            noise = self._model.noise_blocks(rows[None])[0]
-            columns = self._model.precision_columns(rows)
-            self._changed[number] = columns, np.asarray(np.linalg.inv(noise)), float(np.linalg.slogdet(noise)[1])
+    def _begin(self) -> None:
+        """With all points sound."""
+        self._Z = np.zeros((len(self._sound), 0))
+        self._weighted, self._precisions = self._sound.copy(), [group.precision.copy() for group in self._groups]
+        self._log_change = 0.0
 
-    def _update(self) -> None:
-        """Factor of `Delta_R^-1 + P_0[R, R]`, and its inverse times `P_0[R, :]` and `(P_0 r)_R`."""
-        from scipy.linalg import solve_triangular
-
-        numbers = np.flatnonzero(self.kinds).tolist()
-        R = np.concatenate([np.zeros(0, dtype=np.int64), *(self._points[number] for number in numbers)])
-        columns = np.concatenate([np.zeros((len(self._model), 0)), *(self._changed[k][0] for k in numbers)], axis=1)
+    def _inflate(self, numbers: Sequence[int]) -> None:
+        """Add the rows of some points to `Z`, and what follows to the inverse and the log density."""
+        if not numbers:
+            return
+        R = np.concatenate([self._points[number] for number in numbers])
+        P_0 = self._model.precision_columns(R)
+        columns = P_0 - self._Z @ self._Z[R].T
         inner, at, log_determinant = columns[R], 0, 0.0
         for number in numbers:
-            _, inverse, log_noise = self._changed[number]
-            size, increase = len(inverse), float(self._variances[self.kinds[number]]) - 1.0
-            inner[at : at + size, at : at + size] += inverse / increase
-            log_determinant += log_noise + size * np.log(increase)
-            at += size
+            rows = self._points[number]
+            part = slice(at, at := at + len(rows))
+            increase = (self._variances[self.kinds[number]] - 1.0) * self._model.noise_blocks(rows[None])[0]
+            inner[part, part] += np.linalg.inv(increase)
+            log_determinant += float(np.linalg.slogdet(increase)[1])
         factor = np.linalg.cholesky(inner)
-        right_sides = np.column_stack([columns.T, self._weighted[R]])
-        solved = solve_triangular(factor, right_sides, lower=True, check_finite=False) if numbers else right_sides
-        self._projected, self._residual = solved[:, :-1].T, solved[:, -1]
-        self._log_determinant = log_determinant + 2.0 * float(np.log(np.diag(factor)).sum())
+        inverse = np.linalg.inv(factor)
+        added, residual = columns @ inverse.T, inverse @ self._weighted[R]
+        self._Z = np.concatenate([self._Z, added], axis=1)
+        self._weighted -= added @ residual
+        for group, precision in zip(self._groups, self._precisions, strict=True):
+            of_points = added[group.rows]
+            precision -= np.einsum("gik,gjk->gij", of_points, of_points)
+        log_determinant += 2.0 * float(np.log(np.diag(factor)).sum())
+        self._log_change += 0.5 * float(residual @ residual) - 0.5 * log_determinant
 
     def log_ratios(self) -> Floats:
         """Log density (g, k) with every inflation of each point, less that with its current one."""
-        weighted = self._weighted - self._projected @ self._residual
         logs = np.empty((len(self.kinds), len(self._variances)))
-        for group in self._groups:
-            projected = self._projected[group.rows]
-            P = group.precision - projected @ np.swapaxes(projected, 1, 2)
-            current = self._variances[self.kinds[group.numbers]]
-            for kind, variance in enumerate(self._variances.tolist()):
-                change = (variance - current)[:, None, None] * group.noise
-                logs[group.numbers, kind] = _log_ratios(weighted[group.rows], P, change)
+        for group, precision in zip(self._groups, self._precisions, strict=True):
+            changes = self._variances - self._variances[self.kinds[group.numbers]][:, None]
+            logs[group.numbers] = _log_ratios(self._weighted[group.rows], precision, group.noise, changes)
         return logs
 
     def log_density(self) -> float:
         """Of the rows, with the current inflations."""
-        return self._log_sound + 0.5 * float(self._residual @ self._residual) - 0.5 * self._log_determinant
+        return self._log_sound + self._log_change
 
 
-def _log_ratios(v: Floats, P: Floats, change: Floats) -> Floats:
-    """Log densities (g,) with a change of each point's covariance, less those without it."""
-    inner = np.eye(v.shape[1]) + change @ P
-    squares = np.einsum("gi,gi->g", v, np.linalg.solve(inner, change @ v[:, :, None])[:, :, 0])
-    return np.asarray(0.5 * squares - 0.5 * np.linalg.slogdet(inner)[1])
+def _log_ratios(v: Floats, P: Floats, noise: Floats, changes: Floats) -> Floats:
+    """Log densities (g, k) with `changes` (g, k) of each point's variance in units of its noise, less those without."""
+    inner = np.eye(v.shape[1]) + changes[:, :, None, None] * (noise @ P)[:, None]
+    right = changes[:, :, None] * np.einsum("gij,gj->gi", noise, v)[:, None]
+    solved, determinant = _solved(inner, right)
+    return np.asarray(0.5 * (np.einsum("gi,gki->gk", v, solved) - np.log(determinant)))
+
+
+def _solved(A: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Solutions (..., d) and determinants (...) of many small systems (..., d, d); of three rows by Cramer's rule."""
+    if A.shape[-1] == 1:
+        return b / A[..., 0], A[..., 0, 0]
+    if A.shape[-1] != 3:
+        return np.linalg.solve(A, b[..., None])[..., 0], np.linalg.det(A)
+    rows = [[A[..., i, j] for j in range(3)] for i in range(3)]
+    cofactors = [_cross(rows[1], rows[2]), _cross(rows[2], rows[0]), _cross(rows[0], rows[1])]
+    determinant = sum(a * c for a, c in zip(rows[0], cofactors[0], strict=True))
+    solution = [sum(b[..., i] * cofactors[i][j] for i in range(3)) / determinant for j in range(3)]
+    return np.stack(solution, axis=-1), np.asarray(determinant)
+
+
+def _cross(a: Sequence[Floats], b: Sequence[Floats]) -> tuple[Floats, Floats, Floats]:
+    """Vector product of components; NumPy's own takes several times as long for small arrays."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -35,6 +35,15 @@ class AssemblyKernels:
     constrained_load: Any
 
 
+@wp.func
+def force_on(first: wp.array[int], corners: wp.array[int], element_forces: wp.array[Any], i: int):
+    """The sum of the element forces on node `i`, in a fixed order."""
+    f = type(element_forces[0])()
+    for c in range(first[i], first[i + 1]):
+        f += element_forces[corners[c]]
+    return f
+
+
 @cache
 def assembly_kernels(precision: Precision) -> AssemblyKernels:
     """Make (once) the assembly kernels of a precision."""
@@ -79,10 +88,7 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
         forces: wp.array[vec3],
     ):
         i = wp.tid()
-        f = vec3()
-        for c in range(first[i], first[i + 1]):
-            f += element_forces[corners[c]]
-        forces[i] = f
+        forces[i] = force_on(first, corners, element_forces, i)
 
     @wp.kernel(module=module)
     def constrained_load(

@@ -6,6 +6,7 @@ from typing import Any
 
 import warp as wp
 
+from warpbrain.kernels.assembly import force_on
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 
@@ -26,8 +27,10 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
 
     @wp.kernel(module=module)
     def right_hand_side(
+        first: wp.array[int],
+        corners: wp.array[int],
+        element_forces: wp.array[vec3],
         external: wp.array[vec3],
-        internal: wp.array[vec3],
         mass: wp.array[scalar],
         v_start: wp.array[vec3],
         v: wp.array[vec3],
@@ -36,11 +39,14 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
         h: scalar,
         along_Mv: scalar,
         along_Av: scalar,
+        internal: wp.array[vec3],
         b: wp.array[vec3],
     ):
         i = wp.tid()
+        f = force_on(first, corners, element_forces, i)
+        internal[i] = f
         momentum = mass[i] * (v_start[i] + along_Mv * v[i])
-        b[i] = wp.cw_mul(free[i], momentum + h * (external[i] - internal[i]) + along_Av * Av[i])
+        b[i] = wp.cw_mul(free[i], momentum + h * (external[i] - f) + along_Av * Av[i])
 
     @wp.kernel(module=module)
     def update(

@@ -1,12 +1,16 @@
 """The one door to linear algebra: preconditioned conjugate gradients on the assembled system.
 
+On a GPU a solve is one launch (`warpbrain.kernels.persistent`), if the whole matrix is in blocks and nothing but these
+preconditions. What follows is for all else: the CPU, ``fsai``, and products beyond the blocks.
+
 Nobody else calls `warp.optim.linear`. A solve is captured once in a graph, with its convergence test on the device, and
 replayed: on CUDA one launch instead of hundreds, on the CPU a loop in C++ instead of Python. Facts about Warp 1.19 that
 are dealt with here and nowhere else:
 
 - on the CPU its CG reduces every tile of a dot product once per absent GPU lane. Naming the one system as a batch of
   one (`batch_offsets = [0, n]`) takes the code path that does not;
-- its matrix-vector product of 3 x 3 blocks has one thread for a scalar row. Ours has one for a block row;
+- its matrix-vector product of 3 x 3 blocks has one thread for a scalar row. Ours has one for a block row, and on a GPU
+  several for a block row;
 - its CG leaves the loop to the device on CUDA only. `_conditional_loop` does the same for a graph of the CPU, where
   Warp would unroll `max_iterations` of them into it;
 - its kernels are compiled ahead for arrays of scalars only; vectors of three would compile that module three times
@@ -27,7 +31,9 @@ import warp.optim.linear as warp_linear
 from warp.sparse import BsrMatrix
 
 from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.persistent import PersistentSolve, blocks_stay
 from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.row_product import LANES, row_product_kernel
 
 #: Names of the preconditioners: inverse diagonal blocks, factorised sparse approximate inverse, none.
 PRECONDITIONERS = ("block-jacobi", "fsai", "none")
@@ -41,7 +47,8 @@ class LinearResult:
     ----------
     iterations : int
     residual, tolerance : float
-        Norm of the residual `b - A x` (as CG updates it) and the norm that was to be reached.
+        Norm of the residual `b - A x` (as CG updates it, unless a solve is one launch) and the norm that was to be
+        reached.
     curvature : float
         Smallest `p . A p / p . p` over the search directions `p`, or NaN if it was not watched. Not positive: the
         matrix is not positive definite.
@@ -256,6 +263,12 @@ class ConjugateGradient:
         self._size = right_hand_side.shape[0]
         self._device = right_hand_side.device
         self._kind = preconditioner
+        self._persistent: PersistentSolve | None = None
+        if preconditioner != "fsai" and beyond is None and blocks_stay(self._device):
+            self._persistent = PersistentSolve(
+                matrix, diagonal, right_hand_side, solution, precision,
+                max_iterations=max_iterations, jacobi=preconditioner == "block-jacobi", watch=watch_curvature,
+            )  # fmt: skip
         self._inverse = wp.empty(self._size, dtype=precision.mat33, device=self._device)
         self._least = wp.full(1, math.inf, dtype=precision.scalar, device=self._device)
         chunks = (self._size + _CHUNK - 1) // _CHUNK
@@ -279,6 +292,7 @@ class ConjugateGradient:
         self._max_iterations = max_iterations
         self._graphs: dict[float, Any] = {}
         self._solvers: dict[float, warp_linear.CG] = {}
+        self._launched = False
         self._outcome: tuple[wp.array, wp.array, wp.array] | None = None
         self._outcomes: dict[float, tuple[wp.array, wp.array, wp.array]] = {}
 
@@ -325,9 +339,10 @@ class ConjugateGradient:
     def _launch_product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         """`z = alpha A x + beta y`."""
         A, scalar = self._matrix, self._precision.scalar
+        on_gpu = self._device.is_cuda
         wp.launch(
-            self._kernels.multiply,
-            dim=self._size,
+            row_product_kernel(self._precision) if on_gpu else self._kernels.multiply,
+            dim=LANES * self._size if on_gpu else self._size,
             inputs=[A.offsets, A.columns, A.values, x, y, z, scalar(alpha), scalar(beta)],
             device=self._device,
         )
@@ -355,11 +370,13 @@ class ConjugateGradient:
         self._launch_product(x, z, z, 1.0, 0.0)
 
     def precondition(self, x: wp.array, z: wp.array) -> None:
-        """`z = D^-1 x`, `D` the diagonal blocks; of a solver with that preconditioner."""
+        """`z = D^-1 x`, `D` the diagonal blocks; of a solver with that preconditioner that is not one launch."""
         self._apply_diagonal(x, x, z, 1.0, 0.0)
 
     def prepare(self) -> None:
         """Renew the preconditioner after the values of the matrix changed; its pattern is kept."""
+        if self._persistent is not None:
+            return
         if self._kind == "block-jacobi":
             wp.launch(
                 self._kernels.invert_diagonal,
@@ -382,12 +399,17 @@ class ConjugateGradient:
     def solve(self, tolerance: float | None = None) -> None:
         """Run CG from the present content of the solution array.
 
-        Within the capture of a graph this only records; otherwise it replays a graph of its own. A tolerance other than
-        that of the constructor is rounded down to a quarter of a decade, so that few graphs serve all.
+        Within the capture of a graph this only records; otherwise it replays a graph of its own, if it is more than a
+        launch. A tolerance other than that of the constructor is rounded down to a quarter of a decade, so that few
+        graphs serve all.
         """
         if self._refused is not None:
             return
         wanted = self._tolerance if tolerance is None else 10.0 ** (math.floor(4.0 * math.log10(tolerance)) / 4.0)
+        if self._persistent is not None:
+            self._persistent.launch(wanted)
+            self._launched = True
+            return
         if self._device.is_capturing:
             self._record(wanted)
             return
@@ -413,6 +435,9 @@ class ConjugateGradient:
         """How the last solve ended (waits for the device)."""
         if self._refused is not None:
             return LinearResult(0, float("nan"), 0.0, self._refused)
+        if self._persistent is not None and self._launched:
+            steps, left, goal, least = self._persistent.outcome()
+            return LinearResult(steps, left, goal, least if self._watch else float("nan"))
         if self._outcome is None:
             raise RuntimeError("no solve has been run")
         iterations, residual, tolerance = (float(values.numpy().ravel()[0]) for values in self._outcome)

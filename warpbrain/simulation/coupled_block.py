@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.coupled import FIRST, ROUNDS, CoupledSolver
 from warpbrain.simulation.kept_factors import KeptFactors
-from warpbrain.simulation.symmetric_factors import symmetric_factors
+from warpbrain.simulation.sparse_factors import SparseFactors
 
 if TYPE_CHECKING:
     from warpbrain.simulation.system import System
@@ -62,9 +62,9 @@ class CoupledBlock:
         self._S = (S + diags((S.diagonal() == 0.0).astype(np.float64))).tocsc()
         # it changes from step to step, not within one
         if before is not None and np.array_equal(before._S.data, self._S.data):
-            self._schur: Any = before._schur
+            self._schur: SparseFactors = before._schur
         else:
-            self._schur = symmetric_factors(self._S)
+            self._schur = SparseFactors(self._S)
 
     def solve(self, load: Floats, wanted: float, factors: KeptFactors, most: int) -> LinearResult:
         """Leave the displacement under a load (3 n,) in the system's solution; how that ended.

@@ -80,8 +80,9 @@ class Simulator:
         self.tolerance = finest_tolerance(tolerance, system.precision)
         vec3, n, device = system.precision.vec3, system.size, system.device
         self.v = wp.zeros(n, dtype=vec3, device=device)
-        self._v_start = wp.zeros_like(self.v)
-        self._u_start = wp.zeros_like(self.v)
+        # a linearised step takes each node from its start to its end at once
+        self._v_start = self.v if newton == 1 else wp.zeros_like(self.v)
+        self._u_start = system.u if newton == 1 else wp.zeros_like(self.v)
         self._v_prescribed = wp.zeros_like(self.v)
         self._moving = False
         self._cg = system.linear_solver(
@@ -158,7 +159,6 @@ class Simulator:
         s, h, damping = self.system, self._h, self.system.model.damping
         scalar = s.precision.scalar
         k, m = h * damping.stiffness + h * h, 1.0 + h * damping.mass
-        s.gather_forces()
         # damping is that of the skeleton alone: pore fluid damps by itself, and a time does not make it stiffer
         s.assemble(k, m, coupling=h * h)
         self._cg.multiply(self.v, s.increment)
@@ -170,8 +170,8 @@ class Simulator:
             self._kernels.right_hand_side,
             dim=s.size,
             inputs=[
-                s.external, s.internal, s.mass, self._v_start, self.v, s.increment, s.free,
-                scalar(h), scalar(along_Mv), scalar(along_Av), s.load,
+                *s.forces_on_nodes, s.external, s.mass, self._v_start, self.v, s.increment, s.free,
+                scalar(h), scalar(along_Mv), scalar(along_Av), s.internal, s.load,
             ],
             device=s.device,
         )  # fmt: skip
@@ -200,8 +200,9 @@ class Simulator:
         )  # fmt: skip
 
     def _begin(self) -> None:
-        wp.copy(self._v_start, self.v)
-        wp.copy(self._u_start, self.system.u)
+        if self.newton > 1:
+            wp.copy(self._v_start, self.v)
+            wp.copy(self._u_start, self.system.u)
 
     def _finish(self) -> None:
         self.time += self._h

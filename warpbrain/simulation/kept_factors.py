@@ -1,8 +1,7 @@
 """Factors of one stiffness, kept to precondition the systems of many states near to it.
 
 A step in time, another moment, a trial of a fit: each changes a tangent a little, and a factorisation of any of them
-nearly solves all. They are kept in single precision, which halves what a solve has to read: a preconditioner need not
-be more exact than the tangent is near.
+nearly solves all.
 """
 
 from __future__ import annotations
@@ -12,16 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.simulation.symmetric_factors import symmetric_factors
+from warpbrain.simulation.sparse_factors import SparseFactors
 
 Floats = NDArray[np.float64]
 
-#: Iterations of a solve with factors that are near, and how many beyond these a factorisation takes as long as.
-_NEAR, _WORTH = 5, 60
+#: Iterations of a solve with factors that are near.
+_NEAR = 5
 
 
 class KeptFactors:
     """Of the stiffness of the last state that they were renewed at; of none at first."""
+
+    #: How many iterations beyond these a factorisation takes as long as.
+    _worth = 25
 
     def __init__(self) -> None:
         self._free: NDArray[np.bool_] | None = None
@@ -34,7 +36,8 @@ class KeptFactors:
 
         And positive definite, if they have to be.
         """
-        if self._free is None or self._wasted > _WORTH or (definite and not self._definite):
+        # with factors of an unstable state conjugate gradients could not tell that it is one
+        if self._free is None or self._wasted > self._worth or (definite and not self._definite):
             return False
         return np.array_equal(self._free, free)
 
@@ -46,21 +49,15 @@ class KeptFactors:
         """Factorise a stiffness [N/m], SciPy (3 n, 3 n), on its free components (3 n,); whether the factors serve."""
         self._free, self._wasted = None, 0
         try:
-            self._factors = symmetric_factors(stiffness.tocsr()[free][:, free].astype(np.float32))
+            self._factors = SparseFactors(stiffness.tocsr()[free][:, free])
         except RuntimeError:
             return False
-        # with pivots on the diagonal their signs are those of the eigenvalues (Sylvester); with factors of an unstable
-        # state conjugate gradients could not tell that it is one
-        on_diagonal = np.array_equal(self._factors.perm_r, self._factors.perm_c)
-        self._definite = on_diagonal and float(self._factors.U.diagonal().min()) > 0.0
-        self._free = free.copy()
+        self._free, self._definite = free.copy(), self._factors.is_definite
         return self.serve(free, definite)
 
     def solve(self, forces: Floats) -> Floats:
         """What nodal forces (3 n,) [N] move: (3 n,) [m], zero where components are not free."""
         assert self._free is not None
-        found = np.zeros(len(forces))
-        # as a number of the order of one: forces may be too small for single precision
-        scale = float(np.abs(forces).max()) or 1.0
-        found[self._free] = scale * self._factors.solve((forces[self._free] / scale).astype(np.float32))
-        return found
+        displacement = np.zeros(len(forces))
+        displacement[self._free] = self._factors.solve(forces[self._free])
+        return displacement

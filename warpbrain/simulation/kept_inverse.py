@@ -32,6 +32,8 @@ class KeptInverse(KeptFactors):
         A GPU for which there is CuPy.
     """
 
+    _worth = 60
+
     def __init__(self, device: Any) -> None:
         super().__init__()
         self._device = device

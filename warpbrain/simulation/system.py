@@ -424,11 +424,14 @@ class System:
         for term in self.terms:
             term.evaluate_tangents(self.u)
 
+    @property
+    def forces_on_nodes(self) -> tuple[wp.array, wp.array, wp.array]:
+        """For `warpbrain.kernels.assembly.force_on`: starts, lists, and the element forces themselves."""
+        return self.corner_first, self.corners, self._flat_forces
+
     def gather_forces(self) -> None:
         """Internal forces from the element forces."""
-        self._launch(
-            self._kernels.gather_forces, self.size, self.corner_first, self.corners, self._flat_forces, self.internal
-        )
+        self._launch(self._kernels.gather_forces, self.size, *self.forces_on_nodes, self.internal)
 
     def size_of_forces(self) -> float:
         """Norm [N] of what rounding is relative to.

@@ -43,7 +43,7 @@ def base() -> Base:
 
 def columns_at(base: Base, fraction: float, displacement: float = 80.0) -> np.ndarray:
     nuisances = base.nuisances
-    return nuisances.with_unknown_mesh(base.model.columns, fraction * displacement * nuisances.relative)
+    return nuisances.with_family("mesh, unknown", base.model.columns, fraction * displacement * nuisances.relative)
 
 
 def rows_of(base: Base, fraction: float, seed: int) -> np.ndarray:

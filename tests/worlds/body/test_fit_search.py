@@ -35,7 +35,7 @@ def search(sets: HypothesisSearch, base: Base) -> FitSearch:
     """A fit of the set with the weight, at the most probable point of the linear model."""
     weighed = sets.get(("gravity",))
     assert weighed is not None
-    columns = base.nuisances.with_unknown_mesh(weighed.columns, base.nuisances.families[-1].columns)
+    columns = base.nuisances.with_family("mesh, unknown", weighed.columns, base.nuisances.families[-1].columns)
     fit = FitSearch(base, None, weighed.effects, columns, weighed.marginal)
     fit.start([weighed.coordinates], base.state)
     return fit
@@ -54,7 +54,7 @@ def test_another_size_of_the_mesh_error_is_the_same_point(base, search):
     unknown = 3.0 * fit.columns[:, part]
     search.z[part] = np.linspace(-1.0, 1.0, part.stop - part.start)
     linear = search.residual + search.columns @ search.z
-    other = replace(fit, columns=nuisances.with_unknown_mesh(fit.columns, unknown))
+    other = replace(fit, columns=nuisances.with_family("mesh, unknown", fit.columns, unknown))
     assert search.update_noise(other)
     np.testing.assert_array_equal(search.columns[:, part], unknown)
     np.testing.assert_allclose(search.residual + search.columns @ search.z, linear, atol=1e-12)

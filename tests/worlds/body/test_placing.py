@@ -16,7 +16,7 @@ def test_a_cell_is_as_probable_as_the_mean_of_its_places_each_with_gross_errors_
     numbers = search.candidates.of_kind["swelling"]
     effect = search.candidates.effects[numbers[len(numbers) // 2]]
     proposed = effect.proposed
-    near = next(place for place in _around(base, effect, 0.5 * spacing) if place.radius == proposed.radius)
+    near = next(place for place in _around(base, proposed, 0.5 * spacing) if place.radius == proposed.radius)
     [true] = base.effects.of([near])
     rng = np.random.default_rng(0)
     # so large that in the wrong place some points are far off
@@ -34,9 +34,9 @@ def test_a_cell_is_as_probable_as_the_mean_of_its_places_each_with_gross_errors_
 
     better = log_evidence(best.effect) - log_evidence(start)
     assert better > 0.0
-    # the mean of 21 places is at most as probable as the best of them, and at least its share of that
-    assert -np.log(21.0) <= best.gain <= better
-    assert best.gain >= log_evidence(scaled(true, size)) - log_evidence(start) - np.log(21.0) - 1e-6
+    # the mean of 81 places is at most as probable as the best of them, and at least its share of that
+    assert -np.log(81.0) <= best.gain <= better
+    assert best.gain >= log_evidence(scaled(true, size)) - log_evidence(start) - np.log(81.0) - 1e-6
 
 
 def test_a_patch_that_lets_go_is_found_between_the_patches_of_a_scan(small_diagnosis):

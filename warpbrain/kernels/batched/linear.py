@@ -9,6 +9,8 @@ are launched over. `docs/ensembles.md` has the times of both.
 A system need not end in the loop that it began in. The loop is left when few go on (`linger`); they keep their vectors
 and go on in the next one beside whatever has been started until then. So a system that takes a thousand iterations
 holds up nobody.
+
+On a GPU the loop is one launch (`warpbrain.kernels.batched.persistent`).
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ import numpy as np
 import warp as wp
 
 from warpbrain.kernels.batched.layout import stages
+from warpbrain.kernels.batched.persistent import PersistentBatch
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
+from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.kernels.precision import Precision
 
 
@@ -45,7 +49,7 @@ class BatchedConjugateGradient:
     Attributes
     ----------
     right_hand_side : wp.array, shape (n, 3, slots)
-        `b`; the residual takes its place.
+        `b`; the residual may take its place.
     solving : wp.array of int, shape (slots,)
         1 while the system of a slot has not ended.
     """
@@ -77,14 +81,21 @@ class BatchedConjugateGradient:
             return wp.zeros(shape, dtype=dtype, device=self._device)
 
         self.right_hand_side = zeros(n, 3, slots)
+        self.solving = zeros(slots, dtype=int)
+        self._active, self._count = zeros(slots, dtype=int), zeros(1, dtype=int)
+        self._persistent: PersistentBatch | None = None
+        if blocks_stay(self._device):
+            self._persistent = PersistentBatch(
+                offsets, columns, blocks, diagonal, values, self.right_hand_side, solution, self.solving, precision,
+                tolerance=tolerance, max_iterations=max_iterations,
+            )  # fmt: skip
+            return
         self._z, self._p, self._q = zeros(n, 3, slots), zeros(n, 3, slots), zeros(n, 3, slots)
         self._inverse = zeros(n, 6, slots)
         self._shares, self._sums = zeros(3, self._chunks, slots), zeros(3, self._groups, slots)
         self._alpha, self._beta = zeros(slots), zeros(slots)
         self._rr, self._rz, self._goal = zeros(slots), zeros(slots), zeros(slots)
         self._iterations = zeros(slots, dtype=int)
-        self.solving = zeros(slots, dtype=int)
-        self._active, self._count = zeros(slots, dtype=int), zeros(1, dtype=int)
         self._go_on = zeros(1, dtype=int)
 
     def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
@@ -93,6 +104,9 @@ class BatchedConjugateGradient:
 
     def start(self, slots: wp.array, count: wp.array) -> None:
         """Begin the systems of a list of slots, whose matrices, right-hand sides and guesses have been set."""
+        if self._persistent is not None:
+            self._persistent.begin(slots, count)
+            return
         k, lanes = self._kernels, self._slots
         self._launch(k.invert_diagonal, (self._size, lanes), slots, count, self._diagonal, self._values, self._inverse)
         self._launch(
@@ -115,13 +129,20 @@ class BatchedConjugateGradient:
             self._launch(
                 self._kernels.gather_active, self._slots, slots, count, self.solving, self._active, self._count
             )
+
+        def look() -> None:
+            gather()
             self._launch(self._kernels.go_on, 1, self._count, linger, self._go_on)
 
         def cycle() -> None:
             self._iteration()
-            gather()
+            look()
 
-        gather()
+        if self._persistent is not None:
+            gather()
+            self._persistent.solve(self._active, self._count, linger)
+            return
+        look()
         wp.capture_while(self._go_on, cycle)
 
     def _iteration(self) -> None:
@@ -143,6 +164,8 @@ class BatchedConjugateGradient:
 
     def results(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Iterations, residual norms and goals of all slots (waits for the device)."""
+        if self._persistent is not None:
+            return self._persistent.results()
         with np.errstate(invalid="ignore"):
             return (
                 self._iterations.numpy().copy(),

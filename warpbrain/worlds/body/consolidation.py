@@ -24,7 +24,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.physics.mechanism import Following
 from warpbrain.physics.term import Coupling, Term
-from warpbrain.simulation.symmetric_factors import symmetric_factors
+from warpbrain.simulation.sparse_factors import SparseFactors
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import Sensors
@@ -88,7 +88,7 @@ def consolidation(at: Linearisation, term: Term) -> Course:
     from scipy.linalg import eigh_tridiagonal
 
     b, B, N, H = _matrices(at, term)
-    flow = symmetric_factors(H)
+    flow = SparseFactors(H)
     v = flow.solve(-b)
     length = float(np.sqrt(max(v @ (H @ v), np.finfo(np.float64).tiny)))
     basis, answers, diagonal, off_diagonal = [v / length], [], [], []

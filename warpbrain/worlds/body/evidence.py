@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
 from warpbrain.inference.marginal import Marginal, marginal
@@ -52,15 +54,22 @@ def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.
     else:
         fractions, unknown = np.ones(1), nuisances.families[-1].columns
     weighed: dict[tuple[int, int], tuple[Floats, Marginal]] = {}
+    columns = nuisances.with_family(UNKNOWN_MESH, columns, unknown)
+    lengths = np.ones(columns.shape[1])
+
+    @cache
+    def of_noise(number: int) -> GaussianModel:
+        return base.noises[number].of_noise(columns)
 
     def log_evidence(fraction: int, noise: int) -> float:
         if (fraction, noise) not in weighed:
-            at_fraction = nuisances.with_unknown_mesh(columns, fractions[fraction] * unknown)
+            lengths[nuisances.part(UNKNOWN_MESH)] = fractions[fraction]
+            model = of_noise(noise).with_lengths(lengths)
             # gross errors are nearly the same whatever the smooth part; what is not resolved may look like some
             known = next((result for (_, other), (_, result) in weighed.items() if other == noise), None)
             near = (scale, None) if known is None else (known.scale, known.inflation)
-            result = marginal(base.noises[noise].of_noise(at_fraction), residual, base.points, *near)
-            weighed[fraction, noise] = (at_fraction, result)
+            result = marginal(model, residual, base.points, *near)
+            weighed[fraction, noise] = (model.columns, result)
         return weighed[fraction, noise][1].log_evidence
 
     first = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction))))

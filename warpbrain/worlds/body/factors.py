@@ -1,9 +1,7 @@
 """The factors of a stiffness matrix, and equilibria under many forces by them.
 
-A GPU for which CuPy is installed has dense ones; see `dense_factors`. On a host forces are taken in blocks of columns:
-SuperLU passes its factors once a block, and a block has to stay in the cache. Blocks are solved in threads, since SciPy
-lets go of Python's lock for that; a block's answer is the same whoever solves it, so results do not depend on the
-number of threads.
+A GPU for which CuPy is installed has dense ones; see `dense_factors`. On a host forces that are sparse are taken in
+blocks of columns, which are dense for a moment only.
 """
 
 from __future__ import annotations
@@ -16,12 +14,11 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
-from warpbrain.simulation.symmetric_factors import symmetric_factors
-from warpbrain.threads import fill_columns
+from warpbrain.simulation.sparse_factors import SparseFactors
 from warpbrain.worlds.body.dense_factors import dense_factors
 
 #: Columns that are solved together.
-_TOGETHER = 16
+_TOGETHER = 256
 
 
 class Factors:
@@ -47,7 +44,7 @@ class Factors:
         if self._dense is not None:
             return
         try:
-            self._factors: Any = symmetric_factors(matrix)
+            self._factors = SparseFactors(matrix, symmetric)
         except RuntimeError as error:
             raise SolveError(f"the state is unstable: its tangent stiffness cannot be factorised ({error})") from None
 
@@ -64,12 +61,12 @@ class Factors:
 
     @cached_property
     def _transposed(self) -> Factors:
-        """Factors of the transposed: SuperLU answers by the transposed of its factors one column after the other.
+        """Factors of the transposed: by those of the matrix one column after the other would be answered.
 
-        That takes three times as long, which a sensor's equilibria make up for many times over.
+        That takes longer than new factors for as many columns as there are sensors.
         """
         assert self._skew is not None
-        return Factors(self._skew.T)
+        return Factors(self._skew.T, symmetric=False)
 
     def between(self, left: Any, columns: Any) -> Floats:
         """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k), dense a block at a time only."""
@@ -83,11 +80,8 @@ class Factors:
 
         columns = columns.tocsc() if issparse(columns) else columns
         result = np.empty((rows, columns.shape[1]), order="F")
-
-        def solve_block(part: slice) -> Floats:
-            block = columns[:, part]
-            block = block.toarray() if issparse(block) else block
-            return of(self._factors.solve(np.asfortranarray(block, dtype=np.float64)))
-
-        fill_columns(result, solve_block, _TOGETHER)
+        for first in range(0, columns.shape[1], _TOGETHER):
+            part = slice(first, first + _TOGETHER)
+            block = columns[:, part].toarray() if issparse(columns) else columns[:, part]
+            result[:, part] = of(self._factors.solve(block))
         return result

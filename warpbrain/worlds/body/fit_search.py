@@ -26,7 +26,7 @@ from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.mesh_share import MeshShare, mesh_share_of
-from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
+from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.rigid_motion import RigidMotion
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
@@ -40,8 +40,9 @@ _DIFFERENCE = 0.05
 _KEPT = 9
 #: Steps shorter than this in standard deviations of the prior end the search.
 _SHORT = 0.03
-#: By what part the unknown part of the mesh's error changes that is worth going on.
-_SAME_MESH = 0.05
+#: By what part an error of the mesh changes that is worth going on, and by how much [standard deviations of the noise,
+#: all sensors together].
+_SAME_MESH, _MATTERS = 0.05, 0.3
 
 
 class FitSearch:
@@ -89,6 +90,8 @@ class FitSearch:
         # the state that was linearised last, and the coordinates of that of the columns
         self._nearby = base.at
         self._linearised_at = np.full(len(self._layout.nonlinear), np.inf)
+        # whether the columns lack a share of the mesh's error that residuals have
+        self._outdated = False
         # of the last state of this fit that was followed over time
         self._course: tuple[Floats, ...] = ()
         self.columns = columns
@@ -124,8 +127,20 @@ class FitSearch:
         z[first : first + len(coefficients)] = coefficients
         self._linearised_at = z
         if subset.mesh_share is not None:
-            self._mesh_share = subset.mesh_share.extended(len(self.z) - first)
+            share = subset.mesh_share.extended(len(self.z) - first)
+            self._take_mesh_share(share, z[first:])
         return z
+
+    def _take_mesh_share(self, share: MeshShare, z: Floats) -> None:
+        """Take a share of the mesh's error for that of the mechanisms, known to a part only, about coefficients (k,).
+
+        On meshes that lock it is as large as the effect itself: there the error does not yet fall with the power of the
+        element size that is assumed.
+        """
+        nuisances, unknown = self._base.nuisances, belief("mesh.share") * share.at(z)[:, None]
+        self._U = nuisances.with_family(MESH_SHARE, self._U, unknown)
+        self.columns = nuisances.with_family(MESH_SHARE, self.columns, unknown)
+        self._mesh_share, self._outdated = share, True
 
     def backtrack_to_base(self) -> None:
         """Move tissue and field toward the base while that is better: far from it the linear model may fail."""
@@ -148,7 +163,7 @@ class FitSearch:
         self.converged, by_differences = False, False
         for iteration in range(_ITERATIONS):
             moved = np.abs(self.z - self._linearised_at)[self._layout.nonlinear].max(initial=0.0)
-            if relinearise and iteration > 0 and moved > _RELINEARISE:
+            if relinearise and (self._outdated or (iteration > 0 and moved > _RELINEARISE)):
                 self._relinearise()
                 if by_differences:
                     self.columns = self._difference_columns()
@@ -181,25 +196,27 @@ class FitSearch:
             self.residual = self.residual + before @ self.z[part] - unknown @ fit.nuisances[part]
             self.z = self.z.copy()
             self.z[part] = fit.nuisances[part]
-            self._U = nuisances.with_unknown_mesh(self._U, unknown)
-            self.columns = nuisances.with_unknown_mesh(self.columns, unknown)
+            self._U = nuisances.with_family(UNKNOWN_MESH, self._U, unknown)
+            self.columns = nuisances.with_family(UNKNOWN_MESH, self.columns, unknown)
         if not same:
             self._best = np.inf
             self._accept_if_better(self.z, self.state, self.residual)
         return not same
 
     def update_mesh_share(self, known: MeshErrors, finer: FinerStates) -> bool:
-        """Compute the mechanisms' share of the mesh's error at the best point; whether a finer mesh tells it."""
+        """Compute the mechanisms' share of the mesh's error at the best point; whether it is another than was known.
+
+        None is known to be another where a finer mesh does not tell.
+        """
         coefficients, prior = [self.z[part] for part in self._layout.effects], self._base.prior
         share = mesh_share_of(self.effects, coefficients, self.state, known, finer, prior)
         if share is None:
             return False
-        self.columns, part = self.columns.copy(), self._layout.coefficients
-        if self._mesh_share is not None:
-            self.columns[:, part] -= self._mesh_share.columns()
-        self.columns[:, part] += share.columns()
-        self._mesh_share = share
-        return True
+        before, z = self._mesh_share, self.z[self._U.shape[1] :]
+        self._take_mesh_share(share, z)
+        change = share.at(z) - (0.0 if before is None else before.at(z))
+        size = float(np.linalg.norm(self._noise.whitened(share.at(z))))
+        return float(np.linalg.norm(self._noise.whitened(change))) > max(_MATTERS, _SAME_MESH * size)
 
     def result(self) -> Refit:
         """The fit at its best point."""
@@ -208,11 +225,10 @@ class FitSearch:
         columns, evidence = evidence_of(self._base, self.columns, linear, self._marginal.scale)
         part, z = self._base.nuisances.part(UNKNOWN_MESH), self.z.copy()
         z[part] = evidence.coordinates(linear)[part]
-        # what is not known of the mesh's share widens the sizes of mechanisms, not their evidence
-        W = self._noise.whitened(np.column_stack([columns, *self._mesh_share_deviation(z[q:])]))
+        W = self._noise.whitened(columns)
         covariance = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
-        # how far the best point would move with it, or if the search had gone on, is uncertainty, too
-        shift = (covariance @ (W.T @ self._noise.whitened(linear)))[: len(z)] - z
+        # how far the best point would move if the search had gone on is uncertainty, too
+        shift = covariance @ (W.T @ self._noise.whitened(linear)) - z
         parts = self._layout.effects
         return Refit(
             self.effects,
@@ -227,14 +243,6 @@ class FitSearch:
             self.converged,
             self._mesh_share,
         )
-
-    def _mesh_share_deviation(self, z: Floats) -> list[Floats]:
-        """Columns (n, 1) of what is not known of the mechanisms' share of the mesh's error.
-
-        On meshes that lock it is as large as the effect itself: there the error does not yet fall with the power of the
-        element size that is assumed.
-        """
-        return [] if self._mesh_share is None else [belief("mesh.share") * self._mesh_share.at(z)[:, None]]
 
     def _gauss_newton_step(self, field_stays: bool) -> Floats:
         """The step; without the stiffness field, whose columns are rough where something relaxes, if that stays.
@@ -344,7 +352,7 @@ class FitSearch:
             self._mesh_share,
         )
         self._nearby = self._nearby if at is None else at
-        self._linearised_at = self.z
+        self._linearised_at, self._outdated = self.z, False
         # laws act linearly: of what they do, that about the new state
         law = self._layout.law
         before, self._U = self._U, self._U.copy()

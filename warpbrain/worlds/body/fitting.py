@@ -18,7 +18,7 @@ from warpbrain.worlds.body.mesh_share import excess_error
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.states import SolvedState
 
-#: How often at most a fit is repeated with the gross errors and the noise of its result.
+#: How often at most a fit is repeated with the error of the mesh, or the gross errors and the noise, of its result.
 _ROUNDS = 3
 #: Change of the log evidence below which the fit is not repeated again.
 _SAME = 0.1
@@ -82,9 +82,11 @@ class Fitter:
         if subset is None:
             search.backtrack_to_base()
         search.minimise(relinearise=True)
-        if self.mesh_errors is not None and self._mesh_error_changed(search, screened, self.mesh_errors):
+        for _ in range(_ROUNDS):
+            if self.mesh_errors is None or not self._mesh_error_changed(search, screened, self.mesh_errors):
+                break
             search.start([search.z], search.state)
-            search.minimise(relinearise=False)
+            search.minimise(relinearise=True)
         fit = search.result()
         for _ in range(_ROUNDS):
             if not search.update_noise(fit):
@@ -96,6 +98,18 @@ class Fitter:
         if not np.isfinite(fit.log_evidence):
             raise FloatingPointError("its evidence is not a number")
         return fit
+
+    def begin(self, effects: tuple[Effect, ...], refit: Refit) -> Refit:
+        """The point of a fit with other effects that have as many coefficients, in the columns of that fit.
+
+        Raises
+        ------
+        SolveError
+            If there is no equilibrium.
+        """
+        search = FitSearch(self.base, self.mesh_errors, effects, refit.columns, refit.marginal)
+        search.start([search.begin_at(refit)], refit.state)
+        return search.result()
 
     def _mesh_error_changed(self, search: FitSearch, screened: Marginal, known: MeshErrors) -> bool:
         """Compute the error of the mesh at the best point; whether the search has to go on with it."""

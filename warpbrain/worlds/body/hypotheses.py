@@ -214,15 +214,17 @@ class HypothesisSearch:
         gain = inherited + _of_all_places(gain - inherited, candidate.log_share)
         log_evidence = candidate.hypothesis.log_evidence - inherited + gain
         fitted = fitted.with_evidence(log_evidence)
-        self._sets[names] = moved_about_fit(self.base, self._fitter, fitted, self.spacing, self._missing(fitted))
+        # places are moved where the verdict may depend on it
+        near = self._missing(fitted) <= belief("fits.change")
+        self._sets[names] = moved_about_fit(self.base, self._fitter, fitted, self.spacing) if near else fitted
         self._pass_on(gain, names)
         self._refit_subsets(names)
 
     def _missing(self, candidate: WeightedSet) -> float:
-        """Log evidence that a set would have to gain for the verdict to depend on it."""
+        """Log evidence that a set would have to gain to be as probable as the best one."""
         best = max(other.hypothesis.log_evidence + other.hypothesis.log_prior for other in self._sets.values())
         own = candidate.hypothesis.log_evidence + candidate.hypothesis.log_prior
-        return float(best - own - belief("fits.change"))
+        return float(best - own)
 
     def _refit_subsets(self, names: frozenset[str]) -> None:
         """Fit subsets with one mechanism less again, from the optimum of a set, if that is better than their own.
@@ -292,7 +294,7 @@ class HypothesisSearch:
         """The most probable coordinates of a set in the linear model about the fit without any cause."""
         columns = np.column_stack([nothing.columns, candidate.columns[:, len(nothing.nuisances) :]])
         nuisances = self.base.nuisances
-        columns = nuisances.with_unknown_mesh(columns, candidate.columns[:, nuisances.part(UNKNOWN_MESH)])
+        columns = nuisances.with_family(UNKNOWN_MESH, columns, candidate.columns[:, nuisances.part(UNKNOWN_MESH)])
         model = GaussianModel(candidate.marginal.noise.noise_factor, columns)
         return model.coefficients(nothing.linear + candidate.residual - self.base.residual)[0]
 

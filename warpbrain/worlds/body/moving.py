@@ -1,12 +1,14 @@
-"""A fitted set with its local mechanisms moved to better places nearby, as its fit shows them.
+"""A fitted set with its local mechanisms moved to better places nearby.
 
 Places are chosen in the linear model about the base, in which a mechanism deforms nothing yet. Where it moves a wall by
 as much as its own radius, another place and radius may fit better by tens of nats, and what is left at the wrong one
-looks like a further cause.
+looks like a further cause. A linear model about the fit does not show it either: there the mechanism acts where it is.
+So the state with it at another place is computed, all coordinates the same, and is linear about that.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,20 +16,18 @@ import numpy as np
 from warpbrain.errors import InputError, SolveError
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import scaled
-from warpbrain.worlds.body.effects import Effect, Effects
-from warpbrain.worlds.body.evidence import evidence_of
+from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.fitting import Fitter
+from warpbrain.worlds.body.placing import places_about
 from warpbrain.worlds.body.refit import Refit
-from warpbrain.worlds.body.weighing import with_refined_places
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
-#: How often places are looked at anew, and by how much [nats] the linear model must say that others are better.
-_MOVES, _BETTER = 3, 1.0
+#: How often places are looked at anew, how far they are apart in spacings of a scan, and by how much [nats] the linear
+#: model must say that others are better.
+_MOVES, _STEP, _BETTER = 3, 0.25, 1.0
 
 
-def moved_about_fit(
-    base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float, least: float = _BETTER
-) -> WeightedSet:
+def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:
     """A fitted set, fitted again where its mechanisms are better placed.
 
     Parameters
@@ -37,64 +37,52 @@ def moved_about_fit(
     fitted : WeightedSet
     spacing : float
         Between the places of a scan [m].
-    least : float
-        Log evidence [nats] that it has to gain to matter.
     """
-    start = fitted.hypothesis.log_evidence
     for _ in range(_MOVES):
-        gained = fitted.hypothesis.log_evidence - start
-        moved = _moved_once(base, fitter, fitted, spacing, max(least - gained, _BETTER))
+        assert fitted.refit is not None
+        moved = _moved_once(base, fitter, fitted.refit, _STEP * spacing)
         if moved is None:
             break
-        fitted = moved
+        fitted = _with_fit(fitted, moved, moved.log_evidence - fitted.refit.log_evidence)
     return fitted
 
 
-def _moved_once(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float, least: float) -> WeightedSet | None:
-    """The same at the best places in the cells about those of the fit; None if no others are better."""
-    refit = fitted.refit
-    assert refit is not None
-    if not any(_can_be_elsewhere(effect) for effect in fitted.effects):
+def _moved_once(base: Base, fitter: Fitter, refit: Refit, step: float) -> Refit | None:
+    """The fit with one mechanism a step from where it is; None if none is better."""
+    begun = refit
+    for number in range(len(refit.effects)):
+        for effect in _elsewhere(base, refit.effects[number], step):
+            effects = (*refit.effects[:number], effect, *refit.effects[number + 1 :])
+            try:
+                tried = fitter.begin(effects, refit)
+            except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError):
+                continue
+            begun = max(begun, tried, key=lambda fit: fit.log_evidence)
+    if begun.log_evidence < refit.log_evidence + _BETTER:
         return None
     try:
-        source = Effects(refit.state.linearised(), mesh_errors=base.mesh_errors)
-        begun = _about_fit(base, fitted, source)
-        moved = with_refined_places(base, begun, spacing, source)
-        if moved.effects == begun.effects or moved.marginal.log_evidence < begun.marginal.log_evidence + least:
-            return None
-        again = fitter.fit(moved.effects, moved.columns, [moved.coordinates], moved.marginal, refit.state, refit)
+        moved = fitter.fit(begun.effects, begun.columns, [], begun.marginal, begun.state, begun)
     except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError):
         return None
-    return _with_fit(fitted, again, again.log_evidence - refit.log_evidence)
+    return moved if moved.log_evidence > refit.log_evidence else None
 
 
-def _can_be_elsewhere(effect: Effect) -> bool:
+def _elsewhere(base: Base, effect: Effect, step: float) -> Iterator[Effect]:
+    """An effect at places a step from where it is, in its own columns; none of what is everywhere, or there or not."""
     proposal = effect.proposal
-    return proposal is not None and proposal.elsewhere is not None and not proposal.is_there_or_not
+    if proposal is None or proposal.elsewhere is None or proposal.is_there_or_not:
+        return
+    assert proposal.centre is not None and proposal.radius is not None
+    size = float(np.max(proposal.sd / proposal.elsewhere(proposal.centre, proposal.radius).sd))
+    for other in places_about(base, proposal, step):
+        yield replace(scaled(replace(effect, proposal=other), size), columns=effect.columns)
 
 
-def _about_fit(base: Base, fitted: WeightedSet, source: Effects) -> WeightedSet:
-    """The linear model about a fit, with its local effects as those of other places are made: no mesh's share."""
-    effects, columns = list(fitted.effects), fitted.columns.copy()
-    for number, (effect, part) in enumerate(zip(fitted.effects, fitted.slices, strict=True)):
-        if not _can_be_elsewhere(effect):
-            continue
-        here = effect.proposed
-        assert here.elsewhere is not None and here.centre is not None and here.radius is not None
-        usual = here.elsewhere(here.centre, here.radius)
-        effects[number] = scaled(source.of([usual])[0], float(np.max(here.sd / usual.sd)))
-        columns[:, part] = effects[number].columns
-    columns, marginal = evidence_of(base, columns, fitted.residual, fitted.marginal.scale)
-    return replace(fitted, effects=tuple(effects), columns=columns, marginal=marginal, refined=False)
-
-
-def _with_fit(fitted: WeightedSet, refit: Refit, better: float) -> WeightedSet | None:
-    """A set at another place that was fitted; None if that is no better.
+def _with_fit(fitted: WeightedSet, refit: Refit, better: float) -> WeightedSet:
+    """A set at another place that was fitted.
 
     Both places are as probable as each other before anything is recorded: their evidence is added up.
     """
-    if better <= 0.0:
-        return None
     moved = replace(
         fitted,
         effects=refit.effects,

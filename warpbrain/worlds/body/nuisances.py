@@ -34,8 +34,8 @@ from warpbrain.worlds.body.states import Hypothesis, States
 
 #: The family of what is not known of the shape of tissues' laws.
 LAW = "shape of the law"
-#: The family of what is not known of the mesh's error.
-UNKNOWN_MESH = "mesh, unknown"
+#: The family of what is not known of the mesh's error, and that of mechanisms' shares of it, which only fits have.
+UNKNOWN_MESH, MESH_SHARE = "mesh, unknown", "mesh, of mechanisms"
 #: Exponent of what stiffens in both directions.
 _STIFFENS = 8.0
 #: Step of a difference in `theta`.
@@ -97,10 +97,10 @@ class Nuisances:
         scaled = Family(last.name, last.columns * (fraction / self.fraction))
         return replace(self, families=(*others, scaled), fraction=fraction)
 
-    def with_unknown_mesh(self, columns: Floats, unknown: Floats) -> Floats:
-        """Columns (n, q + k) that begin with these nuisances, with others (n, k) of the unknown part of the error."""
+    def with_family(self, name: str, columns: Floats, of_family: Floats) -> Floats:
+        """Columns (n, q + k) that begin with these nuisances, with others (n, j) of one family."""
         changed = columns.copy()
-        changed[:, self.part(UNKNOWN_MESH)] = unknown
+        changed[:, self.part(name)] = of_family
         return changed
 
     def coordinates(self, prior: Gaussian, hypothesis: Hypothesis) -> Floats:
@@ -167,6 +167,7 @@ def nuisances_at(
         error = mesh_errors.error
         answer = sensors.share * sensors.answer(error.u, error.reactions)
         families.append(Family("mesh", Discretisation().deviation * answer[:, None]))
+        families.append(Family(MESH_SHARE, np.zeros((len(sensors), 1))))
     displacement, relative = _displacement(at), _alike(sensors, anchors)
     families.append(Family(UNKNOWN_MESH, fraction * displacement[:, None] * relative))
     return Nuisances(tuple(families), anchors, fraction, displacement, relative)

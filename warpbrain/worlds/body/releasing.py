@@ -113,29 +113,52 @@ class HeldSurface:
         return self._released[key]
 
     def _release(self, members: Bools, lifts: bool) -> Floats:
-        pull = self._R[:, 2]
-        off = members & (pull > 0.0) & lifts
+        """Displacement (3 m,) of the nodes where some (m,) let go, their motion along the wall eliminated first."""
+        from scipy.linalg import cho_factor, cho_solve
+
+        count = int(members.sum())
+        nodes = 3 * np.flatnonzero(members)
+        along, normal = np.sort(np.concatenate([nodes, nodes + 1])), nodes + 2
+        coupling, R = self._S[np.ix_(normal, along)], self._R.ravel()
+        displacement = np.zeros(len(R))
+        try:
+            factor = cho_factor(self._S[np.ix_(along, along)], check_finite=False)
+            sliding = -cho_solve(factor, R[along], check_finite=False)
+            displacement[along] = sliding
+            if lifts:
+                by_normal = cho_solve(factor, coupling.T, check_finite=False)
+                stiffness = self._S[np.ix_(normal, normal)] - coupling @ by_normal
+                lifted = self._lifted(stiffness, R[normal] + coupling @ sliding, R[normal] > 0.0)
+                displacement[normal], displacement[along] = lifted, sliding - by_normal @ lifted
+        except np.linalg.LinAlgError:
+            displacement[normal] = np.inf
+        if not np.abs(displacement).max() < self._farthest:
+            raise SolveError(f"letting go of {count} nodes: no equilibrium is near")
+        return displacement
+
+    @staticmethod
+    def _lifted(S: Floats, R: Floats, off: Bools) -> Floats:
+        """Displacement (k,) along the normals of nodes that leave the wall where they are under tension.
+
+        Parameters
+        ----------
+        S : (k, k) array
+            Stiffness of their motion along the normals, that along the wall eliminated.
+        R : (k,) array
+            Reactions along the normals.
+        off : (k,) bool array
+            Those that are off at first.
+        """
+        from scipy.linalg import cho_factor, cho_solve
+
         for _ in range(_CHANGES):
-            moved = self._displacement(np.column_stack([members, members, off]))
-            if not lifts:
-                break
-            pull = self._R[:, 2] + (self._S[2::3] @ moved)
-            changed = members & np.where(off, moved[2::3] < 0.0, pull > 0.0)
+            lifted = np.zeros(len(R))
+            if off.any():
+                factor = cho_factor(S[np.ix_(off, off)], check_finite=False)
+                lifted[off] = -cho_solve(factor, R[off], check_finite=False)
+            under_tension = R + S @ lifted > 0.0
+            changed = np.where(off, lifted < 0.0, under_tension)
             if np.array_equal(changed, off):
                 break
             off = changed
-        return moved
-
-    def _displacement(self, loose: Bools) -> Floats:
-        from scipy.linalg import cho_factor, cho_solve
-
-        numbers = np.flatnonzero(loose.ravel())
-        displacement = np.zeros(loose.size)
-        try:
-            factor = cho_factor(self._S[np.ix_(numbers, numbers)], check_finite=False)
-            displacement[numbers] = cho_solve(factor, -self._R.ravel()[numbers], check_finite=False)
-        except np.linalg.LinAlgError:
-            displacement[numbers] = np.inf
-        if not np.abs(displacement).max() < self._farthest:
-            raise SolveError(f"letting go of {int(loose[:, 0].sum())} nodes: no equilibrium is near")
-        return displacement
+        return lifted

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -111,7 +112,14 @@ class SolvedState:
         SolveError
             If it is unstable.
         """
-        sensors = self.sensors if sensors is None else sensors
+        return self._linearised if sensors is None else self._linearised_for(sensors)
+
+    @cached_property
+    def _linearised(self) -> Linearisation:
+        """Of its own sensors: factorised once, whoever asks for it."""
+        return self._linearised_for(self.sensors)
+
+    def _linearised_for(self, sensors: Sensors) -> Linearisation:
         last = Linearisation(self.system, self.u, self.reactions, sensors)
         systems = {id(instant.system) for instant in self.instants}
         if sensors.is_counted_from_rest and (self.course or len(systems) <= 1):
@@ -265,9 +273,7 @@ class States:
             own = system if moments.cases[number] is case else self._system(hypothesis, moments.cases[number])
             near = start if not found else self._near.get(time, start)
             external = own.model.external_forces()
-            # on a CPU conjugate gradients solve a single state in the time that factors take
-            factors = None if own.device.is_cpu else self._factors_of(own)
-            solver = EquilibriumSolver(own, options, factors=factors)
+            solver = EquilibriumSolver(own, options, factors=self._factors_of(own))
             if nearby is not None and near is not None and not found:
                 near = nearby.toward_equilibrium(own, external, near, TOLERANCE)
             try:

@@ -1,0 +1,513 @@
+// Preconditioned conjugate gradients in one launch: the body of `solve` in persistent.py and batched/persistent.py,
+// which say what it does and what its arguments are. BATCHED, THREADS, LANES, SHARED_BYTES, REAL and ROUNDING are put
+// before it.
+//
+// Blocks are in groups; a group solves one system after the other. With BATCHED these are samples, of which one in a
+// slot has the numbers `slot + stride * k`; without, there is one group and one system.
+
+constexpr int WARPS = THREADS / 32;
+constexpr int ROWS_OF_WARP = 32 / LANES;
+constexpr int ROWS_AT_ONCE = THREADS / LANES;
+constexpr unsigned ALL = 0xffffffffu;
+constexpr int SUMS = 4;
+constexpr int MOST_BLOCKS = 256;
+#if BATCHED
+constexpr int SCALARS = 7;
+#endif
+// iterations after which the recurrences start again from the residual itself
+constexpr int RENEWED_EVERY = 50;
+// and after which rounding begins to cost more iterations than meetings cost time
+constexpr int PIPELINED = 200;
+// [ns]; blocks that do not hear from each other for so long give up
+constexpr unsigned long long PATIENCE = 2000000000ull;
+
+extern __shared__ char dynamic_smem_base[];
+
+const int tid = threadIdx.x, lane = tid % 32, warp = tid / 32, sub = lane % LANES;
+const int grid = starts.shape[0] - 1, group = blockIdx.x / grid, groups = gridDim.x / grid, me = blockIdx.x % grid;
+const int row0 = starts.data[me], rows = starts.data[me + 1] - row0;
+const int block0 = offsets.data[row0], blocks = offsets.data[row0 + rows] - block0;
+const int nodes = x.shape[0];
+const REAL *const all_values = (const REAL *)values.data;
+const REAL *const b_of = (const REAL *)b.data;
+REAL *const x_of = (REAL *)x.data;
+int *const state = control.data + 2 * group;
+unsigned long long *const mailbox = (unsigned long long *)messages.data + size_t(group) * grid * 4 * SUMS;
+double *const places = exchange.data + size_t(group) * 12 * nodes, *const solution = places + 8 * size_t(nodes);
+#if BATCHED
+const int systems = count.data[0];
+const size_t stride = x.shape[2];
+constexpr int watch = 0, jacobi = 1;
+#else
+const int systems = 1;
+constexpr size_t stride = 1;
+#endif
+size_t slot = 0;
+// number k of the block in a place of these rows
+auto entry = [&](int place, int k) -> REAL {
+#if BATCHED
+    // what is left of the diagonal is kept right of it
+    const int pair = pairs.data[block0 + place];
+    return all_values[(pair < 0 ? 9 * size_t(-1 - pair) + k % 3 * 3 + k / 3 : 9 * size_t(pair) + k) * stride + slot];
+#else
+    return all_values[9 * (size_t(block0) + place) + k];
+#endif
+};
+
+// -- what is kept on the chip: vectors and inverse diagonal blocks, then as much of the matrix as there is room for
+enum { X, R, U, W, P, S, Q, Z, M, INVERSE, VECTORS = INVERSE + 3 };
+double(*const partial)[SUMS] = (double(*)[SUMS])dynamic_smem_base;
+double(*const totals)[SUMS] = partial + WARPS;
+int *const quit = (int *)(totals + MOST_BLOCKS / 32);
+char *room = (char *)(quit + 4);
+int left = SHARED_BYTES - (int)(room - dynamic_smem_base);
+const int length = 3 * rows;
+double *vectors = (double *)room;
+if (VECTORS * length * 8 <= left) {
+    room += VECTORS * length * 8;
+    left -= VECTORS * length * 8;
+} else {
+    vectors = scratch.data + size_t(VECTORS) * 3 * (size_t(group) * nodes + row0);
+}
+int *first = (int *)room;
+const int offset_bytes = (4 * (rows + 1) + 7) / 8 * 8;
+const bool keeps_offsets = offset_bytes <= left;
+if (keeps_offsets) {
+    room += offset_bytes;
+    left -= offset_bytes;
+}
+const int kept = keeps_offsets ? min(blocks, left / (int)(9 * sizeof(REAL) + 4)) : 0;
+REAL *const kept_values = (REAL *)room;
+int *const kept_columns = (int *)(kept_values + 9 * size_t(kept));
+
+if (tid == 0)
+    *quit = state[1];
+if (keeps_offsets)
+    for (int i = tid; i <= rows; i += THREADS)
+        first[i] = offsets.data[row0 + i] - block0;
+for (int i = tid; i < kept; i += THREADS)
+    kept_columns[i] = columns.data[block0 + i];
+// the same for all blocks of a group: each reads it before the first meeting, and it is written after the last
+unsigned epoch = (unsigned)state[0];
+__syncthreads();
+if (*quit)
+    return;
+
+// -- meetings of the blocks of a group
+// Sums over a warp of four numbers: lane 8 k has the k-th, in an order that is always the same. Halves of the warp send
+// each other what the other one sums.
+auto warp_sums = [&](const double s[SUMS]) -> double {
+    const bool upper = lane & 16, odd = lane & 8;
+    double low = upper ? s[2] : s[0], high = upper ? s[3] : s[1];
+    low += __shfl_xor_sync(ALL, upper ? s[0] : s[2], 16);
+    high += __shfl_xor_sync(ALL, upper ? s[1] : s[3], 16);
+    double sum = odd ? high : low;
+    sum += __shfl_xor_sync(ALL, odd ? low : high, 8);
+    for (int d = 4; d > 0; d /= 2)
+        sum += __shfl_xor_sync(ALL, sum, d);
+    return sum;
+};
+double sums[SUMS] = {0.0, 0.0, 0.0, 0.0};
+// What threads stored before is seen by all after it, and their shares of `sums` are added in an order that is always
+// the same. False if a block is missing: then every thread has to return.
+auto meet = [&]() -> bool {
+    double sum = warp_sums(sums);
+    if (lane % 8 == 0)
+        partial[warp][lane / 8] = sum;
+    __syncthreads();
+    ++epoch;
+    // a message is half a number and the epoch, which a single store of eight bytes cannot tear apart; a place is
+    // written again only two meetings later, when all have read it
+    unsigned long long *const mail = mailbox + size_t(epoch % 2) * grid * 2 * SUMS;
+    if (warp == 0) {
+        for (int k = 0; k < SUMS; ++k)
+            sums[k] = lane < WARPS ? partial[lane][k] : 0.0;
+        sum = warp_sums(sums);
+        asm volatile("fence.acq_rel.gpu;" ::: "memory");
+        if (lane % 8 < 2) {
+            const unsigned long long bits = __double_as_longlong(sum);
+            const unsigned long long half = lane % 8 ? bits >> 32 : bits & 0xffffffffull;
+            const unsigned long long message = half << 32 | epoch;
+            unsigned long long *const to = mail + 2 * SUMS * me + lane / 8 * 2 + lane % 8;
+            asm volatile("st.relaxed.gpu.global.u64 [%0], %1;" ::"l"(to), "l"(message) : "memory");
+        }
+    }
+    if (warp < (grid + 31) / 32) {
+        for (int k = 0; k < SUMS; ++k)
+            sums[k] = 0.0;
+        if (tid < grid) {
+            const unsigned long long *const from = mail + 2 * SUMS * tid;
+            unsigned long long begun = 0, now;
+            for (unsigned tries = 1;; ++tries) {
+                bool all_there = true;
+                for (int k = 0; k < SUMS; ++k) {
+                    unsigned long long low, high;
+                    asm volatile("ld.relaxed.gpu.global.v2.u64 {%0, %1}, [%2];"
+                                 : "=l"(low), "=l"(high)
+                                 : "l"(from + 2 * k)
+                                 : "memory");
+                    all_there = all_there && (unsigned)low == epoch && (unsigned)high == epoch;
+                    sums[k] = __longlong_as_double((long long)(high >> 32 << 32 | low >> 32));
+                }
+                if (all_there)
+                    break;
+                if (tries % 1024 == 0) {
+                    asm volatile("mov.u64 %0, %globaltimer;" : "=l"(now));
+                    begun = begun == 0 ? now : begun;
+                    if (now - begun > PATIENCE || *(volatile int *)(state + 1)) {
+                        *(volatile int *)(state + 1) = 1;
+                        *(volatile int *)quit = 1;
+                        break;
+                    }
+                }
+            }
+            asm volatile("fence.acq_rel.gpu;" ::: "memory");
+        }
+        sum = warp_sums(sums);
+        if (lane % 8 == 0)
+            totals[warp][lane / 8] = sum;
+    }
+    __syncthreads();
+    for (int k = 0; k < SUMS; ++k)
+        sums[k] = totals[0][k];
+    // all on their way before the first is needed
+#pragma unroll
+    for (int w = 1; w < MOST_BLOCKS / 32; ++w)
+        if (w < (grid + 31) / 32)
+            for (int k = 0; k < SUMS; ++k)
+                sums[k] += totals[w][k];
+    return *(volatile int *)quit == 0;
+};
+
+// -- rows: LANES threads for each; of every four the first three have its components, of which those of the first four
+// count
+const int component = min(sub % 4, 2);
+// Component of a row of `A v`, of what was given before the last meeting; where the residual is measured of `A x` and
+// `|A| |x|`, of what has been reached or of the guess.
+int turn = 0;
+bool of_guess = true, measured = true;
+double size;
+auto product = [&](int row) -> double {
+    const double *const given = measured ? solution : places + size_t(turn ^ 1) * 4 * nodes;
+    auto get = [&](int node, double v[3]) {
+        if (of_guess) {
+            for (int c = 0; c < 3; ++c)
+                v[c] = double(x_of[(3 * size_t(node) + c) * stride + slot]);
+        } else {
+            const double *const from = given + 4 * size_t(node);
+            asm volatile("ld.global.cg.v2.f64 {%0, %1}, [%2];" : "=d"(v[0]), "=d"(v[1]) : "l"(from));
+            asm volatile("ld.global.cg.f64 %0, [%1];" : "=d"(v[2]) : "l"(from + 2));
+        }
+    };
+    double y[3] = {0.0, 0.0, 0.0}, z[3] = {0.0, 0.0, 0.0};
+    auto add = [&](int place, const double v[3]) {
+        double entries[9];
+        for (int k = 0; k < 9; ++k)
+            entries[k] = double(place < kept ? kept_values[9 * place + k] : entry(place, k));
+        for (int c = 0; c < 3; ++c)
+            for (int k = 0; k < 3; ++k)
+                y[c] += entries[3 * c + k] * v[k];
+        if (measured)
+            for (int c = 0; c < 3; ++c)
+                for (int k = 0; k < 3; ++k)
+                    z[c] += fabs(entries[3 * c + k] * v[k]);
+    };
+    auto column = [&](int place) { return place < kept ? kept_columns[place] : columns.data[block0 + place]; };
+    const int end = keeps_offsets ? first[row + 1] : offsets.data[row0 + row + 1] - block0;
+    int place = (keeps_offsets ? first[row] : offsets.data[row0 + row] - block0) + sub;
+    // two at a time: both are on their way before the first is needed
+#pragma unroll 1
+    for (; place < end; place += 2 * LANES) {
+        double v[3], w[3];
+        const bool two = place + LANES < end;
+        get(column(place), v);
+        if (two)
+            get(column(place + LANES), w);
+        add(place, v);
+        if (two)
+            add(place + LANES, w);
+    }
+    // halves go different ways here, too: thread k of four has component k
+    auto component_sum = [&](const double v[3]) -> double {
+        const bool last = sub & 2, odd = sub & 1;
+        double low = last ? v[2] : v[0], high = last ? 0.0 : v[1];
+        low += __shfl_xor_sync(ALL, last ? v[0] : v[2], 2);
+        high += __shfl_xor_sync(ALL, last ? v[1] : 0.0, 2);
+        double sum = odd ? high : low;
+        sum += __shfl_xor_sync(ALL, odd ? low : high, 1);
+        for (int d = 4; d < LANES; d *= 2)
+            sum += __shfl_xor_sync(ALL, sum, d);
+        return sum;
+    };
+    if (measured)
+        size = component_sum(z);
+    return component_sum(y);
+};
+// Component of the inverse diagonal block times what the first three threads of the row have.
+auto precondition = [&](int row, double v) -> double {
+    const double *const inverse = vectors + INVERSE * length + 9 * row + 3 * component;
+    double y = 0.0;
+    for (int k = 0; k < 3; ++k)
+        y += inverse[k] * __shfl_sync(ALL, v, k, LANES);
+    return y;
+};
+
+// What is done between two meetings. An iteration has one (Ghysels and Vanroose 2014, algorithm 4); what comes before
+// the first and after the last, and every so often between, is the residual itself and what follows from it and from
+// the search direction: u = M r, w = A u, s = A p, q = M s, z = A q. Long solves, and those whose end was none, go on
+// with textbook conjugate gradients, of three meetings an iteration: p = u + beta p; s = A p; x, r and u.
+enum Phase { RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, ITERATE, DIRECTION, CURVATURE, UPDATE };
+const double infinity = __longlong_as_double(0x7ff0000000000000ll);
+for (int system = group; system < systems; system += groups) {
+    int iteration = 0, since = 0;
+    double gamma_before = 1.0, alpha = 1.0, beta = 0.0, least = infinity, before = infinity;
+    double rr = 0.0, goal = 0.0, updated = infinity;
+    bool ended = false, left_off = false, textbook = false;
+    Phase phase = RESIDUAL;
+    of_guess = measured = true;
+#if BATCHED
+    slot = slots.data[system];
+    double *const saved = memory.data + slot * (27 * size_t(nodes) + SCALARS);
+    double *const saved_vectors = saved + SCALARS + 27 * size_t(row0);
+    if (saved[0] >= 0.0) {
+        // it was left off
+        phase = RESUME;
+        of_guess = measured = false;
+        iteration = (int)saved[0], since = (int)saved[1];
+        gamma_before = saved[2], alpha = saved[3], before = saved[4], goal = saved[5], textbook = saved[6] > 0.0;
+    }
+    // the last system's numbers are no longer needed
+    __syncthreads();
+#endif
+#pragma unroll 4
+    for (int i = tid; i < 9 * kept; i += THREADS)
+        kept_values[i] = entry(i / 9, i % 9);
+    for (int i = tid; i < length; i += THREADS) {
+#if BATCHED
+        if (phase == RESUME) {
+            for (int k = 0; k < 9; ++k)
+                vectors[k * length + i] = saved_vectors[k * length + i];
+            continue;
+        }
+#endif
+        vectors[X * length + i] = double(x_of[(3 * size_t(row0) + i) * stride + slot]);
+        vectors[P * length + i] = vectors[S * length + i] = 0.0;
+        vectors[Q * length + i] = vectors[Z * length + i] = 0.0;
+    }
+    for (int i = tid; i < rows; i += THREADS) {
+        double a[9];
+        for (int k = 0; k < 9; ++k)
+            a[k] = double(all_values[(9 * size_t(diagonal.data[row0 + i]) + k) * stride + slot]);
+        double inverse[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+        if (jacobi) {
+            const double c0 = a[4] * a[8] - a[5] * a[7];
+            const double c1 = a[5] * a[6] - a[3] * a[8];
+            const double c2 = a[3] * a[7] - a[4] * a[6];
+            const double d = 1.0 / (a[0] * c0 + a[1] * c1 + a[2] * c2);
+            inverse[0] = d * c0;
+            inverse[1] = d * (a[2] * a[7] - a[1] * a[8]);
+            inverse[2] = d * (a[1] * a[5] - a[2] * a[4]);
+            inverse[3] = d * c1;
+            inverse[4] = d * (a[0] * a[8] - a[2] * a[6]);
+            inverse[5] = d * (a[2] * a[3] - a[0] * a[5]);
+            inverse[6] = d * c2;
+            inverse[7] = d * (a[1] * a[6] - a[0] * a[7]);
+            inverse[8] = d * (a[0] * a[4] - a[1] * a[3]);
+        }
+        for (int k = 0; k < 9; ++k)
+            vectors[INVERSE * length + 9 * i + k] = inverse[k];
+    }
+    __syncthreads();
+
+    for (;;) {
+        for (int k = 0; k < SUMS; ++k)
+            sums[k] = 0.0;
+#if BATCHED
+        // so few go on that the rest may wait for the next launch: asked for here, needed after the rows
+        const bool few = me == 0 && tid == 0 && *(volatile int *)remaining.data <= linger.data[0];
+#endif
+        double *const outgoing = places + size_t(turn) * 4 * nodes;
+#pragma unroll 1
+        for (int base = warp * ROWS_OF_WARP; base < rows; base += ROWS_AT_ONCE) {
+            // threads without a component go along: they take part in shuffles
+            const int row = min(base + lane / LANES, rows - 1), i = 3 * row + component;
+            const bool mine = base + lane / LANES < rows && sub < 3;
+            auto vector = [&](int which) -> double & { return vectors[which * length + i]; };
+            const double y = phase == RESUME || phase == DIRECTION || phase == UPDATE ? 0.0 : product(row);
+            double give, bi = 0.0;
+            if (phase == GET_W) {
+                give = vector(P);
+                if (mine)
+                    vector(W) = y;
+            } else if (phase == DIRECTION) {
+                give = vector(U) + beta * vector(P);
+                if (mine)
+                    vector(P) = give;
+            } else if (phase == CURVATURE) {
+                give = 0.0;
+                if (mine) {
+                    const double p = vector(P);
+                    vector(S) = y;
+                    sums[0] += p * y;
+                    sums[1] += p * p;
+                }
+            } else {
+                // what the preconditioner is applied to
+                double v = y;
+                if (phase == RESIDUAL) {
+                    bi = double(b_of[(3 * size_t(row0) + i) * stride + slot]);
+                    v = bi - y;
+                } else if (phase == GET_Z || phase == RESUME) {
+                    v = vector(W);
+                    if (mine && phase == GET_Z)
+                        vector(Z) = y;
+                } else if (phase == ITERATE) {
+                    const double w = vector(W), u = vector(U);
+                    const double z = y + beta * vector(Z), q = vector(M) + beta * vector(Q);
+                    const double s = w + beta * vector(S), p = u + beta * vector(P);
+                    v = w - alpha * z;
+                    if (mine) {
+                        vector(Z) = z;
+                        vector(Q) = q;
+                        vector(S) = s;
+                        vector(P) = p;
+                        vector(X) += alpha * p;
+                        vector(R) -= alpha * s;
+                        vector(U) = u - alpha * q;
+                        vector(W) = v;
+                    }
+                } else if (phase == UPDATE) {
+                    v = vector(R) - alpha * vector(S);
+                    if (mine) {
+                        vector(X) += alpha * vector(P);
+                        vector(R) = v;
+                    }
+                } else if (phase == BEGIN && mine) {
+                    vector(W) = y;
+                }
+                give = precondition(row, v);
+                if (mine && phase == RESIDUAL) {
+                    vector(X) = double(REAL(vector(X)));
+                    vector(R) = v;
+                    vector(U) = give;
+                    const double magnitude = size + fabs(bi);
+                    sums[0] += v * v;
+                    sums[1] += bi * bi;
+                    sums[2] += magnitude * magnitude;
+                } else if (mine && phase == GET_S) {
+                    vector(S) = y;
+                    vector(Q) = give;
+                } else if (mine && phase == UPDATE) {
+                    vector(U) = give;
+                    solution[4 * size_t(row0 + row) + sub] = double(REAL(vector(X)));
+                    sums[0] += v * v;
+                    sums[1] += v * give;
+                } else if (mine) {
+                    vector(M) = give;
+                    // as it will be stored, should this be the end
+                    solution[4 * size_t(row0 + row) + sub] = double(REAL(vector(X)));
+                    const double r = vector(R), u = vector(U), p = vector(P);
+                    sums[0] += r * r;
+                    sums[1] += r * u;
+                    sums[2] += v * u;
+                    // of many systems nobody asks for the curvature
+                    if (!BATCHED)
+                        sums[3] += p * p;
+                }
+            }
+            if (mine)
+                outgoing[4 * size_t(row0 + row) + sub] = give;
+        }
+#if BATCHED
+        if (few)
+            sums[3] = 1.0;
+#endif
+        if (!meet())
+            return;
+        turn ^= 1;
+        if (phase == RESIDUAL) {
+            measured = false;
+            rr = sums[0];
+            goal = tolerance * tolerance * sums[1];
+            if (!(rr > goal) || ended || iteration >= max_iterations)
+                break;
+            if (!(updated > goal)) {
+                // what is carried along says that this is the end, and is wrong, or as right as rounding allows
+                if (rr <= 256.0 * ROUNDING * ROUNDING * sums[2])
+                    rr = updated;
+                if (rr > 0.25 * before || rr == updated)
+                    break;
+                before = rr;
+                textbook = true;
+            }
+            textbook = textbook || iteration >= PIPELINED;
+            phase = textbook ? RESUME : of_guess ? BEGIN : GET_W;
+            of_guess = false;
+            since = 0;
+        } else if (phase == GET_W) {
+            phase = GET_S;
+        } else if (phase == GET_S) {
+            phase = GET_Z;
+        } else if (phase == DIRECTION) {
+            phase = CURVATURE;
+        } else if (phase == CURVATURE) {
+            if (sums[1] > 0.0)
+                least = fmin(least, sums[0] / sums[1]);
+            alpha = gamma_before / sums[0];
+            ++iteration;
+            phase = UPDATE;
+        } else {
+            updated = sums[0];
+            const double gamma = sums[1];
+            // p . A p is gamma / alpha
+            if (!BATCHED && phase == ITERATE && sums[3] > 0.0)
+                least = fmin(least, gamma_before / alpha / sums[3]);
+            ended = iteration >= max_iterations || (watch && least <= 0.0);
+            since += phase == ITERATE;
+            left_off = BATCHED && sums[3] > 0.0 && !ended && updated > goal;
+            if (left_off)
+                break;
+            if (ended || !(updated > goal) || (since == RENEWED_EVERY && !textbook)) {
+                phase = RESIDUAL;
+                measured = true;
+                continue;
+            }
+            beta = iteration > 0 ? gamma / gamma_before : 0.0;
+            if (textbook) {
+                phase = DIRECTION;
+            } else {
+                phase = ITERATE;
+                alpha = gamma / (sums[2] - beta * gamma / alpha);
+                ++iteration;
+            }
+            gamma_before = gamma;
+        }
+    }
+
+#if BATCHED
+    if (left_off) {
+        for (int i = tid; i < length; i += THREADS)
+            for (int k = 0; k < 9; ++k)
+                saved_vectors[k * length + i] = vectors[k * length + i];
+        if (me == 0 && tid == 0) {
+            saved[0] = double(iteration), saved[1] = double(since);
+            saved[2] = gamma_before, saved[3] = alpha, saved[4] = before, saved[5] = goal, saved[6] = double(textbook);
+        }
+        continue;
+    }
+    if (me == 0 && tid == 0) {
+        solving.data[slot] = 0;
+        atomicSub(remaining.data, 1);
+    }
+#endif
+    for (int i = tid; i < length; i += THREADS)
+        x_of[(3 * size_t(row0) + i) * stride + slot] = REAL(vectors[X * length + i]);
+    if (me == 0 && tid == 0) {
+        outcome.data[4 * slot] = double(iteration);
+        outcome.data[4 * slot + 1] = sqrt(rr);
+        outcome.data[4 * slot + 2] = sqrt(goal);
+        outcome.data[4 * slot + 3] = least;
+    }
+}
+if (me == 0 && tid == 0)
+    state[0] = (int)epoch;

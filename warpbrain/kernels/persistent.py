@@ -1,0 +1,238 @@
+"""Conjugate gradients as one launch on a GPU, in which all blocks stay and talk to each other.
+
+A launch takes some two microseconds even in a graph, and conjugate gradients of a brain's mesh would have nine of them
+an iteration for half a microsecond of work. Here a block has its rows of the matrix for the whole solve, on its
+multiprocessor as far as they fit (PERKS: Zhang et al. 2023, doi 10.1145/3577193.3593705), and all blocks meet once an
+iteration: pipelined conjugate gradients (Ghysels and Vanroose 2014, Parallel Computing 40, 224, algorithm 4) need the
+sums and the numbers of neighbours at the same time. Their recurrences lose digits. So they start again from the
+residual itself every so often, with the search direction kept (Cools, Yetkin, Agullo, Giraud and Vanroose 2018, SIAM J.
+Matrix Anal. Appl. 39, 426), long solves go over to textbook conjugate gradients, and it is the residual itself that has
+to reach the tolerance in the end. Vectors and sums are double in either precision.
+
+**Meetings.** There are no more blocks than multiprocessors, and each of these has room for one: all run at once. A
+block writes its sums, labelled with the number of the meeting, and waits for those of all others, which it adds in one
+order: the same bits every time. A block that does not hear from another for two seconds gives up, then all do, and
+`PersistentSolve.outcome` raises: nothing hangs.
+"""
+
+import os
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+from warp.sparse import BsrMatrix
+
+from warpbrain.errors import SolveError
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.precision import Precision
+
+#: Threads of a block, and how many of them may share a row: the most with which all rows are under way at once.
+THREADS, LANES = 512, (16, 8, 4)
+#: What a kernel has of a multiprocessor's shared memory without asking for it [bytes].
+_RESERVED = 6 * 1024
+#: Numbers of a row beside the matrix: nine vectors of three components and an inverse diagonal block.
+NUMBERS = 36
+#: Sums of a meeting; a message has half of one.
+_SUMS = 4
+#: Blocks that may meet.
+MOST_BLOCKS = 256
+#: Rows that a block has at least, unless there are fewer: what two blocks say to each other takes longer than these.
+_LEAST_ROWS = 8
+
+
+def native_code(precision: Precision, shared_bytes: int, threads: int, lanes: int, batched: bool = False) -> str:
+    """What the kernels consist of, for blocks with so much shared memory and so many threads, `lanes` for a row."""
+    real = {"double": "double", "single": "float"}[precision.name]
+    code = files("warpbrain.kernels").joinpath("persistent.cu").read_text(encoding="utf-8")
+    return (
+        f"#define BATCHED {int(batched)}\n"
+        f"using REAL = {real};\n"
+        f"constexpr int THREADS = {threads}, LANES = {lanes}, SHARED_BYTES = {shared_bytes};\n"
+        f"constexpr double ROUNDING = {precision.epsilon!r};\n"
+    ) + code
+
+
+@cache
+def persistent_kernel(precision: Precision, shared_bytes: int, threads: int, lanes: int) -> Any:
+    """Make (once) the kernel of blocks with so much shared memory and so many threads, of which `lanes` share a row."""
+    vec3, mat33 = precision.vec3, precision.mat33
+    module = compiled_module(f"persistent_{precision.name}_{shared_bytes}_{threads}_{lanes}")
+    module.options["block_dim"] = threads
+    numbers = wp.constant(shared_bytes // 8)
+
+    @wp.func_native(native_code(precision, shared_bytes, threads, lanes))
+    def solve(
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        values: wp.array[mat33],
+        diagonal: wp.array[int],
+        starts: wp.array[int],
+        b: wp.array[vec3],
+        x: wp.array[vec3],
+        tolerance: wp.float64,
+        max_iterations: int,
+        watch: int,
+        jacobi: int,
+        exchange: wp.array[wp.float64],
+        messages: wp.array[wp.uint64],
+        scratch: wp.array[wp.float64],
+        control: wp.array[int],
+        outcome: wp.array[wp.float64],
+    ): ...
+
+    @wp.kernel(module=module, launch_bounds=(threads, 1), grid_stride=False)
+    def conjugate_gradients(
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        values: wp.array[mat33],
+        diagonal: wp.array[int],
+        starts: wp.array[int],
+        b: wp.array[vec3],
+        x: wp.array[vec3],
+        tolerance: wp.float64,
+        max_iterations: int,
+        watch: int,
+        jacobi: int,
+        exchange: wp.array[wp.float64],
+        messages: wp.array[wp.uint64],
+        scratch: wp.array[wp.float64],
+        control: wp.array[int],
+        outcome: wp.array[wp.float64],
+    ):
+        # all of the shared memory: the native code knows where it begins
+        wp.tile_empty(shape=numbers, dtype=wp.float64, storage="shared")
+        solve(
+            offsets, columns, values, diagonal, starts, b, x, tolerance, max_iterations, watch, jacobi, exchange,
+            messages, scratch, control, outcome,
+        )  # fmt: skip
+
+    return conjugate_gradients
+
+
+def blocks_stay(device: wp.Device) -> bool:
+    """Whether blocks of a device can wait for each other: on a GPU since Volta, unless the environment forbids it.
+
+    ``WARPBRAIN_PERSISTENT=0`` is for GPUs of which another program holds multiprocessors for good.
+    """
+    return bool(device.is_cuda and device.arch >= 70 and os.environ.get("WARPBRAIN_PERSISTENT", "1") != "0")
+
+
+def shared_memory(device: wp.Device) -> int:
+    """What a block may have of a multiprocessor's shared memory [bytes]."""
+    return int(device.max_shared_memory_per_block - _RESERVED) // 8 * 8
+
+
+def share_rows(offsets: NDArray[np.int32], blocks: int) -> tuple[NDArray[np.int32], int]:
+    """First row of each block, by the entries (n + 1,) of rows, and how many threads are to share a row."""
+    starts = np.searchsorted(offsets, np.linspace(0, offsets[-1], blocks + 1)).astype(np.int32)
+    starts[0], starts[-1] = 0, len(offsets) - 1
+    rows = int(np.max(np.diff(starts)))
+    return starts, next((lanes for lanes in LANES if rows * lanes <= THREADS), LANES[-1])
+
+
+class Meetings:
+    """Where the blocks of some groups leave what others read.
+
+    Parameters
+    ----------
+    rows, blocks, groups : int
+        Of a system, of a group, and of all.
+    device : Device
+
+    Attributes
+    ----------
+    exchange : wp.array of double
+        Two places a group that take turns, and one for the solution, with four numbers a row.
+    messages : wp.array of uint64
+        Two places a group that take turns, with a message for each half of a sum of a block.
+    scratch : wp.array of double
+        What has no room on the chip.
+    control : wp.array of int
+        Of each group the number of the last meeting, and whether one failed.
+    """
+
+    def __init__(self, rows: int, blocks: int, groups: int, device: wp.Device) -> None:
+        self._device = device
+        self.exchange = wp.zeros(groups * 12 * rows, dtype=wp.float64, device=device)
+        self.messages = wp.zeros(groups * 4 * _SUMS * blocks, dtype=wp.uint64, device=device)
+        self.scratch = wp.zeros(groups * NUMBERS * rows, dtype=wp.float64, device=device)
+        self.control = wp.zeros(groups * 2, dtype=int, device=device)
+
+    def check(self) -> None:
+        """Raise `SolveError` if a block did not hear from another; the next solve may then try again."""
+        if not np.any(self.control.numpy()[1::2]):
+            return
+        self.control.zero_()
+        self.messages.zero_()
+        raise SolveError(
+            f"conjugate gradients on {self._device.name}: its blocks waited two seconds for each other, because "
+            "something else holds a part of it; with WARPBRAIN_PERSISTENT=0 in the environment they need not wait"
+        )
+
+
+class PersistentSolve:
+    """Solves ``matrix x = b`` by one launch; its parameters are those of `warpbrain.kernels.linear.ConjugateGradient`.
+
+    Parameters
+    ----------
+    matrix : warp.sparse.BsrMatrix
+    diagonal : wp.array of int, shape (n,)
+    b, x : wp.array of vec3, shape (n,)
+    precision : Precision
+    max_iterations : int
+    jacobi : bool
+        Precondition by inverse diagonal blocks.
+    watch : bool
+        End where the smallest curvature is not positive.
+    """
+
+    def __init__(
+        self,
+        matrix: BsrMatrix,
+        diagonal: wp.array,
+        b: wp.array,
+        x: wp.array,
+        precision: Precision,
+        *,
+        max_iterations: int,
+        jacobi: bool,
+        watch: bool,
+    ) -> None:
+        device, n = b.device, b.shape[0]
+        self._blocks = max(1, min(device.sm_count, MOST_BLOCKS, n // _LEAST_ROWS))
+        starts, lanes = share_rows(matrix.offsets.numpy(), self._blocks)
+        self._kernel = persistent_kernel(precision, shared_memory(device), THREADS, lanes)
+        self._meetings = m = Meetings(n, self._blocks, 1, device)
+        self._outcome = wp.zeros(4, dtype=wp.float64, device=device)
+        self._before = [
+            matrix.offsets, matrix.columns, matrix.values, diagonal, wp.array(starts, dtype=int, device=device), b, x,
+        ]  # fmt: skip
+        self._after = [
+            max_iterations, int(watch), int(jacobi), m.exchange, m.messages, m.scratch, m.control, self._outcome,
+        ]  # fmt: skip
+        self._device = device
+
+    def launch(self, tolerance: float) -> None:
+        """Solve from the present content of `x`, until ``|b - A x| <= tolerance |b|``."""
+        wp.launch(
+            self._kernel,
+            dim=self._blocks * THREADS,
+            inputs=[*self._before, wp.float64(tolerance), *self._after],
+            device=self._device,
+            block_dim=THREADS,
+        )
+
+    def outcome(self) -> tuple[int, float, float, float]:
+        """Iterations, residual, the norm that was to be reached and the smallest curvature of the last solve.
+
+        Raises
+        ------
+        SolveError
+            If a block did not hear from another.
+        """
+        self._meetings.check()
+        iterations, residual, goal, curvature = self._outcome.numpy()
+        return int(iterations), float(residual), float(goal), float(curvature)
