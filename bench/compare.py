@@ -1,6 +1,6 @@
 """Run every code that is installed, three times each, in turn; keep the smallest times, print and record them.
 
-`python bench/compare.py` measures; `python docs/make_benchmarks.py` puts what was recorded into `docs/benchmarks.md`.
+`python bench/compare.py` measures; `python docs/make_benchmarks.py` makes the tables of `docs/benchmarks.md`.
 """
 
 from __future__ import annotations

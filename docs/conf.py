@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
+import inspect
 import os
 import re
 import sys
@@ -10,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pyvista
+from docutils import nodes
+from sphinx.util.docutils import SphinxDirective
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(Path(__file__).parent))
@@ -36,7 +40,8 @@ exclude_patterns = ["_build", "gallery/*.ipynb", "gallery/*.py", "gallery/*.md5"
 html_theme = "furo"
 html_title = f"warpbrain {release}"
 html_copy_source = False
-html_static_path: list[str] = []
+html_static_path = ["_static"]
+html_css_files = ["tables.css"]
 
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4
@@ -60,7 +65,8 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "remove_config_comments": True,
     "show_memory": False,
-    "min_reported_time": 0,
+    # its page would fetch scripts from the network
+    "write_computation_times": False,
     # an example that fails is a site that is wrong
     "abort_on_example_error": True,
     "only_warn_on_example_error": False,
@@ -89,6 +95,19 @@ def linked_elsewhere(app: Any, name: str, source: list[str]) -> None:
     source[0] = re.sub(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)", shown, source[0])
 
 
+class Docstring(SphinxDirective):
+    """What a module says of itself below its first paragraph, in Markdown: equations stand where they are computed."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """The text, parsed."""
+        module = importlib.import_module(self.arguments[0])
+        self.env.note_dependency(module.__file__)
+        return self.parse_text_to_nodes(inspect.cleandoc(module.__doc__).partition("\n\n")[2])
+
+
 def setup(app: Any) -> None:
     """Called by Sphinx."""
+    app.add_directive("docstring", Docstring)
     app.connect("source-read", linked_elsewhere)

@@ -1,33 +1,32 @@
-"""Puts what was measured into docs/benchmarks.md: `python docs/make_benchmarks.py`.
+"""Makes the tables of docs/benchmarks.md, bench/results/benchmarks.md: `python docs/make_benchmarks.py`.
 
-Every figure between two of its marks comes from the latest files of `bench/results`, none is typed.
+Every figure comes from the latest files of `bench/results`, none is typed.
 """
 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
-DOCS = Path(__file__).parent
-PAGE, RESULTS = DOCS / "benchmarks.md", DOCS.parent / "bench" / "results"
-MARK = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+RESULTS = Path(__file__).parents[1] / "bench" / "results"
+TABLES = RESULTS / "benchmarks.md"
 PHASES = ("internal forces", "assemble system", "solve system", "time integration", "main loop")
 STEP = "step without instruments"
 
 
 def main() -> None:
-    """Write the page again."""
-    PAGE.write_text(made(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    """Write the tables again."""
+    TABLES.write_text(made(), encoding="utf-8")
 
 
-def made(page: str) -> str:
-    """The page with everything between its marks made again."""
-    blocks = {"table3": table3, "bounds": bounds, "cube": cube}
-    return MARK.sub(lambda mark: f"{mark[1]}{blocks[mark[2]]()}\n{mark[3]}", page)
+def made() -> str:
+    """All tables."""
+    parts = ["# What was timed", "Made by `python docs/make_benchmarks.py`."]
+    parts += ["## Beside the paper's Table 3 [ms]", table3(), "What bounds a step:", bounds()]
+    return "\n\n".join([*parts, "## Next to other codes", cube(), ""]).rstrip() + "\n"
 
 
 def latest(kind: str) -> list[tuple[str, dict[str, Any]]]:

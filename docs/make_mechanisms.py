@@ -20,11 +20,11 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import read_costs
+from warpbrain.report.mechanisms.cost import read_costs, table
 from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
 from warpbrain.report.mechanisms.index import index
 from warpbrain.report.mechanisms.page import page
-from warpbrain.report.mechanisms.pairs import pairs_page
+from warpbrain.report.mechanisms.pairs import pairs_page, pairs_table
 from warpbrain.report.mechanisms.picture import INKS, write_picture
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumSolver
@@ -58,7 +58,9 @@ def main() -> None:
     for kind in mechanisms():
         _write(PAGES / f"{kind}.md", page(kind, effects[kind]))
     _write(PAGES / "index.md", index(effects, costs))
+    _write(PAGES / "cost.csv", "\n".join([*table(costs, list(mechanisms())), ""]))
     _write(PAGES / "pairs.md", pairs_page())
+    _write(PAGES / "pairs.csv", pairs_table())
 
 
 def draw(case: Case, kind: str) -> Effect:

@@ -1,7 +1,7 @@
-"""Makes docs/verification.md: `python docs/make_verification.py [--without-slow]`.
+"""Makes the tables of docs/verification.md, in bench/results: `python docs/make_verification.py [--without-slow]`.
 
-Runs every test that compares with an independent reference and writes what they measured. If one of them fails the page
-stays as it was. Without the slow ones their rows are missing, and the page says so.
+Runs every test that compares with an independent reference and writes what they measured. If one of them fails the file
+stays as it was. Without the slow ones their rows are missing, and the file says so.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 from verification_page import page  # noqa: E402
 from verification_rows import Measurement  # noqa: E402
 
-PAGE = ROOT / "docs" / "verification.md"
+PAGE = ROOT / "bench" / "results" / "verification.md"
 WITHOUT_SLOW = "--without-slow" in sys.argv[1:]
 #: What computes, and what it is compared with.
 PACKAGES = ("warp-lang", "numpy", "scipy", "felupe", "scikit-fem", "mpmath")
@@ -83,7 +83,7 @@ def _commit() -> str:
     def git(*words: str) -> str:
         return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
 
-    # the page itself is about to be written
+    # the file itself is about to be written
     changed = [line for line in git("status", "--porcelain").splitlines() if not line.endswith(PAGE.name)]
     return git("rev-parse", "--short", "HEAD") + (" with changes" if changed else "")
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from bench.real.tables import landmarks
 from warpbrain.atomic import whole_file
 from warpbrain.cases.shipped import RESECT, find_case
 from warpbrain.diagnosis.diagnose import Diagnosing
@@ -126,39 +127,10 @@ def main() -> None:
         if any(one["case"] == name for one in done):
             continue
         done.append(diagnosed(name))
-        print(table(done[-1:])[-1], flush=True)
+        print(landmarks(done[-1:])[-1], flush=True)
         with whole_file(FILE) as temporary:
             temporary.write_text(json.dumps(done, indent=1) + "\n", encoding="utf-8")
-    print(*table(done), sep="\n")
-
-
-def _set(one: dict[str, Any]) -> str:
-    first = one["sets"][0]
-    return f"{' + '.join(first['causes']) or 'nothing'} ({100 * first['probability']:.0f} %)"
-
-
-def table(done: list[dict[str, Any]]) -> list[str]:
-    """Rows for the docs."""
-    head = [
-        "case",
-        "verdict",
-        "most probable set",
-        "as recorded",
-        "rigid: shift",
-        "turn",
-        "left",
-        "left out",
-        "tool: left out",
-    ]
-    lines = [" | ".join([*head, "its rigid part from that", "s"]), "|".join(["---"] * (len(head) + 2))]
-    for one in done:
-        millimetres = [one[f"{key}_mm"] for key in ("as_recorded", "rigid_shift", "rigid_left", "rigid_left_out")]
-        lines.append(
-            f"{one['case']} | {one['verdict']} | {_set(one)} | {millimetres[0]:.2f} | "
-            f"{millimetres[1]:.2f} | {one['rigid_turn_degrees']:.1f}° | {millimetres[2]:.2f} | {millimetres[3]:.2f} | "
-            f"{one['left_out_mm']:.2f} | {one['rigid_apart_mm']:.2f} | {one['processor_seconds']:.0f}"
-        )
-    return [f"| {line} |" if "---" not in line else f"|{line}|" for line in lines]
+    print(*landmarks(done), sep="\n")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The tables of docs/proof-recordings.md, written into it from `bench/results/real_*.json`: none is copied by hand.
+"""The tables of docs/proof-recordings.md, bench/results/real.md, made from `bench/results/real_*.json`.
 
 python bench/real/tables.py
 """
@@ -6,14 +6,18 @@ python bench/real/tables.py
 from __future__ import annotations
 
 import json
-import re
+from pathlib import Path
 from typing import Any
-
-from common import RESULTS, ROOT
 
 from warpbrain.inference.probability import percent
 
-PAGE = ROOT / "docs" / "proof-recordings.md"
+RESULTS = Path(__file__).resolve().parents[1] / "results"
+TABLES = RESULTS / "real.md"
+TITLES = {
+    "cortex_specimen": "One human frontal-cortex specimen",
+    "brain_regions": "Four human brain regions",
+    "adhesive": "Adhesives",
+}
 STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what was added"}
 
 
@@ -85,16 +89,44 @@ def confirmations(cases: dict[str, Any]) -> str:
     return table(head, rows)
 
 
+def _set(one: dict[str, Any]) -> str:
+    first = one["sets"][0]
+    return f"{' + '.join(first['causes']) or 'nothing'} ({100 * first['probability']:.0f} %)"
+
+
+def landmarks(done: list[dict[str, Any]]) -> list[str]:
+    """Of each patient what is said, and errors [mm]; a row each, below a head."""
+    head = [
+        "case",
+        "verdict",
+        "most probable set",
+        "as recorded",
+        "rigid: shift",
+        "turn",
+        "left",
+        "left out",
+        "tool: left out",
+    ]
+    lines = [" | ".join([*head, "its rigid part from that", "s"]), "|".join(["---"] * (len(head) + 2))]
+    for one in done:
+        millimetres = [one[f"{key}_mm"] for key in ("as_recorded", "rigid_shift", "rigid_left", "rigid_left_out")]
+        lines.append(
+            f"{one['case']} | {one['verdict']} | {_set(one)} | {millimetres[0]:.2f} | "
+            f"{millimetres[1]:.2f} | {one['rigid_turn_degrees']:.1f}° | {millimetres[2]:.2f} | {millimetres[3]:.2f} | "
+            f"{one['left_out_mm']:.2f} | {one['rigid_apart_mm']:.2f} | {one['processor_seconds']:.0f}"
+        )
+    return [f"| {line} |" if "---" not in line else f"|{line}|" for line in lines]
+
+
 def main() -> None:
     """Write them."""
-    page = PAGE.read_text(encoding="utf-8")
-    for name in ("cortex_specimen", "brain_regions", "adhesive"):
+    parts = ["# What was said of real recordings", "Made by `python bench/real/tables.py`."]
+    for name, title in TITLES.items():
         cases = json.loads((RESULTS / f"real_{name}.json").read_text(encoding="utf-8"))["cases"]
-        text = "\n\n".join((verdicts(cases), errors(cases), confirmations(cases)))
-        pattern = rf"(<!-- {name} -->\n).*?(\n<!-- end -->)"
-        page, count = re.subn(pattern, lambda found: found[1] + text + found[2], page, flags=re.S)  # noqa: B023
-        assert count == 1, name
-    PAGE.write_text(page, encoding="utf-8")
+        parts += [f"## {title}", verdicts(cases), errors(cases), confirmations(cases)]
+    patients = json.loads((RESULTS / "real_resect.json").read_text(encoding="utf-8"))
+    parts += ["## Landmarks of 15 patients before resection", "\n".join(landmarks(patients))]
+    TABLES.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

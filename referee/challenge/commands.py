@@ -40,7 +40,7 @@ def add_challenge(commands: Any) -> None:
     score.add_argument("--out", type=Path, help="file of scores, for the leaderboard")
     board = parts.add_parser("leaderboard", help="make the page from all scores")
     board.add_argument("--results", type=Path, default=Path("bench/results/challenge"))
-    board.add_argument("--out", type=Path, default=Path("docs/leaderboard.md"))
+    board.add_argument("--out", type=Path, default=Path("bench/results/challenge/README.md"))
 
 
 def challenge(given: argparse.Namespace) -> int:

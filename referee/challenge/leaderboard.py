@@ -45,10 +45,9 @@ def leaderboard(results: Path) -> str:
     lines = [
         "# Leaderboard",
         "",
-        "Made by `python -m referee challenge leaderboard` from",
-        "[bench/results/challenge](../bench/results/challenge); how to take part, what the scores mean and what is",
-        "unfair: [challenge.md](challenge.md). Shares with intervals of Clopper and Pearson (95 %). A case without an",
-        "answer counts as `cannot say`. Sorted by answers that are right.",
+        "Made by `python -m referee challenge leaderboard`; docs/challenge.md says how to take part, what the scores",
+        "mean and what is unfair. Shares with intervals of Clopper and Pearson (95 %). A case without an answer counts",
+        "as `cannot say`. Sorted by answers that are right.",
     ]
     for rows in sets.values():
         lines += ["", *_section(sorted(rows, key=lambda row: (-_share(row, "answers right").hits, row["answers"])))]

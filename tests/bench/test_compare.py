@@ -95,7 +95,6 @@ def test_what_a_process_cost_is_its_own():
 
 
 def test_the_page_says_what_was_recorded():
-    page = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    tables = (ROOT / "bench" / "results" / "benchmarks.md").read_text(encoding="utf-8")
     made = runpy.run_path(str(ROOT / "docs" / "make_benchmarks.py"))["made"]
-    assert made(page) == page, "run docs/make_benchmarks.py"
-    assert made(page.replace("warpbrain 0.1.0 |", "warpbrain 0.0.0 |")) == page
+    assert made() == tables, "run docs/make_benchmarks.py"

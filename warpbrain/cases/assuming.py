@@ -11,7 +11,7 @@ from typing import Any
 from warpbrain.cases.case import Case
 from warpbrain.cases.parts.mechanisms import in_si
 from warpbrain.cases.parts.named import Named
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.composition import require_composable, require_left
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing, Says
 from warpbrain.physics.mechanisms import mechanisms
@@ -44,6 +44,8 @@ def assume(case: Case, said: str) -> Case:
     >>> assume(find_case("0529"), "traction:centre=0/0/80,value=0/0/-500").mechanisms[-1].kind
     'traction'
     """
+    require_kind(case, Case, "case", "a Case, as warpbrain.find_case gives")
+    require_kind(said, str, "said", 'a text such as "gravity:csf_level=60"')
     kind, _, rest = said.partition(":")
     known = mechanisms()
     if kind not in known:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.enough import too_few_for_noise, too_few_to_diagnose
 from warpbrain.cases.reading import examine_case
+from warpbrain.errors import require_kind
 from warpbrain.mesh import Quality, measure
 from warpbrain.mesh.extent import extent
 from warpbrain.problems import Problem, Problems
@@ -59,14 +61,16 @@ class Checked:
     plausible: str
 
 
-def check_case(file: Path) -> Checked:
+def check_case(file: str | os.PathLike[str]) -> Checked:
     """Check a `case.toml` with everything that it names.
 
     Parameters
     ----------
-    file : Path
+    file : path
         A `case.toml`, or the folder that holds it.
     """
+    require_kind(file, (str, os.PathLike), "file", "the path of a case.toml or its folder")
+    file = Path(file)
     problems = Problems()
     case = examine_case(file, problems)
     remarks = list(problems.remarks)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from warpbrain.cases.case import Case
-from warpbrain.errors import InputError, SolveError
+from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import DrawnLaws, draw_laws, law_of_curve
 
@@ -58,6 +58,7 @@ def with_prior_draw(case: Case, number: int, seed: int = 0, model: Process | Non
     >>> found.drawn.groups
     ('hyperelastic/grey matter', 'hyperelastic/white matter')
     """
+    require_kind(case, Case, "case", "a Case, as warpbrain.find_case gives")
     asked = _default(model)
     labels = tuple(sorted(case.tissues))
     require_groups(case, labels, asked)

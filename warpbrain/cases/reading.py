@@ -19,7 +19,7 @@ from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.node_sets import NodeSets
 from warpbrain.cases.parts.recordings import read_recordings
 from warpbrain.cases.parts.tissues import read_body, read_tissues
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, require_kind
 from warpbrain.frame import Frame
 from warpbrain.physics.composition import CompositionError, require_composable, require_left
 from warpbrain.problems import Problems
@@ -42,6 +42,7 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     InputError
         If anything in it is wrong: the file, the key or row, what was found and what was expected.
     """
+    require_kind(path, (str, os.PathLike), "path", "the path of a case.toml or its folder")
     problems = Problems()
     case = examine_case(Path(path), problems)
     problems.stop(Path(path) if Path(path).is_dir() else Path(path).parent)

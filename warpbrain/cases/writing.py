@@ -17,7 +17,7 @@ from warpbrain.cases.boundary import Boundary, Contact, Displaced, Fixed, Forced
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.format.tables import PRIOR
 from warpbrain.cases.parts.mechanisms import in_file
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, require_kind
 from warpbrain.frame import Frame
 from warpbrain.mesh import write_mesh
 from warpbrain.mesh.vtu import write_vtu
@@ -55,6 +55,8 @@ def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
     InputError
         If the folder holds a case already or cannot be written to.
     """
+    require_kind(folder, (str, os.PathLike), "folder", "the path of a folder")
+    require_kind(case, Case, "case", "a Case, as warpbrain.find_case gives")
     folder = Path(folder)
     target = folder / "case.toml"
     if target.exists():

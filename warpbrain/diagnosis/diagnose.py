@@ -20,6 +20,7 @@ from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnos
 from warpbrain.diagnosis.sentences import assumptions_of
 from warpbrain.diagnosis.telling_apart import imitations, smallest
 from warpbrain.diagnosis.traits import Traits, traits_of
+from warpbrain.errors import require_kind
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import Confirmation, after_checks
@@ -278,6 +279,7 @@ def diagnose(
     SolveError
         If the case as declared has no equilibrium.
     """
+    require_kind(options or DiagnosisOptions(), DiagnosisOptions, "options", "DiagnosisOptions(...)")
     case = as_case(case)
     if case.specimen is None:
         return Diagnosing(case, options, device, listener).run()

@@ -15,7 +15,7 @@ from warpbrain.ensemble.results import EnsembleResult, results_of
 from warpbrain.ensemble.sample import Sample
 from warpbrain.ensemble.store import Store
 from warpbrain.ensemble.workers import Here, Prepare, Processes, Workers, kind_of
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, require_kind
 from warpbrain.gp.process import Process
 from warpbrain.gp.trained import find_model
 from warpbrain.simulation.of_case import model_of
@@ -130,6 +130,10 @@ def ensemble(
         raise InputError(f"case: {case.path} has a [specimen]: its tests are run one by one: see warpbrain.run")
     if processes < 1:
         raise InputError(f"processes = {processes}: expected a whole number of at least 1")
+    if batch is not None and batch < 1:
+        raise InputError(f"batch = {batch}: expected a whole number of at least 1")
+    if dask is not None:
+        require_kind(dask, str, "dask", 'the address of a scheduler, or "local:N"')
     numbered = chosen_samples(case, samples, seed, process) if isinstance(samples, int | str) else list(samples)
     model = model_of(case)
     job = Job(model, tuple(numbered), steps=steps, tolerance=tolerance, precision=precision)

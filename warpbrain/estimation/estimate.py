@@ -11,7 +11,7 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
 from warpbrain.cases.shipped import as_case
-from warpbrain.errors import SolveError
+from warpbrain.errors import SolveError, require_kind
 from warpbrain.estimation.finer_mesh import Discretisation, DiscretisationError, FinerMesh, discretisation_error
 from warpbrain.estimation.fit import Estimate, GaussNewton, GaussNewtonStep
 from warpbrain.estimation.forward import Forward
@@ -86,6 +86,7 @@ def estimate(
     >>> posterior = estimate(find_case("0529", "single"))  # doctest: +SKIP
     >>> [marginal.interval for marginal in posterior.marginals]  # doctest: +SKIP
     """
+    require_kind(options or EstimationOptions(), EstimationOptions, "options", "EstimationOptions(...)")
     return Estimation(as_case(case), prior, options, device, listener).run()
 
 

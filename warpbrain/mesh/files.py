@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.atomic import is_full, whole_file
+from warpbrain.errors import require_kind
 from warpbrain.frame import METRES
 from warpbrain.mesh.abaqus import read_abaqus
 from warpbrain.mesh.patience import patience
@@ -86,6 +87,7 @@ def read_mesh(path: str | os.PathLike[str], unit: str = "m", tissue: str | None 
 
 def read_mesh_file(path: str | os.PathLike[str], unit: str = "m", tissue: str | None = None) -> MeshInFile:
     """As `read_mesh`, with the numbers that the nodes have in the file."""
+    require_kind(path, (str, os.PathLike), "path", "the path of a mesh")
     return _in_file(Path(path), read_raw(Path(path)), unit, tissue)
 
 
@@ -253,6 +255,7 @@ def write_mesh(path: str | os.PathLike[str], mesh: TetMesh, unit: str = "m", axe
     """
     import meshio
 
+    require_kind(mesh, TetMesh, "mesh", "a TetMesh, as warpbrain.read_mesh gives")
     target = Path(path)
     if target.suffix.lower() != ".vtu":
         raise MeshError(f"{target}: meshes are written as .vtu, found '{target.suffix}'")

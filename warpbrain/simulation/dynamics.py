@@ -16,7 +16,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.errors import InputError, SolveError
+from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.kernels.dynamics import dynamics_kernels
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.kernels.precision import Precision
@@ -68,6 +68,7 @@ class Simulator:
         newton: int = 1,
         preconditioner: str = "block-jacobi",
     ) -> None:
+        require_kind(system, System, "system", "a System, as warpbrain.System(model) gives")
         if newton < 1:
             raise InputError(f"newton = {newton}: expected at least one iteration a step")
         self.system = system

@@ -16,7 +16,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.errors import InputError, SolveError
+from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.coupled import LinearSolver
 from warpbrain.simulation.held import require_held
@@ -176,6 +176,7 @@ class EquilibriumSolver:
         linear: LinearSolver | None = None,
         factors: KeptFactors | None = None,
     ) -> None:
+        require_kind(system, System, "system", "a System, as warpbrain.System(model) gives")
         self.system = system
         self.options = options or EquilibriumOptions()
         self._on_step = on_step

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, require_kind
 from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
 from warpbrain.physics.composition import require_composable
 from warpbrain.physics.laws import Law
@@ -45,6 +45,7 @@ class Material:
     formulation: str = "coupled"
 
     def __post_init__(self) -> None:
+        require_kind(self.law, Law, "law", "a Law, such as warpbrain.NeoHookean(mu=1000)")
         # refuses a bad Poisson ratio or formulation
         self.law.volumetric_modulus(self.poisson, self.formulation)
 

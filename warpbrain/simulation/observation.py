@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments, goes_on
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, require_kind
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.comparison import Comparison, compare_force, compare_points, compare_surface, joined
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
@@ -75,6 +75,7 @@ def observe(
         States of earlier times. Without them, rows of other times are compared with the state at rest if what acts then
         is the same; a motion is compared with the rows of its own time alone.
     """
+    require_kind(case, Case, "case", "a Case, as warpbrain.find_case gives")
     comparisons, skipped = [], []
     for recording in case.recordings:
         try:

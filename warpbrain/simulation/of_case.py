@@ -6,7 +6,7 @@ import numpy as np
 
 from warpbrain.cases.boundary import Contact, Displaced, Fixed, Forced, Pressed, Sliding
 from warpbrain.cases.case import Case
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism
@@ -36,6 +36,7 @@ def plain_model_of(case: Case) -> Model:
         If the case assumes what cannot be simulated; of a specimen, which `warpbrain.simulation.specimen` simulates
         test by test.
     """
+    require_kind(case, Case, "case", "a Case, as warpbrain.find_case gives")
     if case.specimen is not None:
         raise InputError(f"{case.path}: [specimen]: a specimen has no one state; its tests are run by a Rig")
     mesh, nodes = case.remaining

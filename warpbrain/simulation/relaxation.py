@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.errors import SolveError
+from warpbrain.errors import SolveError, require_kind
 from warpbrain.kernels.precision import Precision
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.held import require_held
@@ -119,6 +119,7 @@ def relax_to_rest(
     SolveError
         If the motion does not come to rest: when, where and why.
     """
+    require_kind(system, System, "system", "a System, as warpbrain.System(model) gives")
     options = options or RelaxationOptions()
     clock = clock or PhaseClock(system.device)
     model = system.model

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.errors import require_kind
 from warpbrain.mesh import TetMesh
 from warpbrain.shown import Shown
 from warpbrain.simulation.system import System
@@ -122,6 +123,7 @@ def result_of(system: System, time: float = math.inf) -> Result:
     time : float
         Of the state [s], for loads with a ramp; by default long after every one.
     """
+    require_kind(system, System, "system", "a System, as warpbrain.System(model) gives")
     state = nodal_state_of(system, time)
     F = system.deformation_gradients()
     J = np.linalg.det(F)

@@ -13,7 +13,7 @@ import warp as wp
 from numpy.typing import NDArray
 from warp.sparse import BsrMatrix, bsr_zeros
 
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, require_kind
 from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.linear import ConjugateGradient
 from warpbrain.kernels.precision import PRECISIONS, Precision
@@ -122,6 +122,7 @@ class System:
     """
 
     def __init__(self, model: Model, device: str | None = None, precision: str = "double") -> None:
+        require_kind(model, Model, "model", "a Model, as warpbrain.model_of(case) gives")
         start = time.perf_counter()
         self.model = model
         self.device = find_device(device)

@@ -16,6 +16,7 @@ import abc
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -87,8 +88,8 @@ class Law(abc.ABC):
         return 2.0 * self.shear_modulus * (1.0 + poisson) / (3.0 * (1.0 - 2.0 * poisson))
 
 
-def require_finite(law: str, key: str, *values: float) -> None:
+def require_finite(law: str, key: str, *values: object) -> None:
     """Raise `InputError` if a parameter is NaN or infinite."""
     for value in values:
-        if not math.isfinite(value):
-            raise InputError(f"{law}: {key} = {value}: expected a finite number")
+        if not isinstance(value, Real) or not math.isfinite(value):
+            raise InputError(f"{law}: {key} = {value!r}: expected a finite number")

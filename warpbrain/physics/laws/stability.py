@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.laws.law import Law
 from warpbrain.physics.laws.paths import Path, derivatives
 from warpbrain.physics.laws.total_energy import total_energy
@@ -75,6 +75,7 @@ def require_stable(law: Law, poisson: float = 0.45, formulation: str = "coupled"
     >>> from warpbrain.physics.laws import MooneyRivlin
     >>> require_stable(MooneyRivlin(300.0, 200.0))
     """
+    require_kind(law, Law, "law", "a Law, such as warpbrain.NeoHookean(mu=1000)")
     volumetric = law.volumetric_modulus(poisson, formulation)
     whole = f"{law!r}, {formulation}, at the Poisson ratio {poisson:g}"
     if formulation == "coupled" and volumetric < 0.0:

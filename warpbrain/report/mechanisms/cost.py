@@ -66,15 +66,13 @@ def _other_example(row: Mapping[str, Any]) -> str:
 
 
 def table(measured: Sequence[Costs], kinds: Sequence[str]) -> list[str]:
-    """All mechanisms and the plain model beside itself, two columns a machine."""
-    if not measured:
-        return ["Not measured yet."]
+    """All mechanisms and the plain model beside itself, two columns a machine, as CSV."""
     heads = [f"{machine(costs)}: {what}" for costs in measured for what in ("step", "Newton iteration")]
-    lines = [f"| | {' | '.join(heads)} |", "|---|" + "---|" * len(heads)]
+    lines = [",".join(["", *(f'"{head}"' for head in heads)])]
     for kind in (PLAIN, *kinds):
         cells = []
         for costs in measured:
             row = row_of(costs, kind)
             cells += ["", ""] if row is None else [f"{ratio(row[what]):.2f}" for what in ("step", "newton")]
-        lines.append(f"| {f'{PLAIN} beside {PLAIN}' if kind == PLAIN else kind} | {' | '.join(cells)} |")
+        lines.append(",".join([f"{PLAIN} beside {PLAIN}" if kind == PLAIN else kind, *cells]))
     return lines

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import Costs, machine, ratio, reasons, row_of, table
+from warpbrain.report.mechanisms.cost import Costs, machine, ratio, reasons, row_of
 from warpbrain.report.mechanisms.effect import Effect
 
 _HEAD = """# Mechanisms
 
-What can act on a brain beside its tissue's own law. A case assumes one by a table of `case.toml`, a run by `--with`,
-and several act together, as [one energy](pairs.md):
+What can act on a brain beside its tissue's law. A case assumes one in `case.toml`, a run by `--with`; several act
+together, as [one energy](pairs.md):
 
 ```toml
 [[mechanism]]
@@ -23,31 +23,30 @@ csf_level = 60.0
 warpbrain run --case 0529 --with gravity:level=60 --with swelling:amount=-3
 ```
 
-Each is one file of [physics/mechanisms](../../warpbrain/physics/mechanisms); these pages are made from the files by
-`python docs/make_mechanisms.py`. How states and motions are differentiated by their numbers:
-[solvers.md](../solvers.md#derivatives).
+Each also takes `ramp = [[time, factor], ...]`, which scales what it does over time (s). Each is one file of
+[physics/mechanisms](../../warpbrain/physics/mechanisms), from which `python docs/make_mechanisms.py` makes these
+pages; below their pictures stand their equations.
 """
 
-_EFFECT = """The effect is the largest that its example has on a displacement of the phantom under a light load,
-`--case phantom-loaded`. Examples are there to be seen: they do not say what matters more in a patient. The cost is that
-of a time step with it beside one without it, as measured {where}.
+_EFFECT = """The effect is the largest on a displacement of the phantom under a light load
+(`--case phantom-loaded`), by the example of each page: it does not say what matters more in a patient. Where a
+page does not say what tells a mechanism apart from what it is taken for, one deformed state does. The cost is that of a
+time step beside one without it, {where}.
 """
 
 _COST = """## Cost
 
-Each mechanism's example on `phantom-loaded` (coarse mesh, grey and white matter), times that of the plain model:
+Each example on `phantom-loaded` (coarse mesh, grey and white matter), times the plain model, by `python -m
+warpbrain.bench mechanisms --out bench/results`: a time step of 1 ms, and an iteration of Newton's method. *Plain beside
+plain* says how far to trust the others. What is off costs nothing ([benchmarks.md](../benchmarks.md)).
+"""
 
-    python -m warpbrain.bench mechanisms --out bench/results
+_TABLE = """[cost.csv](cost.csv):
 
-A time step is 1 ms, linearised, conjugate gradients to 1e-6; an iteration of Newton's method is that of an equilibrium,
-its line search included. Steps with and without take turns in one process, in processor time on a CPU. Each number is
-the median of the ratios of neighbours in time; that of the plain model beside itself says how far to trust the others.
-A mechanism that makes the matrix worse conditioned, as a stiff membrane does, costs iterations of conjugate gradients,
-which is in these numbers; where fluid flows MINRES takes their place, for displacement and pressure together
-([solvers.md](../solvers.md#linear-systems)).
-
-What is off is not there: a model without mechanisms has no terms to sum, and each phase of its step takes as long as
-before there were mechanisms ([benchmarks.md](../benchmarks.md)).
+```{csv-table}
+:file: cost.csv
+:header-rows: 1
+```
 """
 
 
@@ -61,7 +60,7 @@ def index(effects: Mapping[str, Effect], measured: Sequence[Costs]) -> str:
         The first is in the overview.
     """
     where = f"on {machine(measured[0])}" if measured else "nowhere yet"
-    lines = [_HEAD, "| | | effect | taken for | told apart by | cost |", "|---|---|---|---|---|---|"]
+    lines = [_HEAD, "| | | effect | taken for | cost |", "|---|---|---|---|---|"]
     for kind, mechanism in mechanisms().items():
         row = row_of(measured[0], kind) if measured else None
         cost = "" if row is None else f"{ratio(row['step']):.2f}"
@@ -70,10 +69,8 @@ def index(effects: Mapping[str, Effect], measured: Sequence[Costs]) -> str:
             mechanism.sentence,
             f"{effects[kind].largest:.2f} mm",
             ", ".join(mechanism.confused_with),
-            ", ".join(mechanism.needs),
             cost,
         ]
         lines.append(f"| {' | '.join(cells)} |")
-    lines += ["", _EFFECT.format(where=where), _COST, *table(measured, list(mechanisms())), ""]
-    long = reasons(measured)
-    return "\n".join([*lines, *(["What makes steps long:", "", *long, ""] if long else [])])
+    lines += ["", _EFFECT.format(where=where), _COST]
+    return "\n".join([*lines, *reasons(measured), "", _TABLE])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import sys
 
 from warpbrain.physics.continuous import smooth_parameters
@@ -25,16 +24,13 @@ def page(kind: str, effect: Effect) -> str:
     mechanism = mechanisms()[kind]
     module = sys.modules[mechanism.__module__]
     source = f"../../{module.__name__.replace('.', '/')}.py"
-    lines = [f"# {kind}", "", f"*{mechanism.sentence}*", "", inspect.cleandoc(module.__doc__ or ""), ""]
-    lines += ["## Parameters", "", *_table(mechanism), ""]
-    lines += ["## What it does to the phantom", "", *_picture(mechanism, effect), ""]
-    lines += ["## What it is taken for", "", *confusions(mechanism), ""]
-    lines += ["## Derivatives", "", *derivatives(mechanism), ""]
-    lines += [
-        f"[{source.rsplit('/', 1)[1]}]({source}), [what it costs, all mechanisms](index.md#cost), "
-        "[together with others](pairs.md)",
-        "",
-    ]
+    doc = (module.__doc__ or "").strip().splitlines()
+    lines = [f"# {kind}", "", f"*{mechanism.sentence}* {doc[0]}", "", *_parameters(mechanism), ""]
+    lines += [*_picture(mechanism, effect), "", *confusions(mechanism), *derivatives(mechanism), ""]
+    lines += [f"[{source.rsplit('/', 1)[1]}]({source}), [cost](index.md#cost), [together with others](pairs.md)", ""]
+    if len(doc) > 1:
+        # the equations stand once, at the head of the file that computes them
+        lines += [f"```{{docstring}} {module.__name__}", "```", ""]
     return "\n".join(lines)
 
 
@@ -49,7 +45,7 @@ def confusions(mechanism: type[Mechanism]) -> list[str]:
         lines.append("It does not act on elements `tet10` and `tet10-mixed`.")
     if mechanism.needs:
         return [*lines, f"Told apart by {', '.join(mechanism.needs)}."]
-    return [*lines, *(["One deformed state tells them apart."] if others else [])]
+    return lines
 
 
 def derivatives(mechanism: type[Mechanism]) -> list[str]:
@@ -57,35 +53,39 @@ def derivatives(mechanism: type[Mechanism]) -> list[str]:
     lines = []
     numbers = [f"`{key}`" for key in smooth_parameters(mechanism)]
     if numbers:
-        lines.append(f"By {', '.join(numbers)} ([how](../solvers.md#derivatives)).")
+        lines.append(f"[Derivatives](../solvers.md#derivatives) by {', '.join(numbers)}.")
     for key, says in mechanism.parameters().items():
         if says.choices:
-            lines.append(
-                f"`{key}` is one of {', '.join(says.choices)}, and nothing between them: a secant, not a derivative."
-            )
+            lines.append(f"`{key}` is one of {', '.join(says.choices)}: a secant, not a derivative.")
     if mechanism.switches:
-        lines.append("It is there or not: a secant, the difference that it makes, not a derivative.")
+        lines.append("It is there or not: a secant, not a derivative.")
     return lines
 
 
-def _table(mechanism: type[Mechanism]) -> list[str]:
-    lines = ["| key | unit | | expected | typical | source |", "|---|---|---|---|---|---|"]
+def _parameters(mechanism: type[Mechanism]) -> list[str]:
+    lines = []
     for name, says in mechanism.parameters().items():
-        expected = "" if says.expectation is None else str(says.expectation)
         unit = "`units`" if says.kind == "position" else says.unit
-        doc = mechanism.described(name)
-        lines.append(f"| `{name}` | {unit} | {doc} | {expected} | {says.typical} | {says.source} |")
-    return [*lines, "", "`ramp = [[time, factor], ...]` scales what it does over time (s)."]
+        parts = [f"- `{name}`{f' [{unit}]' if unit else ''}: {mechanism.described(name)}"]
+        if says.expectation is not None:
+            parts.append(f"Expected: {says.expectation}.")
+        if says.typical:
+            parts.append(f"Typical: {says.typical}.")
+        if says.source:
+            parts.append(f"Source: {says.source}.")
+        lines.append(" ".join(parts))
+    return lines
 
 
 def _picture(mechanism: type[Mechanism], effect: Effect) -> list[str]:
     state = f"{effect.steps} ms after the load came, from rest" if effect.steps else "in equilibrium"
-    place = ", ".join(f"{x:.0f}" for x in effect.place)
     return [
-        f"    warpbrain run {effect.command} --with {mechanism.example}",
+        "```sh",
+        f"warpbrain run {effect.command} --with {mechanism.example}",
+        "```",
         "",
         f"![{mechanism.kind}: what it does to the phantom](../figures/mechanism-{mechanism.kind}.png)",
         "",
-        f"The phantom under 1 N, cut at y = {1000.0 * PLACE:.0f} mm; right: what is added to its displacement, "
-        f"{state}, {MAGNIFIED:g} times as large. At most {effect.largest:.2f} mm, at ({place}) mm.",
+        f"Cut at y = {1000.0 * PLACE:.0f} mm. Right: what is added {state} ({MAGNIFIED:g} times), at most "
+        f"{effect.largest:.2f} mm.",
     ]
