@@ -26,6 +26,7 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
 
     @wp.kernel(module=module)
     def right_hand_side(
+        start: int,
         external: wp.array[vec3],
         internal: wp.array[vec3],
         mass: wp.array[scalar],
@@ -38,12 +39,13 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
         along_Av: scalar,
         b: wp.array[vec3],
     ):
-        i = wp.tid()
+        i = start + wp.tid()
         momentum = mass[i] * (v_start[i] + along_Mv * v[i])
         b[i] = wp.cw_mul(free[i], momentum + h * (external[i] - internal[i]) + along_Av * Av[i])
 
     @wp.kernel(module=module)
     def update(
+        start: int,
         u_start: wp.array[vec3],
         dv: wp.array[vec3],
         v_prescribed: wp.array[vec3],
@@ -52,7 +54,7 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
         v: wp.array[vec3],
         u: wp.array[vec3],
     ):
-        i = wp.tid()
+        i = start + wp.tid()
         w = wp.cw_mul(free[i], v[i] + dv[i] - v_prescribed[i]) + v_prescribed[i]
         v[i] = w
         u[i] = u_start[i] + h * w

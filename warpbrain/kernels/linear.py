@@ -1,8 +1,9 @@
 """The one door to linear algebra: preconditioned conjugate gradients on the assembled system.
 
-Nobody else calls `warp.optim.linear`. A solve is captured once in a graph, with its convergence test on the device, and
-replayed: on CUDA one launch instead of hundreds, on the CPU a loop in C++ instead of Python. Facts about Warp 1.19 that
-are dealt with here and nowhere else:
+On the CPU they are one kernel (`warpbrain.kernels.multicore_gradients`), unless the preconditioner is `fsai` or part of
+the matrix is in no block. All else is Warp's, and nobody else calls `warp.optim.linear`. A solve by Warp is captured
+once in a graph, with its convergence test on the device, and replayed: on CUDA one launch instead of hundreds, on the
+CPU a loop in C++ instead of Python. Facts about Warp 1.19 that are dealt with here and nowhere else:
 
 - on the CPU its CG reduces every tile of a dot product once per absent GPU lane. Naming the one system as a batch of
   one (`batch_offsets = [0, n]`) takes the code path that does not;
@@ -27,6 +28,8 @@ import warp.optim.linear as warp_linear
 from warp.sparse import BsrMatrix
 
 from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.multicore import Graph, launch, launch_together
+from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernel
 from warpbrain.kernels.precision import Precision
 
 #: Names of the preconditioners: inverse diagonal blocks, factorised sparse approximate inverse, none.
@@ -88,6 +91,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
 
     @wp.kernel(module=module)
     def multiply(
+        start: int,
         offsets: wp.array[int],
         columns: wp.array[int],
         values: wp.array[mat33],
@@ -97,7 +101,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         alpha: scalar,
         beta: scalar,
     ):
-        i = wp.tid()
+        i = start + wp.tid()
         s = vec3()
         for k in range(offsets[i], offsets[i + 1]):
             s += values[k] * x[columns[k]]
@@ -108,15 +112,21 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         z[i] = s
 
     @wp.kernel(module=module)
-    def invert_diagonal(diagonal: wp.array[int], values: wp.array[mat33], inverse: wp.array[mat33]):
-        i = wp.tid()
+    def invert_diagonal(start: int, diagonal: wp.array[int], values: wp.array[mat33], inverse: wp.array[mat33]):
+        i = start + wp.tid()
         inverse[i] = wp.inverse(values[diagonal[i]])
 
     @wp.kernel(module=module)
     def apply_diagonal(
-        inverse: wp.array[mat33], x: wp.array[vec3], y: wp.array[vec3], z: wp.array[vec3], alpha: scalar, beta: scalar
+        start: int,
+        inverse: wp.array[mat33],
+        x: wp.array[vec3],
+        y: wp.array[vec3],
+        z: wp.array[vec3],
+        alpha: scalar,
+        beta: scalar,
     ):
-        i = wp.tid()
+        i = start + wp.tid()
         s = alpha * (inverse[i] * x[i])
         if beta != scalar(0.0):
             s += beta * y[i]
@@ -209,6 +219,35 @@ def _conditional_loop(test_convergence: Any, least: wp.array) -> Iterator[None]:
         warp_linear_internals._run_capturable_loop = original
 
 
+class _OnCores:
+    """Solves with one matrix's pattern on the cores of a CPU; see `warpbrain.kernels.multicore_gradients`."""
+
+    def __init__(self, size: int, precision: Precision, device: Any) -> None:
+        self._kernel, self._precision, self._device = gradients_kernel(precision), precision, device
+        self._scratch = [wp.zeros(size, dtype=precision.vec3, device=device) for _ in range(3)]
+        self._partial = wp.zeros(((size + CHUNK - 1) // CHUNK, 4), dtype=precision.scalar, device=device)
+        self.outcome = wp.full(4, math.nan, dtype=precision.scalar, device=device)
+
+    def solve(
+        self,
+        matrix: BsrMatrix,
+        inverse: wp.array,
+        b: wp.array,
+        x: wp.array,
+        *,
+        preconditioned: bool,
+        tolerance: float,
+        max_iterations: int,
+        watch_curvature: bool,
+    ) -> None:
+        """Run conjugate gradients from the present `x`."""
+        inputs = [
+            matrix.offsets, matrix.columns, matrix.values, int(preconditioned), inverse, b, x, *self._scratch,
+            self._partial, self._precision.scalar(tolerance), max_iterations, int(watch_curvature), self.outcome,
+        ]  # fmt: skip
+        launch_together(self._kernel, len(b), inputs, self._device)
+
+
 class ConjugateGradient:
     """Preconditioned CG for one symmetric matrix whose pattern does not change; nothing is allocated in a solve.
 
@@ -277,10 +316,13 @@ class ConjugateGradient:
         self._b, self._x = right_hand_side, solution
         self._tolerance = tolerance
         self._max_iterations = max_iterations
-        self._graphs: dict[float, Any] = {}
+        self._graphs: dict[float, Graph] = {}
         self._solvers: dict[float, warp_linear.CG] = {}
         self._outcome: tuple[wp.array, wp.array, wp.array] | None = None
         self._outcomes: dict[float, tuple[wp.array, wp.array, wp.array]] = {}
+        self._on_cores: _OnCores | None = None
+        if self._device.is_cpu and preconditioner != "fsai" and beyond is None:
+            self._on_cores = _OnCores(self._size, precision, self._device)
 
     def _solver(self, tolerance: float) -> Any:
         """Warp's solver for a tolerance, which it keeps for life; made when it is first asked for."""
@@ -325,7 +367,7 @@ class ConjugateGradient:
     def _launch_product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         """`z = alpha A x + beta y`."""
         A, scalar = self._matrix, self._precision.scalar
-        wp.launch(
+        launch(
             self._kernels.multiply,
             dim=self._size,
             inputs=[A.offsets, A.columns, A.values, x, y, z, scalar(alpha), scalar(beta)],
@@ -336,7 +378,7 @@ class ConjugateGradient:
 
     def _apply_diagonal(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         scalar = self._precision.scalar
-        wp.launch(
+        launch(
             self._kernels.apply_diagonal,
             dim=self._size,
             inputs=[
@@ -361,7 +403,7 @@ class ConjugateGradient:
     def prepare(self) -> None:
         """Renew the preconditioner after the values of the matrix changed; its pattern is kept."""
         if self._kind == "block-jacobi":
-            wp.launch(
+            launch(
                 self._kernels.invert_diagonal,
                 dim=self._size,
                 inputs=[self._diagonal, self._matrix.values, self._inverse],
@@ -382,9 +424,17 @@ class ConjugateGradient:
     def solve(self, tolerance: float | None = None) -> None:
         """Run CG from the present content of the solution array.
 
-        Within the capture of a graph this only records; otherwise it replays a graph of its own. A tolerance other than
-        that of the constructor is rounded down to a quarter of a decade, so that few graphs serve all.
+        Within the capture of a graph this only records. Otherwise Warp's solver replays a graph of its own; for that a
+        tolerance other than that of the constructor is rounded down to a quarter of a decade, so that few graphs serve
+        all.
         """
+        if self._on_cores is not None:
+            self._on_cores.solve(
+                self._matrix, self._inverse, self._b, self._x,
+                preconditioned=self._kind != "none", tolerance=self._tolerance if tolerance is None else tolerance,
+                max_iterations=self._max_iterations, watch_curvature=self._watch,
+            )  # fmt: skip
+            return
         if self._refused is not None:
             return
         wanted = self._tolerance if tolerance is None else 10.0 ** (math.floor(4.0 * math.log10(tolerance)) / 4.0)
@@ -392,10 +442,11 @@ class ConjugateGradient:
             self._record(wanted)
             return
         if wanted not in self._graphs:
-            with wp.ScopedCapture(device=self._device) as capture:
+            graph = Graph(self._device)
+            with graph.capture():
                 self._record(wanted)
-            self._graphs[wanted] = capture.graph
-        wp.capture_launch(self._graphs[wanted])
+            self._graphs[wanted] = graph
+        self._graphs[wanted].launch()
         self._outcome = self._outcomes[wanted]
 
     def _record(self, tolerance: float) -> None:
@@ -411,6 +462,12 @@ class ConjugateGradient:
 
     def result(self) -> LinearResult:
         """How the last solve ended (waits for the device)."""
+        if self._on_cores is not None:
+            iterations, residual, tolerance, curvature = map(float, self._on_cores.outcome.numpy())
+            if math.isnan(iterations):
+                raise RuntimeError("no solve has been run")
+            curvature = curvature if self._watch else float("nan")
+            return LinearResult(int(iterations), residual**0.5, tolerance**0.5, curvature)
         if self._refused is not None:
             return LinearResult(0, float("nan"), 0.0, self._refused)
         if self._outcome is None:

@@ -16,6 +16,7 @@ from warp.sparse import BsrMatrix, bsr_zeros
 from warpbrain.errors import InputError
 from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.linear import ConjugateGradient
+from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import PRECISIONS, Precision
 from warpbrain.kernels.quadratic import quadratic_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
@@ -397,7 +398,7 @@ class System:
     # -- sums over elements ---------------------------------------------------------------------------------------
 
     def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
-        wp.launch(kernel, dim=dim, inputs=list(inputs), device=self.device)
+        launch(kernel, dim, inputs, self.device)
 
     def _geometry(self, group: ElementGroup) -> tuple[wp.array, ...]:
         return (group.elements, self.element_nodes, self.inverse_edges, self.volume, group.parameters)

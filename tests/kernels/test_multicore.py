@@ -1,0 +1,116 @@
+"""Launches on all cores of a CPU: the same bits by any number of threads, whatever else these are at."""
+
+import numpy as np
+import pytest
+from bodies import model_of
+from material_point import LAWS
+from shapes import cube, distorted
+
+from warpbrain.kernels import multicore
+from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.system import System
+from warpbrain.threads import in_threads
+
+#: More than there are processors, and a number that does not divide the rows.
+THREADS = ("1", "2", "3")
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    """A clamped cube of enough nodes (2,197) for four threads."""
+    mesh = distorted(cube(12), 0.01)
+    constrained = np.zeros(mesh.points.shape, dtype=bool)
+    constrained[mesh.points[:, 2] < 0.02] = True
+    return model_of(mesh, Material(LAWS["neo-hookean"]), constrained=constrained, density=1000.0)
+
+
+def solved(model: Model) -> bytes:
+    """Forces, matrix and the solution of a linear system of a deformed body."""
+    system = System(model, "cpu")
+    system.u.assign(1e-3 * np.random.default_rng(2).normal(size=(system.size, 3)) * ~model.constrained)
+    system.evaluate_tangents()
+    system.gather_forces()
+    system.assemble(1.0, 1.0)
+    system.load.assign(system.internal.numpy() * ~model.constrained)
+    solver = system.linear_solver(tolerance=1e-6, max_iterations=1000, watch_curvature=True)
+    solver.prepare()
+    solver.solve()
+    assert solver.result().converged
+    arrays = (system.internal, system.matrix.values, system.solution)
+    return b"".join(array.numpy().tobytes() for array in arrays)
+
+
+def moved(simulator: Simulator) -> bytes:
+    """Displacement after three steps of 1 ms of a cube that is thrown."""
+    free = ~simulator.system.model.constrained
+    simulator.restore(np.zeros(free.shape), 0.1 * np.random.default_rng(1).normal(size=free.shape) * free, 0.0)
+    for _ in range(3):
+        simulator.step()
+    return simulator.system.u.numpy().tobytes()
+
+
+def threads_used(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """A list to which every launch on several threads adds how many these are."""
+    used: list[int] = []
+    run = multicore._run
+
+    def counted(team, kernel, dim, inputs, device, changes):
+        used.append(len(changes))
+        run(team, kernel, dim, inputs, device, changes)
+
+    monkeypatch.setattr(multicore, "_run", counted)
+    return used
+
+
+def test_bits_do_not_depend_on_the_number_of_threads(model, monkeypatch):
+    used = threads_used(monkeypatch)
+    answers = []
+    for count in THREADS:
+        monkeypatch.setenv("OMP_NUM_THREADS", count)
+        answers.append(solved(model))
+    assert answers[1:] == answers[:1] * 2
+    assert set(used) == {2, 3}
+
+
+def test_nor_in_a_captured_graph(model, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    simulator = Simulator(System(model, "cpu"))
+    expected = moved(simulator)
+    for count in THREADS:
+        monkeypatch.setenv("OMP_NUM_THREADS", count)
+        simulator.capture()
+        assert moved(simulator) == expected
+    # the graph was captured for three, and there are fewer now
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    assert moved(simulator) == expected
+
+
+def test_threads_that_have_other_work_are_not_waited_for(model, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    expected = solved(model)
+    team = multicore._team()
+    assert team is not None
+    with team.busy:
+        assert solved(model) == expected
+    assert in_threads(lambda _: solved(model), range(2)) == [expected] * 2
+
+
+def test_an_interrupt_leaves_no_thread_waiting(model, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    expected = solved(model)
+    team = multicore._team()
+    assert team is not None
+    run = multicore._Calls.run
+
+    def interrupted(self, part):
+        # the others wait at a barrier that this thread never comes to
+        if part == 1 and hasattr(self.parts[part][1], "thread"):
+            raise KeyboardInterrupt
+        run(self, part)
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(multicore._Calls, "run", interrupted)
+        solved(model)
+    assert not team.busy.locked()
+    assert solved(model) == expected
