@@ -177,6 +177,11 @@ def linear_kernels(precision: Precision) -> LinearKernels:
     )
 
 
+def solver_kernels(precision: Precision, device: wp.Device) -> list[Any]:
+    """Of each module that `ConjugateGradient` needs on a device, with its default preconditioner, a kernel."""
+    return [linear_kernels(precision).multiply, *([gradients_kernel(precision)] if device.is_cpu else [])]
+
+
 @contextmanager
 def _conditional_loop(test_convergence: Any, least: wp.array) -> Iterator[None]:
     """While a graph of the CPU is being captured: let Warp's CG loop on the device until it has converged.

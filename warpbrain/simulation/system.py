@@ -15,7 +15,8 @@ from warp.sparse import BsrMatrix, bsr_zeros
 
 from warpbrain.errors import InputError
 from warpbrain.kernels.assembly import assembly_kernels
-from warpbrain.kernels.linear import ConjugateGradient
+from warpbrain.kernels.linear import ConjugateGradient, solver_kernels
+from warpbrain.kernels.module import begin_loading
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import PRECISIONS, Precision
 from warpbrain.kernels.quadratic import quadratic_kernels
@@ -56,6 +57,11 @@ def find_precision(name: str) -> Precision:
     if name not in PRECISIONS:
         raise InputError(f"precision '{name}': expected one of {', '.join(PRECISIONS)}")
     return PRECISIONS[name]
+
+
+def begin_loading_kernels(device: wp.Device, precision: Precision) -> None:
+    """Begin to compile what every model needs, while one is still being read; `System.load_kernels` does the rest."""
+    begin_loading([assembly_kernels(precision).gather_matrix, *solver_kernels(precision, device)], device)
 
 
 def _code(material: Material) -> tuple[type[Law], str, int]:
@@ -591,6 +597,10 @@ class System:
     def load_kernels(self) -> float:
         """Compile what a run needs, or find it in Warp's cache, at the present state; returns the seconds it took."""
         start = time.perf_counter()
+        of_laws = [kernel for g in self.groups for kernel in (g.kernels.forces_and_tangents, g.kernels.stress)]
+        begin_loading(
+            [*of_laws, self._kernels.gather_matrix, *solver_kernels(self.precision, self.device)], self.device
+        )()
         # in a step, in which a term may need more than in an equilibrium
         for term in self.terms:
             term.set_time_step(1.0)
