@@ -28,9 +28,10 @@ import warp.optim.linear as warp_linear
 from warp.sparse import BsrMatrix
 
 from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.multicore import Graph, launch, launch_together
-from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernel
+from warpbrain.kernels.multicore import Graph, give_way, launch, launch_together
+from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernel, sync_words
 from warpbrain.kernels.precision import Precision
+from warpbrain.threads import MOST
 
 #: Names of the preconditioners: inverse diagonal blocks, factorised sparse approximate inverse, none.
 PRECONDITIONERS = ("block-jacobi", "fsai", "none")
@@ -231,7 +232,8 @@ class _OnCores:
         self._kernel, self._precision, self._device = gradients_kernel(precision), precision, device
         self._scratch = [wp.zeros(size, dtype=precision.vec3, device=device) for _ in range(3)]
         self._partial = wp.zeros(((size + CHUNK - 1) // CHUNK, 4), dtype=precision.scalar, device=device)
-        self.outcome = wp.full(4, math.nan, dtype=precision.scalar, device=device)
+        self._sync = wp.zeros(sync_words(MOST), dtype=wp.uint64, device=device)
+        self.outcome = wp.full(7, math.nan, dtype=precision.scalar, device=device)
 
     def solve(
         self,
@@ -246,8 +248,10 @@ class _OnCores:
         watch_curvature: bool,
     ) -> None:
         """Run conjugate gradients from the present `x`."""
+        self._sync.zero_()
         inputs = [
-            matrix.offsets, matrix.columns, matrix.values, int(preconditioned), inverse, b, x, *self._scratch,
+            self._sync.ptr, give_way(), matrix.offsets, matrix.columns, matrix.values, int(preconditioned), inverse,
+            b, x, *self._scratch,
             self._partial, self._precision.scalar(tolerance), max_iterations, int(watch_curvature), self.outcome,
         ]  # fmt: skip
         launch_together(self._kernel, len(b), inputs, self._device)
@@ -468,7 +472,7 @@ class ConjugateGradient:
     def result(self) -> LinearResult:
         """How the last solve ended (waits for the device)."""
         if self._on_cores is not None:
-            iterations, residual, tolerance, curvature = map(float, self._on_cores.outcome.numpy())
+            iterations, residual, tolerance, curvature = map(float, self._on_cores.outcome.numpy()[:4])
             if math.isnan(iterations):
                 raise RuntimeError("no solve has been run")
             curvature = curvature if self._watch else float("nan")

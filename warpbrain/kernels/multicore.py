@@ -1,16 +1,17 @@
 """Launches on all cores of a CPU: Warp runs a kernel of the CPU on one thread, this on a team of them.
 
-A kernel whose first argument is called ``start`` takes its index from ``start + wp.tid()``: on the CPU each thread of
-the team has a range of its own (`launch`). A kernel whose first arguments are ``thread, threads, team`` runs once in
-each thread, and they wait for each other at `barrier` (`launch_together`). What a kernel writes must not depend on how
-many threads there are; then the bits do not either. On a GPU `launch` is `wp.launch`.
+A kernel whose first argument is called ``start`` takes its index from ``start + wp.tid()``: on the CPU its items are
+cut into parts, and threads of the team take one after the other (`launch`). A kernel whose first arguments are
+``thread, threads`` runs once for each thread (`launch_together`). What a kernel writes must not depend on how many
+threads there are; then the bits do not either. On a GPU `launch` is `wp.launch`.
 
-How many threads there are say ``OMP_NUM_THREADS`` and the scheduler (`warpbrain.threads.thread_count`). The team is one
-for a process: a launch while it is busy, or within a part of `warpbrain.threads.in_threads`, runs on one thread.
+No thread waits for another to come, only for parts that others have begun: on a machine that has other work as well
+the asking thread does what the others do not get to. How many there are say ``OMP_NUM_THREADS`` and the scheduler
+(`warpbrain.threads.thread_count`). The team is one for a process: a launch while it is busy, or within a part of
+`warpbrain.threads.in_threads`, runs on one thread.
 
-In a captured graph (`Graph`) a launch is a call of `share`, which hands the parts to threads that wait in `work` for as
-long as the graph is replayed. All of this happens outside of Python; threads that have waited for long give way to
-others, so that a machine with other work is not stopped by those that wait.
+In a captured graph (`Graph`) a launch is a call of `share`, which hands its parts to threads that are in `work` for as
+long as the graph is replayed. All of this happens outside of Python.
 """
 
 from __future__ import annotations
@@ -31,106 +32,93 @@ import warp as wp
 from warp._src.context import _build_cpu_args_structs
 
 from warpbrain.kernels.module import compiled_module
-from warpbrain.threads import MOST, is_part, thread_count
+from warpbrain.threads import is_part, thread_count
 
 #: Items of a launch below which it stays on one thread: some 20 us of work, about what it takes to share it out.
 _LEAST = 512
 
-# Words (32 bits) of a team's memory, each alone on a cache line: how many tasks were handed out, threads that wait for
-# them, whether all is to end, addresses of the task and of what gives way, tasks that each thread has done, barriers
-# that each has come to, barriers that are open.
-_LINE = 16
-_SEQUENCE, _WORKERS, _ABORT, _TASK = (line * _LINE for line in range(4))
-_DONE = 4 * _LINE
-_CAME = _DONE + MOST * _LINE
-_OPEN = _CAME + MOST * _LINE
-_WORDS = _OPEN + _LINE
+# Words (64 bits) of a team's memory, each alone on a cache line: the ticket, which counts tasks, parts of the task and
+# parts that were taken; parts that are done; whether threads are to look for work; the task.
+_LINE = 8
+_TICKET, _DONE, _OPEN, _TASK = (line * _LINE for line in range(4))
+_WORDS = 4 * _LINE
 
-_PRELUDE = f"""
-    int* words = (int*)team;
-    unsigned long long* addresses = (unsigned long long*)(words + {_TASK});
-    auto wait_for = [&](int place, int value) {{
-        for (int tries = 0; __atomic_load_n(words + place, __ATOMIC_ACQUIRE) < value; ++tries) {{
-            if (__atomic_load_n(words + {_ABORT}, __ATOMIC_RELAXED)) return false;
-            if (tries > 200) ((void (*)())addresses[1])();
+#: Gives way to other threads after it was called in vain for some microseconds. Of native code of this floor.
+PAUSE = """
+    auto pause = [&](unsigned& tries) {
+        if (++tries > 200) ((void (*)())give_way)();
 #if defined(__x86_64__)
-            else __builtin_ia32_pause();
+        else __builtin_ia32_pause();
 #endif
-        }}
-        return true;
-    }};
+    };
 """
-
-
-@wp.func_native(
-    _PRELUDE
-    + f"""
-    if (threads < 2) return true;
-    const int came = words[{_CAME} + {_LINE} * thread] + 1;
-    __atomic_store_n(words + {_CAME} + {_LINE} * thread, came, __ATOMIC_RELEASE);
-    if (thread > 0) return wait_for({_OPEN}, came);
-    for (int other = 1; other < threads; ++other)
-        if (!wait_for({_CAME} + {_LINE} * other, came)) return false;
-    __atomic_store_n(words + {_OPEN}, came, __ATOMIC_RELEASE);
-    return true;
-    """
-)
-def barrier(thread: int, threads: int, team: wp.uint64) -> bool:
-    """Wait for all threads of a launch; False if it is to end at once. Of kernels that are for the CPU alone."""
-
-
 # A task: its number of parts, the kernel, then bounds and arguments of the whole and of each part.
-@wp.func_native(
-    _PRELUDE
+_HELP = (
+    PAUSE
     + f"""
+    typedef unsigned long long word;
     typedef void (*kernel_type)(void*, void*);
-    unsigned long long* parts = (unsigned long long*)task;
-    const int workers = words[{_WORKERS}];
-    if (parts && workers + 1 < (int)parts[0]) {{
+    word* words = (word*)team;
+    auto help = [&]() {{
+        bool helped = false;
+        for (;;) {{
+            word ticket = __atomic_load_n(words + {_TICKET}, __ATOMIC_ACQUIRE);
+            if ((ticket & 0xffff) >= (ticket >> 16 & 0xffff)) return helped;
+            ticket = __atomic_fetch_add(words + {_TICKET}, 1, __ATOMIC_ACQ_REL);
+            if ((ticket & 0xffff) >= (ticket >> 16 & 0xffff)) return helped;
+            word* part = (word*)words[{_TASK}] + 4 + 2 * (ticket & 0xffff);
+            ((kernel_type)((word*)words[{_TASK}])[1])((void*)part[0], (void*)part[1]);
+            __atomic_fetch_add(words + {_DONE}, 1, __ATOMIC_ACQ_REL);
+            helped = true;
+        }}
+    }};
+    unsigned tries = 0;
+"""
+)
+
+
+@wp.func_native(
+    _HELP
+    + f"""
+    word* parts = (word*)task;
+    if (!words[{_OPEN}]) {{
         ((kernel_type)parts[1])((void*)parts[2], (void*)parts[3]);
         return;
     }}
-    for (int place = {_CAME}; place < {_WORDS}; place += {_LINE}) words[place] = 0;
-    addresses[0] = task;
-    const int sequence = words[{_SEQUENCE}] + 1;
-    __atomic_store_n(words + {_SEQUENCE}, sequence, __ATOMIC_RELEASE);
-    if (!parts) return;
-    ((kernel_type)parts[1])((void*)parts[4], (void*)parts[5]);
-    for (int thread = 1; thread <= workers; ++thread)
-        if (!wait_for({_DONE} + {_LINE} * thread, sequence)) return;
+    words[{_DONE}] = 0;
+    words[{_TASK}] = task;
+    const word sequence = (words[{_TICKET}] >> 32) + 1;
+    __atomic_store_n(words + {_TICKET}, sequence << 32 | parts[0] << 16, __ATOMIC_RELEASE);
+    help();
+    while (__atomic_load_n(words + {_DONE}, __ATOMIC_ACQUIRE) < parts[0]) pause(tries);
     """
 )
-def _share(team: wp.uint64, task: wp.uint64): ...
+def _share(team: wp.uint64, give_way: wp.uint64, task: wp.uint64): ...
 
 
 @wp.func_native(
-    _PRELUDE
+    _HELP
     + f"""
-    typedef void (*kernel_type)(void*, void*);
-    for (int sequence = 1; wait_for({_SEQUENCE}, sequence); ++sequence) {{
-        unsigned long long* parts = (unsigned long long*)addresses[0];
-        if (!parts) return;
-        if (thread < (int)parts[0])
-            ((kernel_type)parts[1])((void*)parts[4 + 2 * thread], (void*)parts[5 + 2 * thread]);
-        __atomic_store_n(words + {_DONE} + {_LINE} * thread, sequence, __ATOMIC_RELEASE);
-    }}
+    while (__atomic_load_n(words + {_OPEN}, __ATOMIC_ACQUIRE))
+        if (help()) tries = 0;
+        else pause(tries);
     """
 )
-def _work(thread: int, team: wp.uint64): ...
+def _work(team: wp.uint64, give_way: wp.uint64): ...
 
 
 @cache
 def _team_kernels() -> tuple[Any, Any]:
-    """`share`, with which a graph hands a task to the team (0: it is over), and `work`, where it waits."""
+    """`share`, with which a task is handed to the team, and `work`, in which its threads are."""
     module = compiled_module("multicore")
 
     @wp.kernel(module=module)
-    def share(team: wp.uint64, task: wp.uint64):
-        _share(team, task)
+    def share(team: wp.uint64, give_way: wp.uint64, task: wp.uint64):
+        _share(team, give_way, task)
 
     @wp.kernel(module=module)
-    def work(thread: int, team: wp.uint64):
-        _work(thread, team)
+    def work(team: wp.uint64, give_way: wp.uint64):
+        _work(team, give_way)
 
     return share, work
 
@@ -163,9 +151,9 @@ class _Calls:
         flat = [ctypes.addressof(struct) for part in self.parts for struct in part]
         return np.array([len(self.parts) - 1, function, *flat], dtype=np.uint64)
 
-    def run(self, part: int) -> None:
-        """Run a part, of which 0 is the whole."""
-        bounds, arguments = self.parts[part]
+    def run(self) -> None:
+        """Run the whole."""
+        bounds, arguments = self.parts[0]
         self.function(ctypes.byref(bounds), ctypes.byref(arguments))
 
 
@@ -175,42 +163,35 @@ class _Team:
     def __init__(self, count: int) -> None:
         self.count = count
         self.busy = threading.Lock()
-        self.words = np.zeros(_WORDS, dtype=np.int32)
-        self.words[_TASK : _TASK + 4].view(np.uint64)[1] = _giving_way()
-        self.address = self.words.ctypes.data
-        self._tasks: list[SimpleQueue[Any]] = [SimpleQueue() for _ in range(count - 1)]
-        for tasks in self._tasks:
-            threading.Thread(target=self._serve, args=(tasks,), daemon=True).start()
+        self._words = np.zeros(_WORDS, dtype=np.uint64)
+        self.address = self._words.ctypes.data
+        _, work = _team_kernels()
+        self._work = _Calls(work, 1, [self.address, give_way()], wp.get_device("cpu"), [])
+        self._calls: list[SimpleQueue[None]] = [SimpleQueue() for _ in range(count - 1)]
+        for calls in self._calls:
+            threading.Thread(target=self._serve, args=(calls,), daemon=True).start()
 
-    def _serve(self, tasks: SimpleQueue[Any]) -> None:
+    def _serve(self, calls: SimpleQueue[None]) -> None:
         while True:
-            function, argument, ended = tasks.get()
-            function(argument)
-            ended.release()
+            calls.get()
+            self._work.run()
 
     @contextmanager
-    def others(self, function: Any, arguments: Sequence[int]) -> Iterator[None]:
-        """Let the other threads call a function, each with an argument, while the body runs; then wait for them.
-
-        If the body is left by an exception, an interrupt for example, those that wait at a barrier are told to end.
-        """
-        self.words[_SEQUENCE] = self.words[_WORKERS] = self.words[_ABORT] = 0
-        self.words[_DONE:] = 0
-        begun, ended = 0, threading.Semaphore(0)
+    def working(self) -> Iterator[None]:
+        """Let the other threads look for work while the body runs; nobody waits until they come or go."""
+        self._words[_OPEN] = 1
         try:
-            for tasks, argument in zip(self._tasks, arguments, strict=False):
-                begun += 1
-                tasks.put((function, argument, ended))
+            for calls in self._calls:
+                # who was called before and has not come yet comes now
+                if calls.empty():
+                    calls.put(None)
             yield
-        except BaseException:
-            self.words[_ABORT] = 1
-            raise
         finally:
-            for _ in range(begun):
-                ended.acquire()
+            self._words[_OPEN] = 0
 
 
-def _giving_way() -> int:
+@cache
+def give_way() -> int:
     """Address of the system's function that lets other threads run."""
     if sys.platform == "win32":
         return ctypes.cast(ctypes.WinDLL("kernel32").SwitchToThread, ctypes.c_void_p).value or 0
@@ -244,7 +225,8 @@ def launch(kernel: Any, dim: Any, inputs: Sequence[Any], device: Any) -> None:
     inputs = [0, *inputs] if divides else inputs
     team = _team() if divides and device.is_cpu else None
     items = dim if isinstance(dim, int) else dim[0]
-    count = 1 if team is None else min(team.count, items // _LEAST)
+    # twice as many as threads, so that what is left at the end is small
+    count = 1 if team is None else min(2 * team.count, items // _LEAST)
     if team is None or count < 2:
         wp.launch(kernel, dim=dim, inputs=list(inputs), device=device)
         return
@@ -254,12 +236,14 @@ def launch(kernel: Any, dim: Any, inputs: Sequence[Any], device: Any) -> None:
 
 
 def launch_together(kernel: Any, items: int, inputs: Sequence[Any], device: Any) -> None:
-    """Run a kernel of the CPU once in each of as many threads as so many items are worth.
+    """Run a kernel of the CPU once for each of as many threads as so many items are worth.
+
+    It must not matter how many of the threads ever come.
 
     Parameters
     ----------
     kernel : wp.Kernel
-        Its first arguments are ``thread, threads, team``.
+        Its first arguments are ``thread, threads``.
     items : int
     inputs : sequence
         Its further arguments.
@@ -268,36 +252,35 @@ def launch_together(kernel: Any, items: int, inputs: Sequence[Any], device: Any)
     team = _team()
     count = 1 if team is None else min(team.count, items // _LEAST)
     if team is None or count < 2:
-        wp.launch(kernel, dim=1, inputs=[0, 1, 0, *inputs], device=device)
+        wp.launch(kernel, dim=1, inputs=[0, 1, *inputs], device=device)
         return
-    changes = [{"thread": thread, "threads": count, "team": team.address} for thread in range(count)]
-    _run(team, kernel, 1, [0, 1, 0, *inputs], device, changes)
+    changes = [{"thread": thread, "threads": count} for thread in range(count)]
+    _run(team, kernel, 1, [0, 1, *inputs], device, changes)
 
 
 def _run(
     team: _Team, kernel: Any, dim: Any, inputs: Sequence[Any], device: Any, changes: Sequence[dict[str, int]]
 ) -> None:
     """Run a launch in parts, now or whenever the graph is replayed that is being captured."""
-    if device.is_capturing:
-        graph = Graph.recording()
-        if graph is None:
-            wp.launch(kernel, dim=dim, inputs=list(inputs), device=device)
-            return
-        calls = _Calls(kernel, dim, inputs, device, changes)
-        table = calls.table()
-        graph.keep(team, calls, table)
-        share, _ = _team_kernels()
-        wp.launch(share, dim=1, inputs=[team.address, table.ctypes.data], device=device)
-        return
-    if not team.busy.acquire(blocking=False):
+    graph = Graph.recording()
+    if device.is_capturing and graph is None:
         wp.launch(kernel, dim=dim, inputs=list(inputs), device=device)
         return
-    try:
-        calls = _Calls(kernel, dim, inputs, device, changes)
-        with team.others(calls.run, range(2, len(calls.parts))):
-            calls.run(1)
-    finally:
-        team.busy.release()
+    calls = _Calls(kernel, dim, inputs, device, changes)
+    table = calls.table()
+    share, _ = _team_kernels()
+    task = [team.address, give_way(), table.ctypes.data]
+    if graph is not None:
+        graph.keep(team, calls, table)
+        wp.launch(share, dim=1, inputs=task, device=device)
+    elif team.busy.acquire(blocking=False):
+        try:
+            with team.working():
+                wp.launch(share, dim=1, inputs=task, device=device)
+        finally:
+            team.busy.release()
+    else:
+        calls.run()
 
 
 class Graph:
@@ -329,9 +312,6 @@ class Graph:
     @contextmanager
     def capture(self) -> Iterator[None]:
         """Capture what is launched in the body instead of running it."""
-        if self._device.is_cpu:
-            share, _ = _team_kernels()
-            share.module.load(self._device)
         Graph._being_recorded.graph = self
         try:
             with wp.ScopedCapture(device=self._device) as captured:
@@ -347,13 +327,7 @@ class Graph:
             wp.capture_launch(self._graph)
             return
         try:
-            share, work = _team_kernels()
-            waits = [{"thread": thread} for thread in range(1, team.count)]
-            calls = _Calls(work, 1, [0, team.address], self._device, waits)
-            with team.others(calls.run, range(1, team.count)):
-                team.words[_WORKERS] = team.count - 1
+            with team.working():
                 wp.capture_launch(self._graph)
-                wp.launch(share, dim=1, inputs=[team.address, 0], device=self._device)
         finally:
-            team.words[_WORKERS] = 0
             team.busy.release()

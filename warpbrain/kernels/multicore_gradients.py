@@ -3,6 +3,9 @@
 Hestenes and Stiefel's recurrences (1952), as `warp.optim.linear.CG` has them, in three passes over the rows an
 iteration where Warp makes nine, and without its kernels, which take longer to compile than all others of a run. Sums
 are over chunks of rows, then over chunks in order: they do not depend on the number of threads.
+
+Each thread has rows of its own, which stay in its cache, in `_SHARES` shares; who is through with these takes what
+others have not come to. Whoever does the last share of a pass adds up and lets the next pass begin.
 """
 
 from functools import cache
@@ -11,26 +14,98 @@ from typing import Any
 import warp as wp
 
 from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.multicore import barrier
+from warpbrain.kernels.multicore import PAUSE
 from warpbrain.kernels.precision import Precision
 
 #: Rows that are summed before anything is added to them.
 CHUNK = 64
+
+#: Shares that the rows of a thread are in.
+_SHARES = 4
+# Words of `sync`, each alone on a cache line: the pass, shares of it that are done, whether all is over, and of each
+# thread the pass and how many of its shares were taken. A pass is that of the start, then by turns the product, the
+# step and the new direction.
+_LINE = 8
+_PASS, _DONE, _OVER, _TAKEN = (line * _LINE for line in range(4))
+_START, _PRODUCT, _STEP, _DIRECTION = range(4)
+
+
+def sync_words(threads: int) -> int:
+    """Words (64 bits) of `sync`; all are zero before a solve."""
+    return _TAKEN + threads * _LINE
+
+
+_WORDS = """
+    typedef unsigned long long word;
+    word* words = (word*)sync;
+"""
+
+
+@wp.func_native(
+    PAUSE
+    + _WORDS
+    + f"""
+    for (unsigned tries = 0;; pause(tries)) {{
+        for (int turn = 0; turn < threads; ++turn) {{
+            const int owner = (thread + turn) % threads;
+            word* taken = words + {_TAKEN} + {_LINE} * owner;
+            if ((__atomic_load_n(taken, __ATOMIC_ACQUIRE) & 0xffffffff) >= {_SHARES}) continue;
+            const word mine = __atomic_fetch_add(taken, 1, __ATOMIC_ACQ_REL);
+            if ((mine & 0xffffffff) >= {_SHARES}) continue;
+            const word pass = mine >> 32;
+            const int kind = pass ? 1 + (int)((pass - 1) % 3) : {_START};
+            return kind * threads * {_SHARES} + owner * {_SHARES} + (int)(mine & 0xffffffff);
+        }}
+        if (__atomic_load_n(words + {_OVER}, __ATOMIC_ACQUIRE)) return -1;
+    }}
+    """
+)
+def _take(thread: int, threads: int, sync: wp.uint64, give_way: wp.uint64) -> int:
+    """A share of the present pass and the kind of the pass, as one number; -1 when all is over."""
+
+
+@wp.func_native(
+    _WORDS
+    + f"""
+    return __atomic_fetch_add(words + {_DONE}, 1, __ATOMIC_ACQ_REL) + 1 == (word)(threads * {_SHARES});
+    """
+)
+def _is_last(threads: int, sync: wp.uint64) -> bool:
+    """A share is done; whether it was the last of the pass."""
+
+
+@wp.func_native(
+    _WORDS
+    + f"""
+    if (!go_on) {{
+        __atomic_store_n(words + {_OVER}, 1, __ATOMIC_RELEASE);
+        return;
+    }}
+    words[{_DONE}] = 0;
+    const word pass = ++words[{_PASS}];
+    for (int owner = 0; owner < threads; ++owner)
+        __atomic_store_n(words + {_TAKEN} + {_LINE} * owner, pass << 32, __ATOMIC_RELEASE);
+    """
+)
+def _begin_pass(threads: int, sync: wp.uint64, go_on: bool):
+    """Let the next pass begin, or end."""
 
 
 @cache
 def gradients_kernel(precision: Precision) -> Any:
     """Make (once) the kernel of a precision; `warpbrain.kernels.multicore.launch_together` runs it.
 
-    Its arguments after those of the team: the matrix by `offsets`, `columns` and `values`; the `inverse` diagonal
-    blocks if it is `preconditioned`; `b`; `x`, the first guess and the result; `r`, `p` and `Ap`, scratch like `x`;
-    `partial` (chunks, 4), scratch; the relative `tolerance`; the most iterations; whether to end where the matrix is
-    seen not to be positive definite; `outcome` (4,): iterations, squares of the norm of the residual and of its goal,
-    and the least `p . A p / p . p`.
+    Its arguments after those of the threads: the addresses of `sync` and of what gives way; the matrix by `offsets`,
+    `columns` and `values`; the `inverse` diagonal blocks if it is `preconditioned`; `b`; `x`, the first guess and the
+    result; `r`, `p` and `Ap`, scratch like `x`; `partial` (chunks, 4), scratch; the relative `tolerance`; the most
+    iterations; whether to end where the matrix is seen not to be positive definite; `outcome` (7,): iterations, squares
+    of the norm of the residual and of its goal, the least `p . A p / p . p`, and three numbers of the recurrences.
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     module = compiled_module(f"multicore_gradients_{precision.name}")
-    chunk = wp.constant(CHUNK)
+    chunk, shares = wp.constant(CHUNK), wp.constant(_SHARES)
+    start, product = wp.constant(_START), wp.constant(_PRODUCT)
+    step, direction = wp.constant(_STEP), wp.constant(_DIRECTION)
 
     @wp.func
     def total(partial: wp.array2d[scalar], column: int):
@@ -43,7 +118,8 @@ def gradients_kernel(precision: Precision) -> Any:
     def conjugate_gradients(
         thread: int,
         threads: int,
-        team: wp.uint64,
+        sync: wp.uint64,
+        give_way: wp.uint64,
         offsets: wp.array[int],
         columns: wp.array[int],
         values: wp.array[mat33],
@@ -60,87 +136,94 @@ def gradients_kernel(precision: Precision) -> Any:
         watch_curvature: int,
         outcome: wp.array[scalar],
     ):
-        chunks = partial.shape[0]
-        first = (chunks * thread) // threads
-        last = (chunks * (thread + 1)) // threads
         rows = b.shape[0]
-        for t in range(first, last):
-            bb = scalar(0.0)
-            rr = scalar(0.0)
-            rz = scalar(0.0)
-            for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
-                s = b[i]
-                bb += wp.dot(s, s)
-                for k in range(offsets[i], offsets[i + 1]):
-                    s -= values[k] * x[columns[k]]
-                r[i] = s
-                z = s
-                if preconditioned != 0:
-                    z = inverse[i] * s
-                p[i] = z
-                rr += wp.dot(s, s)
-                rz += wp.dot(s, z)
-            partial[t, 0] = bb
-            partial[t, 2] = rr
-            partial[t, 3] = rz
-        go_on = barrier(thread, threads, team)
-        goal = tolerance * tolerance * total(partial, 0)
-        rr_total = total(partial, 2)
-        rz_total = total(partial, 3)
-        least = scalar(wp.inf)
-        iterations = scalar(0.0)
-        # nobody writes what others still read
-        go_on = barrier(thread, threads, team) and go_on
-        # written so that a residual that is not a number ends the loop
-        while go_on and rr_total > goal and iterations < scalar(max_iterations):
-            for t in range(first, last):
-                pAp = scalar(0.0)
-                pp = scalar(0.0)
-                for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
-                    s = vec3()
-                    for k in range(offsets[i], offsets[i + 1]):
-                        s += values[k] * p[columns[k]]
-                    Ap[i] = s
-                    pAp += wp.dot(p[i], s)
-                    pp += wp.dot(p[i], p[i])
-                partial[t, 0] = pAp
-                partial[t, 1] = pp
-            go_on = barrier(thread, threads, team)
-            pAp_total = total(partial, 0)
-            least = wp.min(least, pAp_total / total(partial, 1))
-            iterations += scalar(1.0)
-            # of a matrix that is not positive definite nothing is found, however long it goes on
-            if watch_curvature != 0 and not (least > scalar(0.0)):
-                go_on = False
-            alpha = rz_total / pAp_total
-            for t in range(first, last):
-                rr = scalar(0.0)
-                rz = scalar(0.0)
-                for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
-                    x[i] = x[i] + alpha * p[i]
-                    s = r[i] - alpha * Ap[i]
-                    r[i] = s
-                    z = s
-                    if preconditioned != 0:
-                        z = inverse[i] * s
-                    # the product is not needed any more
-                    Ap[i] = z
-                    rr += wp.dot(s, s)
-                    rz += wp.dot(s, z)
-                partial[t, 2] = rr
-                partial[t, 3] = rz
-            go_on = barrier(thread, threads, team) and go_on
-            rr_total = total(partial, 2)
-            rz_before = rz_total
-            rz_total = total(partial, 3)
-            beta = rz_total / rz_before
-            for i in range(first * chunk, wp.min(last * chunk, rows)):
-                p[i] = Ap[i] + beta * p[i]
-            go_on = barrier(thread, threads, team) and go_on
-        if thread == 0:
-            outcome[0] = iterations
-            outcome[1] = rr_total
-            outcome[2] = goal
-            outcome[3] = least
+        chunks = partial.shape[0]
+        all_shares = threads * shares
+        taken = _take(thread, threads, sync, give_way)
+        while taken >= 0:
+            kind = taken // all_shares
+            share = taken % all_shares
+            first = (chunks * share) // all_shares
+            last = (chunks * (share + 1)) // all_shares
+            if kind == start:
+                for t in range(first, last):
+                    bb = scalar(0.0)
+                    rr = scalar(0.0)
+                    rz = scalar(0.0)
+                    for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
+                        s = b[i]
+                        bb += wp.dot(s, s)
+                        for k in range(offsets[i], offsets[i + 1]):
+                            s -= values[k] * x[columns[k]]
+                        r[i] = s
+                        z = s
+                        if preconditioned != 0:
+                            z = inverse[i] * s
+                        p[i] = z
+                        rr += wp.dot(s, s)
+                        rz += wp.dot(s, z)
+                    partial[t, 0] = bb
+                    partial[t, 2] = rr
+                    partial[t, 3] = rz
+            elif kind == product:
+                for t in range(first, last):
+                    pAp = scalar(0.0)
+                    pp = scalar(0.0)
+                    for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
+                        s = vec3()
+                        for k in range(offsets[i], offsets[i + 1]):
+                            s += values[k] * p[columns[k]]
+                        Ap[i] = s
+                        pAp += wp.dot(p[i], s)
+                        pp += wp.dot(p[i], p[i])
+                    partial[t, 0] = pAp
+                    partial[t, 1] = pp
+            elif kind == step:
+                alpha = outcome[5]
+                for t in range(first, last):
+                    rr = scalar(0.0)
+                    rz = scalar(0.0)
+                    for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
+                        x[i] = x[i] + alpha * p[i]
+                        s = r[i] - alpha * Ap[i]
+                        r[i] = s
+                        z = s
+                        if preconditioned != 0:
+                            z = inverse[i] * s
+                        # the product is not needed any more
+                        Ap[i] = z
+                        rr += wp.dot(s, s)
+                        rz += wp.dot(s, z)
+                    partial[t, 2] = rr
+                    partial[t, 3] = rz
+            else:
+                beta = outcome[6]
+                for i in range(first * chunk, wp.min(last * chunk, rows)):
+                    p[i] = Ap[i] + beta * p[i]
+
+            if _is_last(threads, sync):
+                go_on = True
+                if kind == product:
+                    pAp_total = total(partial, 0)
+                    outcome[0] = outcome[0] + scalar(1.0)
+                    outcome[3] = wp.min(outcome[3], pAp_total / total(partial, 1))
+                    outcome[5] = outcome[4] / pAp_total
+                elif kind != direction:
+                    rz_total = total(partial, 3)
+                    if kind == start:
+                        outcome[0] = scalar(0.0)
+                        outcome[2] = tolerance * tolerance * total(partial, 0)
+                        outcome[3] = scalar(wp.inf)
+                    else:
+                        outcome[6] = rz_total / outcome[4]
+                    outcome[1] = total(partial, 2)
+                    outcome[4] = rz_total
+                    # written so that a residual that is not a number ends the loop
+                    go_on = outcome[1] > outcome[2] and outcome[0] < scalar(max_iterations)
+                    # of a matrix that is not positive definite nothing is found, however long it goes on
+                    if watch_curvature != 0 and not (outcome[3] > scalar(0.0)):
+                        go_on = False
+                _begin_pass(threads, sync, go_on)
+            taken = _take(thread, threads, sync, give_way)
 
     return conjugate_gradients
