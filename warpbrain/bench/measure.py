@@ -170,7 +170,8 @@ def _checked(simulator: Simulator) -> int:
 def count(system: System, cg_iterations: int) -> tuple[int, int]:
     """Bytes that a step must move through memory, each array once a kernel, and kernel launches of a step.
 
-    Gathers count what they read, not what caches save; the vectors of CG count as Warp's kernels pass over them.
+    Gathers count what they read, not what caches save; the vectors of CG count as the kernels pass over them. On the
+    CPU, where CG is one kernel, a pass counts as a launch.
     """
     real = system.precision.numpy.itemsize
     vector, block = 3 * real, 9 * real
@@ -182,10 +183,12 @@ def count(system: System, cg_iterations: int) -> tuple[int, int]:
     diagonal = n * 2 * block
     right_hand_side = 8 * n * vector
     update = 7 * n * vector
-    # a CG iteration: product, p.Ap, x and r, preconditioner, r.r and r.z, p
-    iteration = multiply + 2 * n * vector + 6 * n * vector + n * (block + 2 * vector) + 4 * n * vector + 3 * n * vector
+    # a CG iteration: product, p.Ap, x and r, preconditioner, r.r and r.z, p; on the CPU product, x and r, p
+    iteration, passes = multiply + 17 * n * vector + n * block, 9
+    if system.device.is_cpu:
+        iteration, passes = multiply + 11 * n * vector + n * block, 3
     total = elements + gather_forces + gather_matrix + multiply + diagonal + right_hand_side + update
     total += 2 * n * vector + cg_iterations * iteration + iteration
     # copies of the state, elements by group, two gathers, product, right-hand side, preconditioner, CG's start, update
-    launches = 2 + len(system.groups) + 5 + 12 + 9 * cg_iterations + 1
+    launches = 2 + len(system.groups) + 5 + passes + 3 + passes * cg_iterations + 1
     return int(total), launches

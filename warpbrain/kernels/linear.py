@@ -433,20 +433,19 @@ class ConjugateGradient:
     def solve(self, tolerance: float | None = None) -> None:
         """Run CG from the present content of the solution array.
 
-        Within the capture of a graph this only records. Otherwise Warp's solver replays a graph of its own; for that a
-        tolerance other than that of the constructor is rounded down to a quarter of a decade, so that few graphs serve
-        all.
+        Within the capture of a graph this only records; otherwise Warp's solver replays a graph of its own. A tolerance
+        other than that of the constructor is rounded down to a quarter of a decade, so that few graphs serve all.
         """
-        if self._on_cores is not None:
-            self._on_cores.solve(
-                self._matrix, self._inverse, self._b, self._x,
-                preconditioned=self._kind != "none", tolerance=self._tolerance if tolerance is None else tolerance,
-                max_iterations=self._max_iterations, watch_curvature=self._watch,
-            )  # fmt: skip
-            return
         if self._refused is not None:
             return
         wanted = self._tolerance if tolerance is None else 10.0 ** (math.floor(4.0 * math.log10(tolerance)) / 4.0)
+        if self._on_cores is not None:
+            self._on_cores.solve(
+                self._matrix, self._inverse, self._b, self._x,
+                preconditioned=self._kind != "none", tolerance=wanted,
+                max_iterations=self._max_iterations, watch_curvature=self._watch,
+            )  # fmt: skip
+            return
         if self._device.is_capturing:
             self._record(wanted)
             return
