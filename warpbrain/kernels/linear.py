@@ -25,13 +25,15 @@ import numpy as np
 import warp as wp
 import warp._src.optim.linear as warp_linear_internals
 import warp.optim.linear as warp_linear
+from numpy.typing import NDArray
+from scipy.linalg import lapack
 from warp.sparse import BsrMatrix
 
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.multicore import Graph, give_way, launch, launch_together
-from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernel, sync_words
+from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernels, sync_words
 from warpbrain.kernels.precision import Precision
-from warpbrain.threads import MOST
+from warpbrain.threads import MOST, one_thread_of_blas
 
 #: Names of the preconditioners: inverse diagonal blocks, factorised sparse approximate inverse, none.
 PRECONDITIONERS = ("block-jacobi", "fsai", "none")
@@ -180,7 +182,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
 
 def solver_kernels(precision: Precision, device: wp.Device) -> list[Any]:
     """Of each module that `ConjugateGradient` needs on a device, with its default preconditioner, a kernel."""
-    return [linear_kernels(precision).multiply, *([gradients_kernel(precision)] if device.is_cpu else [])]
+    return [linear_kernels(precision).multiply, *([gradients_kernels(precision)[0]] if device.is_cpu else [])]
 
 
 @contextmanager
@@ -225,15 +227,77 @@ def _conditional_loop(test_convergence: Any, least: wp.array) -> Iterator[None]:
         warp_linear_internals._run_capturable_loop = original
 
 
+@dataclass(frozen=True)
+class Nodes:
+    """Where the rows of a matrix are, for the coarse space of `warpbrain.kernels.multicore_gradients`.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+        [m]
+    free : wp.array of vec3, shape (n,)
+        1 for free components, 0 for constrained ones.
+    """
+
+    points: NDArray[np.float64]
+    free: wp.array
+
+
+#: Aggregates of the coarse space, and rows of a matrix from which on it pays: the inverse of its matrix takes as long
+#: as some iterations, of which it saves more than half.
+_AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 2000
+
+
 class _OnCores:
     """Solves with one matrix's pattern on the cores of a CPU; see `warpbrain.kernels.multicore_gradients`."""
 
-    def __init__(self, size: int, precision: Precision, device: Any) -> None:
-        self._kernel, self._precision, self._device = gradients_kernel(precision), precision, device
-        self._scratch = [wp.zeros(size, dtype=precision.vec3, device=device) for _ in range(3)]
-        self._partial = wp.zeros(((size + CHUNK - 1) // CHUNK, 4), dtype=precision.scalar, device=device)
-        self._sync = wp.zeros(sync_words(MOST), dtype=wp.uint64, device=device)
-        self.outcome = wp.full(7, math.nan, dtype=precision.scalar, device=device)
+    def __init__(self, size: int, precision: Precision, device: Any, nodes: Nodes | None) -> None:
+        self._kernel, self._coarse_matrix = gradients_kernels(precision)
+        self._precision, self._device = precision, device
+        self._scratch = [self._zeros(size, precision.vec3) for _ in range(3)]
+        chunks = -(-size // CHUNK)
+        self._partial = self._zeros((chunks, 4), precision.scalar)
+        self._sync = self._zeros(sync_words(MOST), wp.uint64)
+        self.outcome = wp.full(8, math.nan, dtype=precision.scalar, device=device)
+        # chunks of an aggregate, and aggregates
+        self._aggregate, self._count = -(-chunks // _AGGREGATES), 0
+        self._free = self._places = self._zeros(0, precision.vec3)
+        if nodes is not None and size >= _WORTH_A_COARSE_SPACE:
+            self._count = -(-chunks // self._aggregate)
+            self._free = nodes.free
+            self._places = wp.array(self._affine(nodes.points), dtype=precision.vec3, device=device)
+        self._coarse = self._zeros((self._count, 16 * self._count), precision.mat33)
+        self._inverse = self._zeros((12 * self._count, 12 * self._count), precision.scalar)
+        self._left, self._found = (self._zeros(12 * self._count, precision.scalar) for _ in range(2))
+        self._restricted = self._zeros((chunks, 4), precision.vec3)
+
+    def _zeros(self, shape: Any, dtype: Any) -> wp.array:
+        return wp.zeros(shape, dtype=dtype, device=self._device)
+
+    def _affine(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Coordinates of each row from the middle of its aggregate, 1 at most."""
+        of = np.arange(len(points)) // (CHUNK * self._aggregate)
+        middles = np.stack([np.bincount(of, along) for along in points.T], axis=1) / np.bincount(of)[:, None]
+        places = points - middles[of]
+        result: NDArray[np.float64] = places / np.abs(places).max()
+        return result
+
+    def prepare(self, matrix: BsrMatrix) -> None:
+        """Renew the coarse space after the values of the matrix changed; without one where it is not definite."""
+        if not self._count:
+            return
+        inputs = [matrix.offsets, matrix.columns, matrix.values, self._aggregate, 4, self._free, self._places]
+        launch(self._coarse_matrix, self._count, [*inputs, self._coarse], self._device, least=1)
+        k = self._count
+        blocks = self._coarse.numpy().astype(np.float64).reshape(k, k, 4, 4, 3, 3)
+        galerkin = blocks.transpose(0, 2, 4, 1, 3, 5).reshape(12 * k, 12 * k)
+        diagonal = np.diagonal(galerkin)
+        # an aggregate that is held, or flat, has modes without stiffness: they are left alone
+        galerkin = galerkin + np.diag(np.where(diagonal > 0.0, 1e-10 * diagonal, 1.0))
+        with one_thread_of_blas():
+            factor, failed = lapack.dpotrf(galerkin, lower=1)
+            inverse = np.zeros_like(galerkin) if failed else lapack.dpotri(factor, lower=1)[0]
+        self._inverse.assign(np.tril(inverse) + np.tril(inverse, -1).T)
 
     def solve(
         self,
@@ -253,6 +317,7 @@ class _OnCores:
             self._sync.ptr, give_way(), matrix.offsets, matrix.columns, matrix.values, int(preconditioned), inverse,
             b, x, *self._scratch,
             self._partial, self._precision.scalar(tolerance), max_iterations, int(watch_curvature), self.outcome,
+            self._aggregate, self._free, self._places, self._inverse, self._left, self._found, self._restricted,
         ]  # fmt: skip
         launch_together(self._kernel, len(b), inputs, self._device)
 
@@ -279,6 +344,9 @@ class ConjugateGradient:
     beyond : callable, optional
         ``beyond(x, factor, y)`` adds to `y` a factor times the product of `x` with what belongs to `A` and is in no
         block, whose diagonal blocks are in the matrix (and are taken off again there).
+    nodes : Nodes, optional
+        Where the rows are: on the CPU block-Jacobi has a coarse space then, if the matrix is large. `prepare` cannot be
+        captured in a graph then.
     """
 
     def __init__(
@@ -294,6 +362,7 @@ class ConjugateGradient:
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
         beyond: Callable[[wp.array, float, wp.array], None] | None = None,
+        nodes: Nodes | None = None,
     ) -> None:
         if preconditioner not in PRECONDITIONERS:
             raise ValueError(f"preconditioner {preconditioner!r}: expected one of {', '.join(PRECONDITIONERS)}")
@@ -331,7 +400,9 @@ class ConjugateGradient:
         self._outcomes: dict[float, tuple[wp.array, wp.array, wp.array]] = {}
         self._on_cores: _OnCores | None = None
         if self._device.is_cpu and preconditioner != "fsai" and beyond is None:
-            self._on_cores = _OnCores(self._size, precision, self._device)
+            self._on_cores = _OnCores(
+                self._size, precision, self._device, nodes if preconditioner == "block-jacobi" else None
+            )
 
     def _solver(self, tolerance: float) -> Any:
         """Warp's solver for a tolerance, which it keeps for life; made when it is first asked for."""
@@ -418,6 +489,8 @@ class ConjugateGradient:
                 inputs=[self._diagonal, self._matrix.values, self._inverse],
                 device=self._device,
             )
+            if self._on_cores is not None:
+                self._on_cores.prepare(self._matrix)
         elif self._kind == "fsai":
             self._refused = None
             if self._fsai is not None:

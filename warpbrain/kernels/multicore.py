@@ -209,7 +209,7 @@ def _team() -> _Team | None:
     return _team_of(count, os.getpid()) if count > 1 else None
 
 
-def launch(kernel: Any, dim: Any, inputs: Sequence[Any], device: Any) -> None:
+def launch(kernel: Any, dim: Any, inputs: Sequence[Any], device: Any, least: int = _LEAST) -> None:
     """Launch a kernel on a device; on a CPU on all its cores, if its first argument is called ``start``.
 
     Parameters
@@ -220,13 +220,15 @@ def launch(kernel: Any, dim: Any, inputs: Sequence[Any], device: Any) -> None:
     inputs : sequence
         Its arguments, without ``start``.
     device : wp.Device
+    least : int
+        Items that are worth a part.
     """
     divides = kernel.adj.args[0].label == "start"
     inputs = [0, *inputs] if divides else inputs
     team = _team() if divides and device.is_cpu else None
     items = dim if isinstance(dim, int) else dim[0]
     # twice as many as threads, so that what is left at the end is small
-    count = 1 if team is None else min(2 * team.count, items // _LEAST)
+    count = 1 if team is None else min(2 * team.count, items // least)
     if team is None or count < 2:
         wp.launch(kernel, dim=dim, inputs=list(inputs), device=device)
         return

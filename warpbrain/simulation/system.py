@@ -15,7 +15,7 @@ from warp.sparse import BsrMatrix, bsr_zeros
 
 from warpbrain.errors import InputError
 from warpbrain.kernels.assembly import assembly_kernels
-from warpbrain.kernels.linear import ConjugateGradient, solver_kernels
+from warpbrain.kernels.linear import ConjugateGradient, Nodes, solver_kernels
 from warpbrain.kernels.module import begin_loading
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import PRECISIONS, Precision
@@ -571,10 +571,11 @@ class System:
         max_iterations: int,
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
+        at_rest: bool = False,
     ) -> LinearSolver:
         """A solver for ``matrix solution = load``: conjugate gradients (`warpbrain.kernels.linear`).
 
-        Where a term has unknowns of its own: `warpbrain.simulation.coupled`.
+        `at_rest`: for matrices without inertia, which a coarse space is worth its making for. Where a term has unknowns of its own: `warpbrain.simulation.coupled`.
         """
         conjugate_gradient = ConjugateGradient(
             self.matrix,
@@ -587,6 +588,7 @@ class System:
             preconditioner=preconditioner,
             watch_curvature=watch_curvature,
             beyond=None if self.assembled else self._add_beyond_blocks,
+            nodes=Nodes(self.model.node_mesh.points, self.free) if at_rest else None,
         )
         if not self._coupled:
             return conjugate_gradient
