@@ -259,6 +259,8 @@ class _OnCores:
         self._partial = self._zeros((chunks, 4), precision.scalar)
         self._sync = self._zeros(sync_words(MOST), wp.uint64)
         self.outcome = wp.full(8, math.nan, dtype=precision.scalar, device=device)
+        # values of the matrix changed since the coarse space was made
+        self.is_stale = True
         # chunks of an aggregate, and aggregates
         self._aggregate, self._count = -(-chunks // _AGGREGATES), 0
         self._free = self._places = self._zeros(0, precision.vec3)
@@ -282,10 +284,8 @@ class _OnCores:
         result: NDArray[np.float64] = places / np.abs(places).max()
         return result
 
-    def prepare(self, matrix: BsrMatrix) -> None:
+    def _renew(self, matrix: BsrMatrix) -> None:
         """Renew the coarse space after the values of the matrix changed; without one where it is not definite."""
-        if not self._count:
-            return
         inputs = [matrix.offsets, matrix.columns, matrix.values, self._aggregate, 4, self._free, self._places]
         launch(self._coarse_matrix, self._count, [*inputs, self._coarse], self._device, least=1)
         k = self._count
@@ -312,6 +312,9 @@ class _OnCores:
         watch_curvature: bool,
     ) -> None:
         """Run conjugate gradients from the present `x`."""
+        if self.is_stale and self._count:
+            self._renew(matrix)
+        self.is_stale = False
         self._sync.zero_()
         inputs = [
             self._sync.ptr, give_way(), matrix.offsets, matrix.columns, matrix.values, int(preconditioned), inverse,
@@ -345,7 +348,7 @@ class ConjugateGradient:
         ``beyond(x, factor, y)`` adds to `y` a factor times the product of `x` with what belongs to `A` and is in no
         block, whose diagonal blocks are in the matrix (and are taken off again there).
     nodes : Nodes, optional
-        Where the rows are: on the CPU block-Jacobi has a coarse space then, if the matrix is large. `prepare` cannot be
+        Where the rows are: on the CPU block-Jacobi has a coarse space then, if the matrix is large. `solve` cannot be
         captured in a graph then.
     """
 
@@ -490,7 +493,8 @@ class ConjugateGradient:
                 device=self._device,
             )
             if self._on_cores is not None:
-                self._on_cores.prepare(self._matrix)
+                # who solves in another way, and only prepares, does without a coarse space
+                self._on_cores.is_stale = True
         elif self._kind == "fsai":
             self._refused = None
             if self._fsai is not None:

@@ -575,7 +575,8 @@ class System:
     ) -> LinearSolver:
         """A solver for ``matrix solution = load``: conjugate gradients (`warpbrain.kernels.linear`).
 
-        `at_rest`: for matrices without inertia, which a coarse space is worth its making for. Where a term has unknowns of its own: `warpbrain.simulation.coupled`.
+        `at_rest` is for matrices without inertia, for which a coarse space is worth its making. Where a term has
+        unknowns of its own: `warpbrain.simulation.coupled`.
         """
         conjugate_gradient = ConjugateGradient(
             self.matrix,
