@@ -30,7 +30,7 @@ from scipy.linalg import lapack
 from warp.sparse import BsrMatrix
 
 from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.multicore import Graph, give_way, launch, launch_together
+from warpbrain.kernels.multicore import Graph, give_way, launch, launch_together, team_kernels
 from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernels, sync_words
 from warpbrain.kernels.precision import Precision
 from warpbrain.threads import MOST, one_thread_of_blas
@@ -182,7 +182,8 @@ def linear_kernels(precision: Precision) -> LinearKernels:
 
 def solver_kernels(precision: Precision, device: wp.Device) -> list[Any]:
     """Of each module that `ConjugateGradient` needs on a device, with its default preconditioner, a kernel."""
-    return [linear_kernels(precision).multiply, *([gradients_kernels(precision)[0]] if device.is_cpu else [])]
+    on_cores = [gradients_kernels(precision)[0], team_kernels()[0]] if device.is_cpu else []
+    return [linear_kernels(precision).multiply, *on_cores]
 
 
 @contextmanager

@@ -108,7 +108,7 @@ def _work(team: wp.uint64, give_way: wp.uint64): ...
 
 
 @cache
-def _team_kernels() -> tuple[Any, Any]:
+def team_kernels() -> tuple[Any, Any]:
     """`share`, with which a task is handed to the team, and `work`, in which its threads are."""
     module = compiled_module("multicore")
 
@@ -165,7 +165,7 @@ class _Team:
         self.busy = threading.Lock()
         self._words = np.zeros(_WORDS, dtype=np.uint64)
         self.address = self._words.ctypes.data
-        _, work = _team_kernels()
+        _, work = team_kernels()
         self._work = _Calls(work, 1, [self.address, give_way()], wp.get_device("cpu"), [])
         self._calls: list[SimpleQueue[None]] = [SimpleQueue() for _ in range(count - 1)]
         for calls in self._calls:
@@ -270,7 +270,7 @@ def _run(
         return
     calls = _Calls(kernel, dim, inputs, device, changes)
     table = calls.table()
-    share, _ = _team_kernels()
+    share, _ = team_kernels()
     task = [team.address, give_way(), table.ctypes.data]
     if graph is not None:
         graph.keep(team, calls, table)
