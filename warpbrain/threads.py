@@ -35,6 +35,11 @@ def thread_count() -> int:
     return min(wanted, MOST)
 
 
+def is_part() -> bool:
+    """Whether this is one of several threads already: what is asked for in it stays in it."""
+    return getattr(_here, "is_part", False)
+
+
 def in_threads(work: Callable[[Part], Made], parts: Sequence[Part]) -> list[Made]:
     """What a function makes of each part, in their order.
 
@@ -43,7 +48,7 @@ def in_threads(work: Callable[[Part], Made], parts: Sequence[Part]) -> list[Made
     stay in their own.
     """
     count = min(thread_count(), len(parts))
-    if getattr(_here, "is_part", False):
+    if is_part():
         return [work(part) for part in parts]
     with one_thread_of_blas():
         if count < 2:
@@ -69,7 +74,7 @@ def beside(work: Callable[[], Made]) -> Callable[[], Made]:
     callable
         Waits for it, and gives what came out or raises what went wrong.
     """
-    if thread_count() < 2 or getattr(_here, "is_part", False):
+    if thread_count() < 2 or is_part():
         return work
     pool = ThreadPoolExecutor(1, initializer=_become_part)
     begun = pool.submit(work)

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from warpbrain.bench import diagnosing, ensemble, mechanisms
+from warpbrain.bench import diagnosing, ensemble, mechanisms, threads
 from warpbrain.errors import InputError
 from warpbrain.terminal.command import OneLineParser, exit_status
 
@@ -22,10 +22,13 @@ def main() -> int:
         return diagnosing.main(sys.argv[2:])
     if sys.argv[1:2] == ["mechanisms"]:
         return mechanisms.main(sys.argv[2:])
+    if sys.argv[1:2] == ["threads"]:
+        return threads.main(sys.argv[2:])
     parser = OneLineParser(
         prog="python -m warpbrain.bench",
         description="Times each phase of a step on the phantom's meshes beside the paper's Table 3. "
-        "python -m warpbrain.bench ensemble times batches, mechanisms what each costs, diagnose a diagnosis.",
+        "python -m warpbrain.bench ensemble times batches, mechanisms what each costs, diagnose a diagnosis, threads a "
+        "step and an equilibrium by how many cores of the CPU they have.",
     )
     add = parser.add_argument
     add("--device", default=None, metavar="NAME", help="cpu, cuda:0, ... or all (default: the GPU if there is one)")

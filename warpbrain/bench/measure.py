@@ -171,7 +171,8 @@ def _checked(simulator: Simulator) -> int:
 def count(system: System, cg_iterations: int) -> tuple[int, int]:
     """Bytes that a step must move through memory, each array once a kernel, and kernel launches of a step.
 
-    Gathers count what they read, not what caches save; the vectors of CG count as Warp's kernels pass over them.
+    Gathers count what they read, not what caches save; the vectors of CG count as the kernels pass over them. On the
+    CPU, where CG is one kernel, a pass counts as a launch.
     """
     real = system.precision.numpy.itemsize
     vector, block = 3 * real, 9 * real
@@ -189,9 +190,11 @@ def count(system: System, cg_iterations: int) -> tuple[int, int]:
         # the matrix once; then what blocks read of each other, four numbers a node
         total += nnz * (4 + block) + cg_iterations * (nnz * 24 + n * 32)
         return int(total), launches + 1
-    # a CG iteration: product, p.Ap, x and r, preconditioner, r.r and r.z, p
-    iteration = multiply + 2 * n * vector + 6 * n * vector + n * (block + 2 * vector) + 4 * n * vector + 3 * n * vector
+    # a CG iteration: product, p.Ap, x and r, preconditioner, r.r and r.z, p; on the CPU product, x and r, p
+    iteration, passes = multiply + 17 * n * vector + n * block, 9
+    if system.device.is_cpu:
+        iteration, passes = multiply + 11 * n * vector + n * block, 3
     total += n * 2 * block + 2 * n * vector + cg_iterations * iteration + iteration
     # preconditioner and CG's start
-    launches += 13 + 9 * cg_iterations
+    launches += 4 + passes + passes * cg_iterations
     return int(total), launches

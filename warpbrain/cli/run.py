@@ -129,12 +129,12 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.report.prior_text import describe_prior, prior_lines
     from warpbrain.simulation.courses import Course
     from warpbrain.simulation.run import Running
-    from warpbrain.simulation.system import find_device
+    from warpbrain.simulation.system import begin_loading_kernels, find_device, find_precision
     from warpbrain.terminal.quiet import start_warp_quietly
     from warpbrain.terminal.result_folder import choose_folder, results_in
 
     start_warp_quietly()
-    find_device(options.device)
+    begin_loading_kernels(find_device(options.device), find_precision(options.precision))
     asked = warp.asked_for(options)
     case, found = _case(options)
     warp.check_place(asked, case)

@@ -52,6 +52,7 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
 
     @wp.kernel(module=module)
     def gather_matrix(
+        start: int,
         pairs: wp.array[wp.vec2i],
         first: wp.array[int],
         contributions: wp.array[int],
@@ -63,7 +64,7 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
         m: scalar,
         values: wp.array[mat33],
     ):
-        p = wp.tid()
+        p = start + wp.tid()
         K = mat33()
         for c in range(first[p], first[p + 1]):
             K += element_blocks[contributions[c]]
@@ -82,16 +83,18 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
 
     @wp.kernel(module=module)
     def gather_forces(
+        start: int,
         first: wp.array[int],
         corners: wp.array[int],
         element_forces: wp.array[vec3],
         forces: wp.array[vec3],
     ):
-        i = wp.tid()
+        i = start + wp.tid()
         forces[i] = force_on(first, corners, element_forces, i)
 
     @wp.kernel(module=module)
     def constrained_load(
+        start: int,
         offsets: wp.array[int],
         columns: wp.array[int],
         block_pairs: wp.array[int],
@@ -103,7 +106,7 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
         k: scalar,
         load: wp.array[vec3],
     ):
-        i = wp.tid()
+        i = start + wp.tid()
         f = vec3()
         for block in range(offsets[i], offsets[i + 1]):
             d = increment[columns[block]]

@@ -17,6 +17,7 @@ from warp.sparse import BsrMatrix
 
 from warpbrain.kernels.linear import LinearResult, linear_kernels
 from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.multicore import Graph, launch
 from warpbrain.kernels.precision import Precision
 
 #: Iterations between two looks at the residuals.
@@ -163,13 +164,13 @@ class BlockConjugateGradient:
         self._residual, self._before, self._along = (self._zeros((count, 2), dtype=scalar) for _ in range(3))
         self._goal, self._least = self._zeros(count, dtype=scalar), self._zeros(count, dtype=scalar)
         self._iterations = self._zeros(count, dtype=int)
-        self._graph: Any = None
+        self._graph: Graph | None = None
 
     def _zeros(self, shape: Any, dtype: Any) -> wp.array:
         return wp.zeros(shape, dtype=dtype, device=self._device)
 
     def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
-        wp.launch(kernel, dim=dim, inputs=list(inputs), device=self._device)
+        launch(kernel, dim, inputs, self._device)
 
     def prepare(self) -> None:
         """Renew the preconditioner after the values of the matrix changed."""
@@ -200,15 +201,15 @@ class BlockConjugateGradient:
         self._dots(self._b, self._b, self._z, self._residual)
         self._goal.assign((tolerance or self._tolerance) ** 2 * self._residual.numpy()[:, 0])
         if self._graph is None:
-            with wp.ScopedCapture(device=self._device) as capture:
+            self._graph = Graph(self._device)
+            with self._graph.capture():
                 for _ in range(ROUND):
                     self._iterate()
-            self._graph = capture.graph
         for _ in range(-(-self._max_iterations // ROUND)):
             # a residual that is not a number has no way on
             if not np.any(self._residual.numpy()[:, 0] > self._goal.numpy()):
                 break
-            wp.capture_launch(self._graph)
+            self._graph.launch()
         return self._x.numpy().astype(np.float64).transpose(1, 0, 2)
 
     def _iterate(self) -> None:

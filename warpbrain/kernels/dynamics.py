@@ -27,6 +27,7 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
 
     @wp.kernel(module=module)
     def right_hand_side(
+        start: int,
         first: wp.array[int],
         corners: wp.array[int],
         element_forces: wp.array[vec3],
@@ -42,7 +43,7 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
         internal: wp.array[vec3],
         b: wp.array[vec3],
     ):
-        i = wp.tid()
+        i = start + wp.tid()
         f = force_on(first, corners, element_forces, i)
         internal[i] = f
         momentum = mass[i] * (v_start[i] + along_Mv * v[i])
@@ -50,6 +51,7 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
 
     @wp.kernel(module=module)
     def update(
+        start: int,
         u_start: wp.array[vec3],
         dv: wp.array[vec3],
         v_prescribed: wp.array[vec3],
@@ -58,7 +60,7 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
         v: wp.array[vec3],
         u: wp.array[vec3],
     ):
-        i = wp.tid()
+        i = start + wp.tid()
         w = wp.cw_mul(free[i], v[i] + dv[i] - v_prescribed[i]) + v_prescribed[i]
         v[i] = w
         u[i] = u_start[i] + h * w

@@ -1,11 +1,10 @@
 """The one door to linear algebra: preconditioned conjugate gradients on the assembled system.
 
-On a GPU a solve is one launch (`warpbrain.kernels.persistent`), if the whole matrix is in blocks and nothing but these
-preconditions. What follows is for all else: the CPU, ``fsai``, and products beyond the blocks.
-
-Nobody else calls `warp.optim.linear`. A solve is captured once in a graph, with its convergence test on the device, and
-replayed: on CUDA one launch instead of hundreds, on the CPU a loop in C++ instead of Python. Facts about Warp 1.19 that
-are dealt with here and nowhere else:
+A solve is one launch, on a GPU by `warpbrain.kernels.persistent`, on the CPU by
+`warpbrain.kernels.multicore_gradients`, unless the preconditioner is ``fsai`` or part of the matrix is in no block. All
+else is Warp's, and nobody else calls `warp.optim.linear`. A solve by Warp is captured once in a graph, with its
+convergence test on the device, and replayed: on CUDA one launch instead of hundreds, on the CPU a loop in C++ instead of
+Python. Facts about Warp 1.19 that are dealt with here and nowhere else:
 
 - on the CPU its CG reduces every tile of a dot product once per absent GPU lane. Naming the one system as a batch of
   one (`batch_offsets = [0, n]`) takes the code path that does not;
@@ -28,12 +27,17 @@ import numpy as np
 import warp as wp
 import warp._src.optim.linear as warp_linear_internals
 import warp.optim.linear as warp_linear
+from numpy.typing import NDArray
+from scipy.linalg import lapack
 from warp.sparse import BsrMatrix
 
 from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.multicore import Graph, give_way, launch, launch_together, team_kernels
+from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernels, sync_words
 from warpbrain.kernels.persistent import PersistentSolve, blocks_stay
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.row_product import LANES, row_product_kernel
+from warpbrain.threads import MOST, one_thread_of_blas
 
 #: Names of the preconditioners: inverse diagonal blocks, factorised sparse approximate inverse, none.
 PRECONDITIONERS = ("block-jacobi", "fsai", "none")
@@ -95,6 +99,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
 
     @wp.kernel(module=module)
     def multiply(
+        start: int,
         offsets: wp.array[int],
         columns: wp.array[int],
         values: wp.array[mat33],
@@ -104,7 +109,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         alpha: scalar,
         beta: scalar,
     ):
-        i = wp.tid()
+        i = start + wp.tid()
         s = vec3()
         for k in range(offsets[i], offsets[i + 1]):
             s += values[k] * x[columns[k]]
@@ -115,15 +120,21 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         z[i] = s
 
     @wp.kernel(module=module)
-    def invert_diagonal(diagonal: wp.array[int], values: wp.array[mat33], inverse: wp.array[mat33]):
-        i = wp.tid()
+    def invert_diagonal(start: int, diagonal: wp.array[int], values: wp.array[mat33], inverse: wp.array[mat33]):
+        i = start + wp.tid()
         inverse[i] = wp.inverse(values[diagonal[i]])
 
     @wp.kernel(module=module)
     def apply_diagonal(
-        inverse: wp.array[mat33], x: wp.array[vec3], y: wp.array[vec3], z: wp.array[vec3], alpha: scalar, beta: scalar
+        start: int,
+        inverse: wp.array[mat33],
+        x: wp.array[vec3],
+        y: wp.array[vec3],
+        z: wp.array[vec3],
+        alpha: scalar,
+        beta: scalar,
     ):
-        i = wp.tid()
+        i = start + wp.tid()
         s = alpha * (inverse[i] * x[i])
         if beta != scalar(0.0):
             s += beta * y[i]
@@ -174,6 +185,12 @@ def linear_kernels(precision: Precision) -> LinearKernels:
     )
 
 
+def solver_kernels(precision: Precision, device: wp.Device) -> list[Any]:
+    """Of each module that `ConjugateGradient` needs on a device, with its default preconditioner, a kernel."""
+    on_cores = [gradients_kernels(precision)[0], team_kernels()[0]] if device.is_cpu else []
+    return [linear_kernels(precision).multiply, *on_cores]
+
+
 @contextmanager
 def _conditional_loop(test_convergence: Any, least: wp.array) -> Iterator[None]:
     """While a graph of the CPU is being captured: let Warp's CG loop on the device until it has converged.
@@ -216,6 +233,104 @@ def _conditional_loop(test_convergence: Any, least: wp.array) -> Iterator[None]:
         warp_linear_internals._run_capturable_loop = original
 
 
+@dataclass(frozen=True)
+class Nodes:
+    """Where the rows of a matrix are, for the coarse space of `warpbrain.kernels.multicore_gradients`.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+        [m]
+    free : wp.array of vec3, shape (n,)
+        1 for free components, 0 for constrained ones.
+    """
+
+    points: NDArray[np.float64]
+    free: wp.array
+
+
+#: Aggregates of the coarse space, and rows of a matrix from which on it pays: the inverse of its matrix takes as long
+#: as some iterations, of which it saves more than half.
+_AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 2000
+
+
+class _OnCores:
+    """Solves with one matrix's pattern on the cores of a CPU; see `warpbrain.kernels.multicore_gradients`."""
+
+    def __init__(self, size: int, precision: Precision, device: Any, nodes: Nodes | None) -> None:
+        self._kernel, self._coarse_matrix = gradients_kernels(precision)
+        self._precision, self._device = precision, device
+        self._scratch = [self._zeros(size, precision.vec3) for _ in range(3)]
+        chunks = -(-size // CHUNK)
+        self._partial = self._zeros((chunks, 4), precision.scalar)
+        self._sync = self._zeros(sync_words(MOST), wp.uint64)
+        self.outcome = wp.full(8, math.nan, dtype=precision.scalar, device=device)
+        # values of the matrix changed since the coarse space was made
+        self.is_stale = True
+        # chunks of an aggregate, and aggregates
+        self._aggregate, self._count = -(-chunks // _AGGREGATES), 0
+        self._free = self._places = self._zeros(0, precision.vec3)
+        if nodes is not None and size >= _WORTH_A_COARSE_SPACE:
+            self._count = -(-chunks // self._aggregate)
+            self._free = nodes.free
+            self._places = wp.array(self._affine(nodes.points), dtype=precision.vec3, device=device)
+        self._coarse = self._zeros((self._count, 16 * self._count), precision.mat33)
+        self._inverse = self._zeros((12 * self._count, 12 * self._count), precision.scalar)
+        self._left, self._found = (self._zeros(12 * self._count, precision.scalar) for _ in range(2))
+        self._restricted = self._zeros((chunks, 4), precision.vec3)
+
+    def _zeros(self, shape: Any, dtype: Any) -> wp.array:
+        return wp.zeros(shape, dtype=dtype, device=self._device)
+
+    def _affine(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Coordinates of each row from the middle of its aggregate, 1 at most."""
+        of = np.arange(len(points)) // (CHUNK * self._aggregate)
+        middles = np.stack([np.bincount(of, along) for along in points.T], axis=1) / np.bincount(of)[:, None]
+        places = points - middles[of]
+        result: NDArray[np.float64] = places / np.abs(places).max()
+        return result
+
+    def _renew(self, matrix: BsrMatrix) -> None:
+        """Renew the coarse space after the values of the matrix changed; without one where it is not definite."""
+        inputs = [matrix.offsets, matrix.columns, matrix.values, self._aggregate, 4, self._free, self._places]
+        launch(self._coarse_matrix, self._count, [*inputs, self._coarse], self._device, least=1)
+        k = self._count
+        blocks = self._coarse.numpy().astype(np.float64).reshape(k, k, 4, 4, 3, 3)
+        galerkin = blocks.transpose(0, 2, 4, 1, 3, 5).reshape(12 * k, 12 * k)
+        diagonal = np.diagonal(galerkin)
+        # an aggregate that is held, or flat, has modes without stiffness: they are left alone
+        galerkin = galerkin + np.diag(np.where(diagonal > 0.0, 1e-10 * diagonal, 1.0))
+        with one_thread_of_blas():
+            factor, failed = lapack.dpotrf(galerkin, lower=1)
+            inverse = np.zeros_like(galerkin) if failed else lapack.dpotri(factor, lower=1)[0]
+        self._inverse.assign(np.tril(inverse) + np.tril(inverse, -1).T)
+
+    def solve(
+        self,
+        matrix: BsrMatrix,
+        inverse: wp.array,
+        b: wp.array,
+        x: wp.array,
+        *,
+        preconditioned: bool,
+        tolerance: float,
+        max_iterations: int,
+        watch_curvature: bool,
+    ) -> None:
+        """Run conjugate gradients from the present `x`."""
+        if self.is_stale and self._count:
+            self._renew(matrix)
+        self.is_stale = False
+        self._sync.zero_()
+        inputs = [
+            self._sync.ptr, give_way(), matrix.offsets, matrix.columns, matrix.values, int(preconditioned), inverse,
+            b, x, *self._scratch,
+            self._partial, self._precision.scalar(tolerance), max_iterations, int(watch_curvature), self.outcome,
+            self._aggregate, self._free, self._places, self._inverse, self._left, self._found, self._restricted,
+        ]  # fmt: skip
+        launch_together(self._kernel, len(b), inputs, self._device)
+
+
 class ConjugateGradient:
     """Preconditioned CG for one symmetric matrix whose pattern does not change; nothing is allocated in a solve.
 
@@ -238,6 +353,9 @@ class ConjugateGradient:
     beyond : callable, optional
         ``beyond(x, factor, y)`` adds to `y` a factor times the product of `x` with what belongs to `A` and is in no
         block, whose diagonal blocks are in the matrix (and are taken off again there).
+    nodes : Nodes, optional
+        Where the rows are: on the CPU block-Jacobi has a coarse space then, if the matrix is large. `solve` cannot be
+        captured in a graph then.
     """
 
     def __init__(
@@ -253,6 +371,7 @@ class ConjugateGradient:
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
         beyond: Callable[[wp.array, float, wp.array], None] | None = None,
+        nodes: Nodes | None = None,
     ) -> None:
         if preconditioner not in PRECONDITIONERS:
             raise ValueError(f"preconditioner {preconditioner!r}: expected one of {', '.join(PRECONDITIONERS)}")
@@ -290,11 +409,16 @@ class ConjugateGradient:
         self._b, self._x = right_hand_side, solution
         self._tolerance = tolerance
         self._max_iterations = max_iterations
-        self._graphs: dict[float, Any] = {}
+        self._graphs: dict[float, Graph] = {}
         self._solvers: dict[float, warp_linear.CG] = {}
         self._launched = False
         self._outcome: tuple[wp.array, wp.array, wp.array] | None = None
         self._outcomes: dict[float, tuple[wp.array, wp.array, wp.array]] = {}
+        self._on_cores: _OnCores | None = None
+        if self._device.is_cpu and preconditioner != "fsai" and beyond is None:
+            self._on_cores = _OnCores(
+                self._size, precision, self._device, nodes if preconditioner == "block-jacobi" else None
+            )
 
     def _solver(self, tolerance: float) -> Any:
         """Warp's solver for a tolerance, which it keeps for life; made when it is first asked for."""
@@ -339,19 +463,17 @@ class ConjugateGradient:
     def _launch_product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         """`z = alpha A x + beta y`."""
         A, scalar = self._matrix, self._precision.scalar
-        on_gpu = self._device.is_cuda
-        wp.launch(
-            row_product_kernel(self._precision) if on_gpu else self._kernels.multiply,
-            dim=LANES * self._size if on_gpu else self._size,
-            inputs=[A.offsets, A.columns, A.values, x, y, z, scalar(alpha), scalar(beta)],
-            device=self._device,
-        )
+        inputs = [A.offsets, A.columns, A.values, x, y, z, scalar(alpha), scalar(beta)]
+        if self._device.is_cuda:
+            wp.launch(row_product_kernel(self._precision), dim=LANES * self._size, inputs=inputs, device=self._device)
+        else:
+            launch(self._kernels.multiply, self._size, inputs, self._device)
         if self._beyond is not None:
             self._beyond(x, alpha, z)
 
     def _apply_diagonal(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         scalar = self._precision.scalar
-        wp.launch(
+        launch(
             self._kernels.apply_diagonal,
             dim=self._size,
             inputs=[
@@ -378,12 +500,15 @@ class ConjugateGradient:
         if self._persistent is not None:
             return
         if self._kind == "block-jacobi":
-            wp.launch(
+            launch(
                 self._kernels.invert_diagonal,
                 dim=self._size,
                 inputs=[self._diagonal, self._matrix.values, self._inverse],
                 device=self._device,
             )
+            if self._on_cores is not None:
+                # who solves in another way, and only prepares, does without a coarse space
+                self._on_cores.is_stale = True
         elif self._kind == "fsai":
             self._refused = None
             if self._fsai is not None:
@@ -399,9 +524,8 @@ class ConjugateGradient:
     def solve(self, tolerance: float | None = None) -> None:
         """Run CG from the present content of the solution array.
 
-        Within the capture of a graph this only records; otherwise it replays a graph of its own, if it is more than a
-        launch. A tolerance other than that of the constructor is rounded down to a quarter of a decade, so that few
-        graphs serve all.
+        Within the capture of a graph this only records; otherwise Warp's solver replays a graph of its own. A tolerance
+        other than that of the constructor is rounded down to a quarter of a decade, so that few graphs serve all.
         """
         if self._refused is not None:
             return
@@ -410,14 +534,22 @@ class ConjugateGradient:
             self._persistent.launch(wanted)
             self._launched = True
             return
+        if self._on_cores is not None:
+            self._on_cores.solve(
+                self._matrix, self._inverse, self._b, self._x,
+                preconditioned=self._kind != "none", tolerance=wanted,
+                max_iterations=self._max_iterations, watch_curvature=self._watch,
+            )  # fmt: skip
+            return
         if self._device.is_capturing:
             self._record(wanted)
             return
         if wanted not in self._graphs:
-            with wp.ScopedCapture(device=self._device) as capture:
+            graph = Graph(self._device)
+            with graph.capture():
                 self._record(wanted)
-            self._graphs[wanted] = capture.graph
-        wp.capture_launch(self._graphs[wanted])
+            self._graphs[wanted] = graph
+        self._graphs[wanted].launch()
         self._outcome = self._outcomes[wanted]
 
     def _record(self, tolerance: float) -> None:
@@ -433,6 +565,12 @@ class ConjugateGradient:
 
     def result(self) -> LinearResult:
         """How the last solve ended (waits for the device)."""
+        if self._on_cores is not None:
+            iterations, residual, tolerance, curvature = map(float, self._on_cores.outcome.numpy()[:4])
+            if math.isnan(iterations):
+                raise RuntimeError("no solve has been run")
+            curvature = curvature if self._watch else float("nan")
+            return LinearResult(int(iterations), residual**0.5, tolerance**0.5, curvature)
         if self._refused is not None:
             return LinearResult(0, float("nan"), 0.0, self._refused)
         if self._persistent is not None and self._launched:

@@ -13,6 +13,7 @@ from typing import Any
 import warp as wp
 
 from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.multicore import Graph, launch
 from warpbrain.kernels.precision import Precision
 
 #: Rows that one thread sums in the first stage of a dot product.
@@ -219,10 +220,10 @@ class MinimalResidual:
         self._tolerance = wp.zeros(1, dtype=precision.scalar, device=device)
         self._iterations = wp.zeros(1, dtype=int, device=device)
         self._go_on = wp.zeros(1, dtype=int, device=device)
-        self._graph: Any = None
+        self._graph: Graph | None = None
 
     def _launch(self, kernel: Any, dim: int, *inputs: Any) -> None:
-        wp.launch(kernel, dim=dim, inputs=list(inputs), device=self._device)
+        launch(kernel, dim, inputs, self._device)
 
     def _dot(self, x: wp.array, y: wp.array) -> None:
         self._launch(self._kernels.partial_dot, len(self._partial), x, y, self._partial)
@@ -237,10 +238,10 @@ class MinimalResidual:
             self._record()
             return
         if self._graph is None:
-            with wp.ScopedCapture(device=self._device) as capture:
+            self._graph = Graph(self._device)
+            with self._graph.capture():
                 self._record()
-            self._graph = capture.graph
-        wp.capture_launch(self._graph)
+        self._graph.launch()
 
     def _record(self) -> None:
         kernels, n = self._kernels, self._size

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import Any
 
 import warp as wp
@@ -30,3 +34,29 @@ def compiled_module(name: str, unroll: int | None = None) -> Any:
     if unroll is not None:
         module.options["max_unroll"] = unroll
     return module
+
+
+def begin_loading(kernels: Iterable[Any], device: wp.Device) -> Callable[[], None]:
+    """Begin to compile the modules of kernels, or to find them in Warp's cache, beside what else is to be done.
+
+    All that is begun in a process is compiled in one thread: Warp precompiles its header once for each thread, and that
+    takes longer than four of our modules.
+
+    Returns
+    -------
+    callable
+        Waits for them, and raises what went wrong.
+    """
+    modules = {kernel.module.name: kernel.module for kernel in kernels}
+    begun = [_compiler(os.getpid()).submit(wp.force_load, device, [module]) for module in modules.values()]
+
+    def wait() -> None:
+        for loaded in begun:
+            loaded.result()
+
+    return wait
+
+
+@cache
+def _compiler(process: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(1, thread_name_prefix="compiler")

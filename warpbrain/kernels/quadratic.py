@@ -25,6 +25,7 @@ def quadratic_kernels(law: DeviceLaw, precision: Precision) -> ElementKernels:
 
     @wp.kernel(module=module)
     def forces(
+        start: int,
         elements: wp.array[int],
         nodes: wp.array2d[int],
         inverse_edges: wp.array[mat33],
@@ -33,7 +34,7 @@ def quadratic_kernels(law: DeviceLaw, precision: Precision) -> ElementKernels:
         u: wp.array[vec3],
         element_forces: wp.array2d[vec3],
     ):
-        e = elements[wp.tid()]
+        e = elements[start + wp.tid()]
         G = inverse_edges[e]
         for point in range(POINTS):
             F = gradient_at(u, nodes, e, point, G)
@@ -41,6 +42,7 @@ def quadratic_kernels(law: DeviceLaw, precision: Precision) -> ElementKernels:
 
     @wp.kernel(module=module)
     def forces_and_tangents(
+        start: int,
         elements: wp.array[int],
         nodes: wp.array2d[int],
         inverse_edges: wp.array[mat33],
@@ -50,7 +52,7 @@ def quadratic_kernels(law: DeviceLaw, precision: Precision) -> ElementKernels:
         element_forces: wp.array2d[vec3],
         element_blocks: wp.array2d[mat33],
     ):
-        e = elements[wp.tid()]
+        e = elements[start + wp.tid()]
         G = inverse_edges[e]
         axes = wp.identity(n=3, dtype=scalar)
         for point in range(POINTS):
@@ -61,6 +63,7 @@ def quadratic_kernels(law: DeviceLaw, precision: Precision) -> ElementKernels:
 
     @wp.kernel(module=module)
     def energy(
+        start: int,
         elements: wp.array[int],
         nodes: wp.array2d[int],
         inverse_edges: wp.array[mat33],
@@ -70,7 +73,7 @@ def quadratic_kernels(law: DeviceLaw, precision: Precision) -> ElementKernels:
         element_energy: wp.array[scalar],
         element_J: wp.array[scalar],
     ):
-        e = elements[wp.tid()]
+        e = elements[start + wp.tid()]
         stored = scalar(0.0)
         smallest = scalar(0.0)
         for point in range(POINTS):

@@ -125,6 +125,7 @@ def element_kernels(
 
     @wp.kernel(module=module)
     def forces(
+        start: int,
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
         inverse_edges: wp.array[mat33],
@@ -133,13 +134,14 @@ def element_kernels(
         u: wp.array[vec3],
         element_forces: wp.array2d[vec3],
     ):
-        e = elements[wp.tid()]
+        e = elements[start + wp.tid()]
         G = inverse_edges[e]
         F = deformation_gradient(u, nodes[e], G)
         store_forces(volume[e] * stress_of(F, parameters, e), G, element_forces, e)
 
     @wp.kernel(module=module)
     def forces_and_tangents(
+        start: int,
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
         inverse_edges: wp.array[mat33],
@@ -149,7 +151,7 @@ def element_kernels(
         element_forces: wp.array2d[vec3],
         element_blocks: wp.array2d[mat33],
     ):
-        e = elements[wp.tid()]
+        e = elements[start + wp.tid()]
         G = inverse_edges[e]
         F = deformation_gradient(u, nodes[e], G)
         VP, K11, K12, K13, K22, K23, K33 = tangents_of(F, G, volume[e], parameters, e)
@@ -158,6 +160,7 @@ def element_kernels(
 
     @wp.kernel(module=module)
     def energy(
+        start: int,
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
         inverse_edges: wp.array[mat33],
@@ -167,7 +170,7 @@ def element_kernels(
         element_energy: wp.array[scalar],
         element_J: wp.array[scalar],
     ):
-        e = elements[wp.tid()]
+        e = elements[start + wp.tid()]
         F = deformation_gradient(u, nodes[e], inverse_edges[e])
         J = wp.determinant(F)
         element_J[e] = J

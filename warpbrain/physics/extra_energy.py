@@ -15,6 +15,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.kernels.extra_energy import extra_kernels, quadratic_extra_kernels
+from warpbrain.kernels.multicore import launch
 from warpbrain.physics.term import Body, Term
 
 
@@ -93,7 +94,7 @@ class ExtraEnergyTerm(Term):
             u,
             *outputs,
         ]
-        wp.launch(kernel, dim=len(self._elements), inputs=inputs, device=body.device)
+        launch(kernel, len(self._elements), inputs, body.device)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self._launch(self._kernels[0], u, self.forces)

@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.kernels.multicore import launch
 from warpbrain.physics.term import Body, Term
 
 
@@ -48,7 +49,7 @@ class TriangleTerm(Term):
 
     def _launch(self, kernel: Any, u: wp.array, output: wp.array) -> None:
         inputs = [self._nodes, self._points, self._data, self.scale, u, output]
-        wp.launch(kernel, dim=len(self.stencils), inputs=inputs, device=self.body.device)
+        launch(kernel, len(self.stencils), inputs, self.body.device)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self._launch(self._kernels[0], u, self.forces)

@@ -19,6 +19,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.kernels.averaged_gradient import averaged_kernels
+from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.physics.term import Body, Term
 from warpbrain.simulation.model import Material
@@ -126,22 +127,22 @@ class AveragedTerm(Term):
 
     def _stress(self, u: wp.array) -> None:
         device, count = self.body.device, len(self.stencils)
-        wp.launch(self._kernels.gradient, count, [self._nodes, self._gradients, u, self._F], device=device)
+        launch(self._kernels.gradient, count, [self._nodes, self._gradients, u, self._F], device)
         inputs = [self._all, self._F, self._parameters, self._density, self._P]
-        wp.launch(self._law.stress, count, inputs, device=device)
+        launch(self._law.stress, count, inputs, device)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self._stress(u)
         inputs = [self._gradients, self._volume, self._P, self.forces]
-        wp.launch(self._kernels.forces, self.stencils.shape, inputs, device=self.body.device)
+        launch(self._kernels.forces, self.stencils.shape, inputs, self.body.device)
 
     def evaluate_tangents(self, u: wp.array) -> None:
         self.evaluate_forces(u)
         device, count = self.body.device, len(self.stencils)
         inputs = [self._all, self._F, self._parameters, self._moduli]
-        wp.launch(self._law.moduli, (count, 3, 3), inputs, device=device)
+        launch(self._law.moduli, (count, 3, 3), inputs, device)
         inputs = [self._rows, self._columns, self._gradients, self._volume, self._moduli, self.blocks]
-        wp.launch(self._kernels.tangents, (count, len(self._rows)), inputs, device=device)
+        launch(self._kernels.tangents, (count, len(self._rows)), inputs, device)
 
     def energy(self, u: wp.array) -> float:
         self._stress(u)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from warpbrain.kernels.coupled import coupled_kernels
 from warpbrain.kernels.linear import ConjugateGradient, LinearResult
 from warpbrain.kernels.minimal_residual import MinimalResidual, four_vector
+from warpbrain.kernels.multicore import launch
 from warpbrain.physics.term import Coupling, Term
 
 if TYPE_CHECKING:
@@ -125,7 +126,7 @@ class CoupledSolver:
         self._result: LinearResult | None = None
 
     def _launch(self, kernel: object, *inputs: object) -> None:
-        wp.launch(kernel, dim=self._system.size, inputs=list(inputs), device=self._system.device)
+        launch(kernel, self._system.size, inputs, self._system.device)
 
     def _multiply(self, x: wp.array, y: wp.array) -> None:
         s, c = self._system, self.coupling

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.kernels.dynamics import dynamics_kernels
 from warpbrain.kernels.linear import LinearResult
+from warpbrain.kernels.multicore import Graph, launch
 from warpbrain.kernels.precision import Precision
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
@@ -90,7 +91,7 @@ class Simulator:
             max_iterations=max_cg,
             preconditioner=preconditioner,
         )
-        self._graph: object = None
+        self._graph: Graph | None = None
         self._graph_moves = False
         system.solution.zero_()
         self._external_factor: tuple[float, ...] | None = None
@@ -166,14 +167,14 @@ class Simulator:
             s.add_coupling(self.v, h * h, s.increment)
         along_Av = -1.0 if first else -damping.stiffness / (damping.stiffness + h)
         along_Mv = 0.0 if first else -m - along_Av * m
-        wp.launch(
+        launch(
             self._kernels.right_hand_side,
-            dim=s.size,
-            inputs=[
+            s.size,
+            [
                 *s.forces_on_nodes, s.external, s.mass, self._v_start, self.v, s.increment, s.free,
                 scalar(h), scalar(along_Mv), scalar(along_Av), s.internal, s.load,
             ],
-            device=s.device,
+            s.device,
         )  # fmt: skip
         if self._moving:
             # later iterations have the motion in v and lack only its share of the damping force
@@ -190,13 +191,13 @@ class Simulator:
     def integrate(self) -> None:
         """Phase 4: velocity and displacement at the end of the step."""
         s = self.system
-        wp.launch(
+        launch(
             self._kernels.update,
-            dim=s.size,
-            inputs=[
+            s.size,
+            [
                 self._u_start, s.solution, self._v_prescribed, s.free, s.precision.scalar(self._h), self.v, s.u,
             ],
-            device=s.device,
+            s.device,
         )  # fmt: skip
 
     def _begin(self) -> None:
@@ -230,7 +231,7 @@ class Simulator:
         self._remember()
         self.apply_loads()
         if self._graph is not None and self._graph_moves == self._moving:
-            wp.capture_launch(self._graph)
+            self._graph.launch()
         else:
             self._run_phases()
         self._finish()
@@ -260,9 +261,10 @@ class Simulator:
         wp.copy(self.system.u, u)
         wp.copy(self.v, v)
         self.system.solution.zero_()
-        with wp.ScopedCapture(device=self.system.device) as capture:
+        graph = Graph(self.system.device)
+        with graph.capture():
             self._run_phases()
-        self._graph = capture.graph
+        self._graph = graph
 
     # -- looking at the state -------------------------------------------------------------------------------------
 

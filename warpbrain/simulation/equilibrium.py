@@ -187,6 +187,7 @@ class EquilibriumSolver:
             max_iterations=self.options.max_cg,
             preconditioner=self.options.preconditioner,
             watch_curvature=True,
+            at_rest=True,
         )
         if factors is not None:
             self._linear = with_kept(system, self._linear, factors, self.options.cg_tolerance)

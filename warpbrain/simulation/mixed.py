@@ -26,6 +26,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.nodal_volume import nodal_volume_kernels
 from warpbrain.physics.term import Body, Term
 
@@ -114,7 +115,7 @@ class NodalVolumeTerm(Term):
         super().set_scale(1.0)
 
     def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
-        wp.launch(kernel, count, list(inputs), device=self.body.device)
+        launch(kernel, count, inputs, self.body.device)
 
     def _evaluate(self, u: wp.array) -> tuple[Any, ...]:
         """Find the pressures at a displacement; returns what element kernels take."""
@@ -187,7 +188,7 @@ class PatchStiffnessTerm(Term):
         super().set_scale(1.0)
 
     def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
-        wp.launch(kernel, count, list(inputs), device=self.body.device)
+        launch(kernel, count, inputs, self.body.device)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self.forces.zero_()

@@ -15,7 +15,9 @@ from warp.sparse import BsrMatrix, bsr_zeros
 
 from warpbrain.errors import InputError, require_kind
 from warpbrain.kernels.assembly import assembly_kernels
-from warpbrain.kernels.linear import ConjugateGradient
+from warpbrain.kernels.linear import ConjugateGradient, Nodes, solver_kernels
+from warpbrain.kernels.module import begin_loading
+from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import PRECISIONS, Precision
 from warpbrain.kernels.quadratic import quadratic_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
@@ -55,6 +57,11 @@ def find_precision(name: str) -> Precision:
     if name not in PRECISIONS:
         raise InputError(f"precision '{name}': expected one of {', '.join(PRECISIONS)}")
     return PRECISIONS[name]
+
+
+def begin_loading_kernels(device: wp.Device, precision: Precision) -> None:
+    """Begin to compile what every model needs, while one is still being read; `System.load_kernels` does the rest."""
+    begin_loading([assembly_kernels(precision).gather_matrix, *solver_kernels(precision, device)], device)
 
 
 def _code(material: Material) -> tuple[type[Law], str, int]:
@@ -398,7 +405,7 @@ class System:
     # -- sums over elements ---------------------------------------------------------------------------------------
 
     def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
-        wp.launch(kernel, dim=dim, inputs=list(inputs), device=self.device)
+        launch(kernel, dim, inputs, self.device)
 
     def _geometry(self, group: ElementGroup) -> tuple[wp.array, ...]:
         return (group.elements, self.element_nodes, self.inverse_edges, self.volume, group.parameters)
@@ -568,10 +575,12 @@ class System:
         max_iterations: int,
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
+        at_rest: bool = False,
     ) -> LinearSolver:
         """A solver for ``matrix solution = load``: conjugate gradients (`warpbrain.kernels.linear`).
 
-        Where a term has unknowns of its own: `warpbrain.simulation.coupled`.
+        `at_rest` is for matrices without inertia, for which a coarse space is worth its making. Where a term has
+        unknowns of its own: `warpbrain.simulation.coupled`.
         """
         conjugate_gradient = ConjugateGradient(
             self.matrix,
@@ -584,6 +593,7 @@ class System:
             preconditioner=preconditioner,
             watch_curvature=watch_curvature,
             beyond=None if self.assembled else self._add_beyond_blocks,
+            nodes=Nodes(self.model.node_mesh.points, self.free) if at_rest else None,
         )
         if not self._coupled:
             return conjugate_gradient
@@ -594,6 +604,10 @@ class System:
     def load_kernels(self) -> float:
         """Compile what a run needs, or find it in Warp's cache, at the present state; returns the seconds it took."""
         start = time.perf_counter()
+        of_laws = [kernel for g in self.groups for kernel in (g.kernels.forces_and_tangents, g.kernels.stress)]
+        begin_loading(
+            [*of_laws, self._kernels.gather_matrix, *solver_kernels(self.precision, self.device)], self.device
+        )()
         # in a step, in which a term may need more than in an equilibrium
         for term in self.terms:
             term.set_time_step(1.0)

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from warpbrain.kernels.distance_field import smooth_distance
 from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
 from warpbrain.mesh.extent import extent
@@ -247,7 +248,7 @@ class ContactTerm(Term):
             scalar(self._field.spacing), STATES.index(self.mechanism.state), self._numbers,
             self._found, self._pressing, self._directions, self._tractions, u, *outputs,
         ]  # fmt: skip
-        wp.launch(kernel, dim=len(self.stencils), inputs=inputs, device=self.body.device)
+        launch(kernel, len(self.stencils), inputs, self.body.device)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self._launch(self._kernels[0], u, self.forces)

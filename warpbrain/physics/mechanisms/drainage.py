@@ -36,6 +36,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.kernels.minimal_residual import MinimalResidual
+from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.pore import pore_kernels
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import LogNormal, Normal
@@ -281,7 +282,7 @@ class DrainageTerm(Term):
     # -- the pressure's system ------------------------------------------------------------------------------------
 
     def _launch(self, kernel: object, dim: int, *inputs: object) -> None:
-        wp.launch(kernel, dim=dim, inputs=list(inputs), device=self.body.device)
+        launch(kernel, dim, inputs, self.body.device)
 
     @property
     def _geometry(self) -> tuple[wp.array, ...]:

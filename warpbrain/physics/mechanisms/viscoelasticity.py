@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from warpbrain.kernels.invariants import cofactor
 from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks, store_forces
 from warpbrain.physics.expectation import LogNormal, LogUniform
@@ -239,7 +240,7 @@ class ViscoelasticTerm(Term):
     def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
         body = self.body
         inputs = [body.nodes, body.inverse_edges, self._weights, self._decay, self._response, self._q, self._S]
-        wp.launch(kernel, dim=len(self.stencils), inputs=[*inputs, self.scale, u, *outputs], device=body.device)
+        launch(kernel, len(self.stencils), [*inputs, self.scale, u, *outputs], body.device)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self._launch(self._kernels[0], u, self.forces)

@@ -1,0 +1,150 @@
+"""`python -m warpbrain.bench threads`: a step and an equilibrium on the CPU by the number of threads."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from hashlib import sha256
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from warpbrain.errors import InputError
+from warpbrain.terminal.command import OneLineParser, exit_status
+
+#: Counts that are measured if none are named, as far as there are processors.
+COUNTS = (1, 2, 4, 8, 16)
+#: Steps from rest in a turn, and turns of each count after the first, which is not counted: counts take turns, so that
+#: what else the machine has to do is shared alike.
+STEPS, TURNS = 20, 5
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Parse, measure, print; returns the exit status."""
+    parser = OneLineParser(
+        prog="python -m warpbrain.bench threads",
+        description="Times a step of the phantom's meshes and the equilibrium of 0529 on the CPU by the number of "
+        "threads, in turns; the answers must be the same to the bit.",
+    )
+    add = parser.add_argument
+    add("--row", default="mt/fine", metavar="ROW", help="st/coarse, st/fine, mt/coarse or mt/fine (default)")
+    add("--counts", default=None, metavar="N,...", help="threads (default: 1, 2, 4, 8, 16, as there are processors)")
+    add("--turns", type=int, default=TURNS, help=f"of {STEPS} steps and an equilibrium each (default: {TURNS})")
+    add("--json", type=Path, metavar="FILE", help="write every sample")
+    options = parser.parse_args(arguments)
+    return exit_status(parser.prog, lambda: _bench(options))
+
+
+def _bench(options: argparse.Namespace) -> None:
+    from warpbrain.bench.table3 import TABLE3
+    from warpbrain.threads import MOST, processors
+
+    if options.turns < 1:
+        raise InputError(f"--turns {options.turns}: expected a whole number of at least 1")
+    if options.row not in TABLE3:
+        raise InputError(f"--row {options.row}: expected one of {', '.join(TABLE3)}")
+    said = options.counts
+    counts = [n for n in COUNTS if n <= processors()] if said is None else [int(n or 0) for n in _numbers(said)]
+    if not counts or not all(0 < n <= MOST for n in counts):
+        raise InputError(f"--counts {said}: expected whole numbers from 1 to {MOST}, with commas between them")
+
+    from warpbrain.atomic import check_writable, whole_file
+    from warpbrain.bench.host import host
+    from warpbrain.report.summary import machine
+    from warpbrain.terminal.quiet import start_warp_quietly
+
+    if options.json is not None:
+        check_writable(options.json)
+    start_warp_quietly()
+    where = host()
+    print(f"{where['processor']}, {processors()} processors; median ms of {options.turns} turns, times as fast as one")
+    measured = []
+    for name, turn in (("a step", _steps(TABLE3[options.row])), ("equilibrium of 0529", _equilibria())):
+        milliseconds = _in_turns(turn, counts, options.turns)
+        medians = {count: median(samples) for count, samples in milliseconds.items()}
+        for count, value in medians.items():
+            print(f"  {name:<20}{count:4d} threads{value:10.2f}{medians[counts[0]] / value:8.2f}")
+        measured.append({"what": name, "milliseconds": milliseconds, "medians": medians})
+    if options.json is not None:
+        with whole_file(options.json) as scratch:
+            told = {"versions": machine(), "host": where, "row": options.row, "measured": measured}
+            scratch.write_text(json.dumps(told, indent=1) + "\n")
+        print(f"written to {options.json}")
+
+
+def _numbers(said: str) -> list[str | None]:
+    """Whole numbers of a list; None for what is none."""
+    return [part.strip() if part.strip().isdecimal() else None for part in said.split(",")]
+
+
+def _in_turns(turn: Callable[[], tuple[list[float], bytes]], counts: Sequence[int], turns: int) -> dict[int, Any]:
+    """Samples [ms] of each count; every turn must give the same answer."""
+    samples: dict[int, list[float]] = {count: [] for count in counts}
+    answers = set()
+    for number in range(turns + 1):
+        for count in counts:
+            with _threads(count):
+                milliseconds, answer = turn()
+            answers.add(sha256(answer).hexdigest())
+            if number:
+                samples[count] += milliseconds
+    if len(answers) > 1:
+        raise AssertionError(f"{len(answers)} different answers by the number of threads")
+    return samples
+
+
+@contextmanager
+def _threads(count: int) -> Iterator[None]:
+    """Say how many threads there are to be while it lasts."""
+    before = os.environ.get("OMP_NUM_THREADS")
+    os.environ["OMP_NUM_THREADS"] = str(count)
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["OMP_NUM_THREADS"]
+        else:
+            os.environ["OMP_NUM_THREADS"] = before
+
+
+def _steps(row: Any) -> Callable[[], tuple[list[float], bytes]]:
+    """Steps from rest, each captured in a graph for the threads that there are."""
+    from warpbrain.cases.shipped import find_case
+    from warpbrain.simulation.dynamics import Simulator
+    from warpbrain.simulation.of_case import model_of
+    from warpbrain.simulation.system import System
+
+    simulator = Simulator(System(model_of(find_case(row.case, row.tissue)), "cpu"))
+
+    def turn() -> tuple[list[float], bytes]:
+        simulator.reset()
+        simulator.capture()
+        samples = []
+        for _ in range(STEPS):
+            start = time.perf_counter()
+            simulator.step()
+            samples.append(1000.0 * (time.perf_counter() - start))
+        simulator.check()
+        return samples, simulator.system.u.numpy().tobytes()
+
+    return turn
+
+
+def _equilibria() -> Callable[[], tuple[list[float], bytes]]:
+    from warpbrain.cases.shipped import find_case
+    from warpbrain.simulation.equilibrium import solve_equilibrium
+    from warpbrain.simulation.of_case import model_of
+    from warpbrain.simulation.system import System
+
+    system = System(model_of(find_case("0529", "multi")), "cpu")
+
+    def turn() -> tuple[list[float], bytes]:
+        start = time.perf_counter()
+        found = solve_equilibrium(system)
+        return [1000.0 * (time.perf_counter() - start)], found.u.tobytes()
+
+    return turn

@@ -1,0 +1,322 @@
+"""Conjugate gradients as one kernel that all cores of a CPU run together.
+
+Hestenes and Stiefel's recurrences (1952), as `warp.optim.linear.CG` has them, in three passes over the rows an
+iteration where Warp makes nine, and without its kernels, which take longer to compile than all others of a run. Sums
+are over chunks of rows, then over chunks in order: they do not depend on the number of threads.
+
+The preconditioner has one level or two: the inverse diagonal blocks, and what an affine motion of each of some
+aggregates, runs of neighbouring rows, takes off the residual (an additive coarse space as of Nicolaides 1987, SIAM J.
+Numer. Anal. 24, 355, with the modes of a linear strain). Block-Jacobi needs hundreds of iterations for what is smooth.
+
+Each thread has rows of its own, which stay in its cache, in `_SHARES` shares; who is through with these takes what
+others have not come to. Whoever does the last share of a pass adds up and lets the next pass begin.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.multicore import PAUSE
+from warpbrain.kernels.precision import Precision
+
+#: Rows that are summed before anything is added to them.
+CHUNK = 64
+
+#: Shares that the rows of a thread are in.
+_SHARES = 4
+# Words of `sync`, each alone on a cache line: the pass, shares of it that are done, whether all is over, and of each
+# thread the pass and how many of its shares were taken. A pass is that of the start, then by turns the coarse space,
+# the new direction, the product and the step.
+_LINE = 8
+_PASS, _DONE, _OVER, _TAKEN = (line * _LINE for line in range(4))
+_START, _COARSE, _DIRECTION, _PRODUCT, _STEP = range(5)
+
+
+def sync_words(threads: int) -> int:
+    """Words (64 bits) of `sync`; all are zero before a solve."""
+    return _TAKEN + threads * _LINE
+
+
+_WORDS = """
+    typedef unsigned long long word;
+    word* words = (word*)sync;
+"""
+
+
+@wp.func_native(
+    PAUSE
+    + _WORDS
+    + f"""
+    for (unsigned tries = 0;; pause(tries)) {{
+        for (int turn = 0; turn < threads; ++turn) {{
+            const int owner = (thread + turn) % threads;
+            word* taken = words + {_TAKEN} + {_LINE} * owner;
+            if ((__atomic_load_n(taken, __ATOMIC_ACQUIRE) & 0xffffffff) >= {_SHARES}) continue;
+            const word mine = __atomic_fetch_add(taken, 1, __ATOMIC_ACQ_REL);
+            if ((mine & 0xffffffff) >= {_SHARES}) continue;
+            const word pass = mine >> 32;
+            const int kind = pass ? 1 + (int)((pass - 1) % 4) : {_START};
+            return kind * threads * {_SHARES} + owner * {_SHARES} + (int)(mine & 0xffffffff);
+        }}
+        if (__atomic_load_n(words + {_OVER}, __ATOMIC_ACQUIRE)) return -1;
+    }}
+    """
+)
+def _take(thread: int, threads: int, sync: wp.uint64, give_way: wp.uint64) -> int:  # type: ignore[empty-body]
+    """A share of the present pass and the kind of the pass, as one number; -1 when all is over."""
+
+
+@wp.func_native(
+    _WORDS
+    + f"""
+    return __atomic_fetch_add(words + {_DONE}, 1, __ATOMIC_ACQ_REL) + 1 == (word)(threads * {_SHARES});
+    """
+)
+def _is_last(threads: int, sync: wp.uint64) -> bool:  # type: ignore[empty-body]
+    """A share is done; whether it was the last of the pass."""
+
+
+@wp.func_native(
+    _WORDS
+    + f"""
+    if (!go_on) {{
+        __atomic_store_n(words + {_OVER}, 1, __ATOMIC_RELEASE);
+        return;
+    }}
+    words[{_DONE}] = 0;
+    const word pass = ++words[{_PASS}];
+    for (int owner = 0; owner < threads; ++owner)
+        __atomic_store_n(words + {_TAKEN} + {_LINE} * owner, pass << 32, __ATOMIC_RELEASE);
+    """
+)
+def _begin_pass(threads: int, sync: wp.uint64, go_on: bool):
+    """Let the next pass begin, or end."""
+
+
+@cache
+def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
+    """Make (once) the kernels of a precision: conjugate gradients, and the matrix of the coarse space.
+
+    `warpbrain.kernels.multicore.launch_together` runs the first. Its arguments after those of the threads: the
+    addresses of `sync` and of what gives way; the matrix by `offsets`, `columns` and `values`; the `inverse` diagonal
+    blocks if it is `preconditioned`; `b`; `x`, the first guess and the result; `r`, `p` and `Ap`, scratch like `x`;
+    `partial` (chunks, 4), scratch; the relative `tolerance`; the most iterations; whether to end where the matrix is
+    seen not to be positive definite; `outcome` (8,): iterations, squares of the norm of the residual and of its goal,
+    the least `p . A p / p . p`, and four numbers of the recurrences. Then of the coarse space: how many chunks of rows
+    are an `aggregate`; `free`, 1 where a component is; `places` of nodes; the `coarse_inverse` (12 k, 12 k) of `k`
+    aggregates, none if there is no such space; residual and solution in it (12 k,); and `restricted` (chunks, 4),
+    scratch.
+    """
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = compiled_module(f"multicore_gradients_{precision.name}")
+    chunk, shares = wp.constant(CHUNK), wp.constant(_SHARES)
+    start, coarse, direction = wp.constant(_START), wp.constant(_COARSE), wp.constant(_DIRECTION)
+    product = wp.constant(_PRODUCT)
+
+    @wp.func
+    def total(partial: wp.array2d[scalar], column: int):
+        s = scalar(0.0)
+        for t in range(partial.shape[0]):
+            s += partial[t, column]
+        return s
+
+    @wp.func
+    def weight(place: vec3, mode: int):
+        """Of an affine motion: 1, or a coordinate."""
+        w = scalar(1.0)
+        if mode > 0:
+            w = place[mode - 1]
+        return w
+
+    @wp.func
+    def restrict(t: int, r: wp.array[vec3], free: wp.array[vec3], places: wp.array[vec3], restricted: wp.array2d[vec3]):
+        for d in range(4):
+            restricted[t, d] = vec3()
+        for i in range(t * chunk, wp.min((t + 1) * chunk, r.shape[0])):
+            for d in range(4):
+                restricted[t, d] = restricted[t, d] + weight(places[i], d) * wp.cw_mul(free[i], r[i])
+
+    @wp.kernel(module=module)
+    def conjugate_gradients(
+        thread: int,
+        threads: int,
+        sync: wp.uint64,
+        give_way: wp.uint64,
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        values: wp.array[mat33],
+        preconditioned: int,
+        inverse: wp.array[mat33],
+        b: wp.array[vec3],
+        x: wp.array[vec3],
+        r: wp.array[vec3],
+        p: wp.array[vec3],
+        Ap: wp.array[vec3],
+        partial: wp.array2d[scalar],
+        tolerance: scalar,
+        max_iterations: int,
+        watch_curvature: int,
+        outcome: wp.array[scalar],
+        aggregate: int,
+        free: wp.array[vec3],
+        places: wp.array[vec3],
+        coarse_inverse: wp.array2d[scalar],
+        coarse_residual: wp.array[scalar],
+        coarse_solution: wp.array[scalar],
+        restricted: wp.array2d[vec3],
+    ):
+        rows = b.shape[0]
+        modes = coarse_residual.shape[0]
+        chunks = partial.shape[0]
+        all_shares = threads * shares
+        taken = _take(thread, threads, sync, give_way)
+        while taken >= 0:
+            kind = taken // all_shares
+            share = taken % all_shares
+            first = (chunks * share) // all_shares
+            last = (chunks * (share + 1)) // all_shares
+            if kind == start:
+                for t in range(first, last):
+                    bb = scalar(0.0)
+                    rr = scalar(0.0)
+                    rz = scalar(0.0)
+                    for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
+                        s = b[i]
+                        bb += wp.dot(s, s)
+                        for k in range(offsets[i], offsets[i + 1]):
+                            s -= values[k] * x[columns[k]]
+                        r[i] = s
+                        z = s
+                        if preconditioned != 0:
+                            z = inverse[i] * s
+                        Ap[i] = z
+                        p[i] = vec3()
+                        rr += wp.dot(s, s)
+                        rz += wp.dot(s, z)
+                    partial[t, 0] = bb
+                    partial[t, 2] = rr
+                    partial[t, 3] = rz
+                    if modes > 0:
+                        restrict(t, r, free, places, restricted)
+            elif kind == coarse:
+                for m in range((modes * share) // all_shares, (modes * (share + 1)) // all_shares):
+                    found = scalar(0.0)
+                    for q in range(modes):
+                        found += coarse_inverse[m, q] * coarse_residual[q]
+                    coarse_solution[m] = found
+            elif kind == direction:
+                beta = outcome[6]
+                for i in range(first * chunk, wp.min(last * chunk, rows)):
+                    z = Ap[i]
+                    if modes > 0:
+                        m = 12 * (i // (chunk * aggregate))
+                        motion = vec3()
+                        for d in range(4):
+                            motion += weight(places[i], d) * vec3(
+                                coarse_solution[m], coarse_solution[m + 1], coarse_solution[m + 2]
+                            )
+                            m += 3
+                        z += wp.cw_mul(free[i], motion)
+                    p[i] = z + beta * p[i]
+            elif kind == product:
+                for t in range(first, last):
+                    pAp = scalar(0.0)
+                    pp = scalar(0.0)
+                    for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
+                        s = vec3()
+                        for k in range(offsets[i], offsets[i + 1]):
+                            s += values[k] * p[columns[k]]
+                        Ap[i] = s
+                        pAp += wp.dot(p[i], s)
+                        pp += wp.dot(p[i], p[i])
+                    partial[t, 0] = pAp
+                    partial[t, 1] = pp
+            else:
+                alpha = outcome[5]
+                for t in range(first, last):
+                    rr = scalar(0.0)
+                    rz = scalar(0.0)
+                    for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
+                        x[i] = x[i] + alpha * p[i]
+                        s = r[i] - alpha * Ap[i]
+                        r[i] = s
+                        z = s
+                        if preconditioned != 0:
+                            z = inverse[i] * s
+                        # the product is not needed any more
+                        Ap[i] = z
+                        rr += wp.dot(s, s)
+                        rz += wp.dot(s, z)
+                    partial[t, 2] = rr
+                    partial[t, 3] = rz
+                    if modes > 0:
+                        restrict(t, r, free, places, restricted)
+
+            if _is_last(threads, sync):
+                go_on = True
+                if kind == product:
+                    pAp_total = total(partial, 0)
+                    outcome[0] = outcome[0] + scalar(1.0)
+                    outcome[3] = wp.min(outcome[3], pAp_total / total(partial, 1))
+                    outcome[5] = outcome[4] / pAp_total
+                elif kind == coarse:
+                    rz = outcome[7]
+                    for m in range(modes):
+                        rz += coarse_residual[m] * coarse_solution[m]
+                    outcome[6] = scalar(0.0)
+                    if outcome[0] > scalar(0.0):
+                        outcome[6] = rz / outcome[4]
+                    outcome[4] = rz
+                elif kind != direction:
+                    if kind == start:
+                        outcome[0] = scalar(0.0)
+                        outcome[2] = tolerance * tolerance * total(partial, 0)
+                        outcome[3] = scalar(wp.inf)  # type: ignore[attr-defined]
+                    outcome[1] = total(partial, 2)
+                    outcome[7] = total(partial, 3)
+                    for m in range(modes):
+                        coarse_residual[m] = scalar(0.0)
+                    if modes > 0:
+                        for t in range(chunks):
+                            for d in range(4):
+                                m = 12 * (t // aggregate) + 3 * d
+                                for c in range(3):
+                                    coarse_residual[m + c] = coarse_residual[m + c] + restricted[t, d][c]
+                    # written so that a residual that is not a number ends the loop
+                    go_on = outcome[1] > outcome[2] and outcome[0] < scalar(max_iterations)
+                    # of a matrix that is not positive definite nothing is found, however long it goes on
+                    if watch_curvature != 0 and not (outcome[3] > scalar(0.0)):
+                        go_on = False
+                _begin_pass(threads, sync, go_on)
+            taken = _take(thread, threads, sync, give_way)
+
+    @wp.kernel(module=module)
+    def coarse_matrix(
+        start: int,
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        values: wp.array[mat33],
+        aggregate: int,
+        modes: int,
+        free: wp.array[vec3],
+        places: wp.array[vec3],
+        coarse: wp.array2d[mat33],
+    ):
+        g = start + wp.tid()
+        size = chunk * aggregate
+        for m in range(coarse.shape[1]):
+            coarse[g, m] = mat33()
+        for i in range(g * size, wp.min((g + 1) * size, free.shape[0])):
+            for k in range(offsets[i], offsets[i + 1]):
+                j = columns[k]
+                A = wp.cw_mul(values[k], wp.outer(free[i], free[j]))
+                m = 16 * (j // size)
+                for d in range(modes):
+                    for e in range(modes):
+                        w = weight(places[i], d) * weight(places[j], e)
+                        coarse[g, m] = coarse[g, m] + w * A
+                        m += 1
+
+    return conjugate_gradients, coarse_matrix
