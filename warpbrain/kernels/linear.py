@@ -3,8 +3,8 @@
 A solve is one launch, on a GPU by `warpbrain.kernels.persistent`, on the CPU by
 `warpbrain.kernels.multicore_gradients`, unless the preconditioner is ``fsai`` or part of the matrix is in no block. All
 else is Warp's, and nobody else calls `warp.optim.linear`. A solve by Warp is captured once in a graph, with its
-convergence test on the device, and replayed: on CUDA one launch instead of hundreds, on the CPU a loop in C++ instead of
-Python. Facts about Warp 1.19 that are dealt with here and nowhere else:
+convergence test on the device, and replayed: on CUDA one launch instead of hundreds, on the CPU a loop in C++ instead
+of Python. Facts about Warp 1.19 that are dealt with here and nowhere else:
 
 - on the CPU its CG reduces every tile of a dot product once per absent GPU lane. Naming the one system as a batch of
   one (`batch_offsets = [0, n]`) takes the code path that does not;
