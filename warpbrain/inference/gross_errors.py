@@ -228,12 +228,16 @@ def _solved(A: Floats, b: Floats) -> tuple[Floats, Floats]:
     if A.shape[-1] == 1:
         return b / A[..., 0], A[..., 0, 0]
     if A.shape[-1] != 3:
-        return np.linalg.solve(A, b[..., None])[..., 0], np.linalg.det(A)
-    rows = [[A[..., i, j] for j in range(3)] for i in range(3)]
-    cofactors = [_cross(rows[1], rows[2]), _cross(rows[2], rows[0]), _cross(rows[0], rows[1])]
-    determinant = sum(a * c for a, c in zip(rows[0], cofactors[0], strict=True))
-    solution = [sum(b[..., i] * cofactors[i][j] for i in range(3)) / determinant for j in range(3)]
-    return np.stack(solution, axis=-1), np.asarray(determinant)
+        solution = np.asarray(np.linalg.solve(A, b[..., None])[..., 0], dtype=np.float64)
+        return solution, np.asarray(np.linalg.det(A), dtype=np.float64)
+    first, second, third = ([A[..., i, j] for j in range(3)] for i in range(3))
+    of_first, of_second, of_third = _cross(second, third), _cross(third, first), _cross(first, second)
+    determinant = first[0] * of_first[0] + first[1] * of_first[1] + first[2] * of_first[2]
+    solution = np.empty(b.shape)
+    for j in range(3):
+        numerator = b[..., 0] * of_first[j] + b[..., 1] * of_second[j] + b[..., 2] * of_third[j]
+        solution[..., j] = numerator / determinant
+    return solution, determinant
 
 
 def _cross(a: Sequence[Floats], b: Sequence[Floats]) -> tuple[Floats, Floats, Floats]:

@@ -35,10 +35,14 @@ class SparseFactors:
 
         pattern = (tril(matrix) if symmetric else matrix).tocsc().astype(np.float64)
         pattern.sum_duplicates()
-        factorise = rslab.ldlt if symmetric else rslab.lu
-        self._factors = factorise(pattern, threads=thread_count())
         #: Whether the matrix is positive definite; known of symmetric ones.
-        self.is_definite = symmetric and self._factors.inertia[0] == matrix.shape[0]
+        self.is_definite = False
+        self._factors: rslab.Ldlt | rslab.Lu
+        if symmetric:
+            factors = rslab.ldlt(pattern, threads=thread_count())
+            self._factors, self.is_definite = factors, factors.inertia[0] == matrix.shape[0]
+        else:
+            self._factors = rslab.lu(pattern, threads=thread_count())
 
     def solve(self, columns: Floats) -> Floats:
         """Solution (n,) or (n, k) for right-hand sides (n,) or (n, k), an array of which Fortran order is faster."""

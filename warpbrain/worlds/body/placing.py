@@ -131,7 +131,7 @@ def _around(base: Base, proposed: Proposal, step: float) -> list[Proposal]:
 
 def _with_radii(proposed: Proposal, centres: Floats) -> list[Proposal]:
     """A proposal at other centres (k, 3) [m] and with other radii, without itself."""
-    assert proposed.elsewhere is not None and proposed.radius is not None
+    assert proposed.elsewhere is not None and proposed.radius is not None and proposed.centre is not None
     return [
         proposed.elsewhere(centre, radius * proposed.radius)
         for centre, radius in itertools.product(centres, _RADII)
