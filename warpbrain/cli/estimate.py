@@ -236,10 +236,10 @@ def _what_else(
     from numpy.linalg import LinAlgError
 
     from warpbrain.diagnosis.locating import map_of_search
-    from warpbrain.worlds.options import DiagnosisOptions
     from warpbrain.worlds.body.averaged_tissue import averaged_tissue
     from warpbrain.worlds.body.screened import screened
     from warpbrain.worlds.listener import Listener
+    from warpbrain.worlds.options import DiagnosisOptions
 
     prior, mesh_error = posterior.best.problem.mode.gaussian, posterior.options.discretisation is not None
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 from typing import Any
 
@@ -17,6 +17,9 @@ _CPU_FLAGS = (
     "-march=native -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
     " -fno-slp-vectorize -ffp-contract=fast"
 )
+
+#: What was begun to be compiled and may not be done.
+_begun: list[Future[None]] = []
 
 
 def compiled_module(name: str, unroll: int | None = None) -> Any:
@@ -49,12 +52,18 @@ def begin_loading(kernels: Iterable[Any], device: wp.Device) -> Callable[[], Non
     """
     modules = {kernel.module.name: kernel.module for kernel in kernels}
     begun = [_compiler(os.getpid()).submit(wp.force_load, device, [module]) for module in modules.values()]
+    _begun[:] = [*(loaded for loaded in _begun if not loaded.done()), *begun]
 
     def wait() -> None:
         for loaded in begun:
             loaded.result()
 
     return wait
+
+
+def is_compiling() -> bool:
+    """Whether the thread of `begin_loading` is at work, which nothing stops before it is done."""
+    return any(not loaded.done() for loaded in _begun)
 
 
 @cache

@@ -13,7 +13,7 @@ from typing import NoReturn
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.claim import release
 from warpbrain.terminal.crash import SOFTWARE, where, write_report
-from warpbrain.terminal.interrupt import clear_up, stop_promptly
+from warpbrain.terminal.interrupt import clear_up, leave_compiler, stop_promptly
 from warpbrain.terminal.quiet import reason_of
 from warpbrain.terminal.record import Record
 
@@ -74,6 +74,7 @@ def exit_status(program: str, call: Callable[[], None], record: Record | None = 
     except KeyboardInterrupt:
         clear_up()
         print(f"\n{program}: interrupted; nothing half-written was left", file=sys.stderr)
+        leave_compiler()
         return 130
     except Exception as error:
         arguments, doing = ((), "") if record is None else (record.arguments, record.doing)

@@ -37,6 +37,17 @@ def clear_up() -> None:
             shutil.rmtree(unfinished, ignore_errors=True)
 
 
+def leave_compiler() -> None:
+    """End the process with the status of an interrupted one if kernels are being compiled in a thread of their own.
+
+    Python would wait for that thread, which finds the folder gone that it writes to.
+    """
+    module = sys.modules.get("warpbrain.kernels.module")
+    if module is not None and module.is_compiling():
+        sys.stderr.flush()
+        os._exit(130)
+
+
 @contextmanager
 def stop_promptly() -> Iterator[None]:
     """Make Ctrl-C end the process within a second while the block runs; does nothing outside the main thread."""
