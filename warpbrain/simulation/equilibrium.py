@@ -30,6 +30,8 @@ Floats = NDArray[np.float64]
 
 #: Out-of-balance force, relative, from which on steps say something of the steps to come.
 _NEAR = 0.1
+#: Terms of a stress that are rounded.
+_TERMS = 4.0
 
 
 @dataclass(frozen=True)
@@ -195,10 +197,11 @@ class EquilibriumSolver:
         self._free = 1.0 - system.model.constrained
         # residuals cannot fall below the rounding of the sums of element forces
         self.tolerance = max(self.options.tolerance, 50.0 * system.precision.epsilon)
-        # force and energy of the order of rounding, so that a body without any load is in equilibrium
+        # force and energy of the order of rounding, so that a body without any load is in equilibrium; a stress is a
+        # sum of some terms that are as large as moduli, each of which is rounded
         stiffest = max(m.law.shear_modulus + abs(m.volumetric_modulus) for m in system.model.materials.values())
-        self._noise = system.precision.epsilon * stiffest * system.model.mesh.volume ** (2.0 / 3.0)
-        self._energy_noise = system.precision.epsilon * stiffest * system.model.mesh.volume
+        self._noise = _TERMS * system.precision.epsilon * stiffest * system.model.mesh.volume ** (2.0 / 3.0)
+        self._energy_noise = _TERMS * system.precision.epsilon * stiffest * system.model.mesh.volume
 
     def solve(self, external: Floats | None = None, start: Floats | None = None) -> Equilibrium:
         """Go from a start (rest by default) to equilibrium at full load.
