@@ -23,3 +23,11 @@ def test_other_tissues_have_colours_of_their_own():
     assert found[7] not in (found[9], views.RESECTED)
     colours = views.element_colours(two_tissues((7, 9)), np.zeros(12, dtype=bool), {7: "gel", 9: "white matter"})
     assert set(colours) == set(found.values())
+
+
+def test_a_tissue_has_its_colour_whatever_else_a_mesh_has():
+    alone = views.tissue_colours({5: "gel"}, two_tissues((5, 5)))
+    beside = views.tissue_colours({3: "gel", 2: "white matter"}, two_tissues((3, 2)))
+    assert alone[5] == beside[3]
+    both = views.tissue_colours({3: "gel", 2: "agar"}, two_tissues((3, 2)))
+    assert both[3] != both[2]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import warnings
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,9 +26,10 @@ from warpbrain.report.slices import Cut, cut, outline
 
 Ints = NDArray[np.int32]
 
-#: Of tissue in pictures: that of its name; names that the presets of labels do not give have the remaining ones, in the
-#: order of their numbers.
+#: Of tissue in pictures: that of its name. A name that the presets of labels do not give has one of the remaining ones,
+#: the same wherever it stands; labels without a name have them in the order of their numbers.
 COLOUR_OF = {
+    "brain": "#b9aea6",
     "grey matter": "#b9aea6",
     "white matter": "#efe8df",
     "brain stem": "#d3b8a8",
@@ -36,7 +38,7 @@ COLOUR_OF = {
     "enhancing tumour": "#4b2a63",
     "oedema": "#8fb3c9",
 }
-TISSUE_COLOURS = ("#b9aea6", "#efe8df", "#d3b8a8", "#c9d3c0", "#c5c3d8", "#d9cfa8")
+TISSUE_COLOURS = ("#b9aea6", "#efe8df", "#d3b8a8", "#c9d3c0", "#c5c3d8", "#d9cfa8", "#bfd5d3", "#dcc3cb")
 RESECTED = "#d9483b"
 TISSUE_EDGE = "#4d4640"
 
@@ -109,9 +111,18 @@ def heading(mesh: TetMesh, view: View, place: float) -> str:
 def tissue_colours(names: Mapping[int, str], mesh: TetMesh) -> dict[int, str]:
     """Colour of each label of a mesh, whatever the order of the labels."""
     known = {label: COLOUR_OF[names[label]] for label in mesh.labels if names.get(label) in COLOUR_OF}
-    left = [colour for colour in TISSUE_COLOURS if colour not in known.values()]
-    others = [label for label in mesh.labels if label not in known]
-    return known | {label: left[i % len(left)] for i, label in enumerate(others)}
+    own = [colour for colour in TISSUE_COLOURS if colour not in COLOUR_OF.values()]
+    chosen = dict(known)
+    # one that nobody named is called so (`cases new`)
+    named = {label: name for label, name in names.items() if name != f"tissue {label}"}
+    for name, label in sorted((named[label], label) for label in mesh.labels if label in named.keys() - known.keys()):
+        # that of the name in every case, unless another tissue of this one has it already
+        wish = zlib.crc32(name.encode())
+        wishes = [own[(wish + k) % len(own)] for k in range(len(own))]
+        chosen[label] = next((colour for colour in wishes if colour not in chosen.values()), wishes[0])
+    left = [colour for colour in TISSUE_COLOURS if colour not in chosen.values()]
+    nameless = [label for label in mesh.labels if label not in chosen]
+    return chosen | {label: left[i % len(left)] for i, label in enumerate(nameless)}
 
 
 def element_colours(mesh: TetMesh, resected: Bools, names: Mapping[int, str] | None = None) -> NDArray[np.str_]:
