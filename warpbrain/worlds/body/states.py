@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -112,14 +111,7 @@ class SolvedState:
         SolveError
             If it is unstable.
         """
-        return self._linearised if sensors is None else self._linearised_for(sensors)
-
-    @cached_property
-    def _linearised(self) -> Linearisation:
-        """Of its own sensors: factorised once, whoever asks for it."""
-        return self._linearised_for(self.sensors)
-
-    def _linearised_for(self, sensors: Sensors) -> Linearisation:
+        sensors = self.sensors if sensors is None else sensors
         last = Linearisation(self.system, self.u, self.reactions, sensors)
         systems = {id(instant.system) for instant in self.instants}
         if sensors.is_counted_from_rest and (self.course or len(systems) <= 1):
