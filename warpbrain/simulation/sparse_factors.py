@@ -1,11 +1,14 @@
 """Factors of sparse matrices, by RSLAB: supernodes in the order of a nested dissection.
 
 Of a brain of 5,000 nodes they take a fifth of the time of SciPy's SuperLU, and a solution a third
-(``python bench/factors.py``). They are the same to the bit for any number of threads.
+(``python bench/factors.py``). They are the same to the bit for any number of threads. A fork of a process that has used
+it has SuperLU instead.
 """
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,23 +33,54 @@ class SparseFactors:
     """
 
     def __init__(self, matrix: Any, symmetric: bool = True) -> None:
-        import rslab
         from scipy.sparse import tril
 
-        pattern = (tril(matrix) if symmetric else matrix).tocsc().astype(np.float64)
-        pattern.sum_duplicates()
         #: Whether the matrix is positive definite; known of symmetric ones.
         self.is_definite = False
-        self._factors: rslab.Ldlt | rslab.Lu
+        if _is_fork:
+            self._solve = self._by_superlu(matrix, symmetric)
+            return
+        import rslab
+
+        _used.add(os.getpid())
+        pattern = (tril(matrix) if symmetric else matrix).tocsc().astype(np.float64)
+        pattern.sum_duplicates()
+        factors: rslab.Ldlt | rslab.Lu
         if symmetric:
             factors = rslab.ldlt(pattern, threads=thread_count())
-            self._factors, self.is_definite = factors, factors.inertia[0] == matrix.shape[0]
+            self.is_definite = factors.inertia[0] == matrix.shape[0]
         else:
-            self._factors = rslab.lu(pattern, threads=thread_count())
+            factors = rslab.lu(pattern, threads=thread_count())
+        self._solve = factors.solve_many
+
+    def _by_superlu(self, matrix: Any, symmetric: bool) -> Callable[[Floats], Floats]:
+        from scipy.sparse.linalg import splu
+
+        options = {"SymmetricMode": True}
+        factors = splu(
+            matrix.tocsc().astype(np.float64), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
+        )
+        # with pivots on the diagonal their signs are those of the eigenvalues (Sylvester)
+        on_diagonal = symmetric and np.array_equal(factors.perm_r, factors.perm_c)
+        self.is_definite = bool(on_diagonal and factors.U.diagonal().min() > 0.0)
+        return factors.solve
 
     def solve(self, columns: Floats) -> Floats:
         """Solution (n,) or (n, k) for right-hand sides (n,) or (n, k), an array of which Fortran order is faster."""
         columns = np.asarray(columns, dtype=np.float64)
-        if columns.ndim == 1:
-            return np.asarray(self._factors.solve(np.ascontiguousarray(columns)))
-        return np.asarray(self._factors.solve_many(np.asfortranarray(columns)))
+        solution = np.asarray(self._solve(np.asfortranarray(columns.reshape(len(columns), -1))))
+        return solution.reshape(columns.shape)
+
+
+#: Processes that RSLAB was used in: its threads do not live on in a fork, which would wait for them for ever.
+_used: set[int] = set()
+_is_fork = False
+
+
+def _after_fork() -> None:
+    global _is_fork
+    _is_fork = _is_fork or bool(_used)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
