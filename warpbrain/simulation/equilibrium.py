@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 #: Out-of-balance force, relative, from which on steps say something of the steps to come.
 _NEAR = 0.1
 #: Terms of a stress that are rounded.
-_TERMS = 4.0
+_TERMS = 2.0
 
 
 @dataclass(frozen=True)
