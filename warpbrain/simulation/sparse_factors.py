@@ -42,7 +42,8 @@ class SparseFactors:
             return
         import rslab
 
-        _used.add(os.getpid())
+        global _is_used
+        _is_used = True
         pattern = (tril(matrix) if symmetric else matrix).tocsc().astype(np.float64)
         pattern.sum_duplicates()
         factors: rslab.Ldlt | rslab.Lu
@@ -72,14 +73,14 @@ class SparseFactors:
         return solution.reshape(columns.shape)
 
 
-#: Processes that RSLAB was used in: its threads do not live on in a fork, which would wait for them for ever.
-_used: set[int] = set()
-_is_fork = False
+#: Whether RSLAB was used, and whether this is a fork of a process in which it was: its threads do not live on in a
+#: fork, which would wait for them for ever.
+_is_used = _is_fork = False
 
 
 def _after_fork() -> None:
     global _is_fork
-    _is_fork = _is_fork or bool(_used)
+    _is_fork = _is_fork or _is_used
 
 
 if hasattr(os, "register_at_fork"):

@@ -100,7 +100,14 @@ class Fitter:
         return fit
 
     def begin(self, effects: tuple[Effect, ...], refit: Refit) -> Refit:
-        """The point of a fit with other effects that have as many coefficients, in the columns of that fit.
+        """State, residual and Laplace evidence with other effects at the coordinates of a fit, before any iteration.
+
+        Parameters
+        ----------
+        effects : tuple of Effect
+            As many as those of the fit, with as many coefficients each.
+        refit : Refit
+            Whose columns, noise and share of the mesh's error are kept.
 
         Raises
         ------
