@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.frame import PASCALS, Frame
 from warpbrain.problems import Problems
-from warpbrain.recordings.markups import is_markup, paired, read_markup
+from warpbrain.recordings.markups import is_markup, read_markup
 from warpbrain.recordings.recording import (
     ForceRecording,
     PointsRecording,
@@ -24,13 +23,11 @@ from warpbrain.recordings.recording import (
 )
 from warpbrain.recordings.surfaces import read_surface_mesh
 from warpbrain.recordings.tables import Table, read_table
-from warpbrain.recordings.tags import read_tags
 from warpbrain.recordings.text import collected, shown
+from warpbrain.recordings.tracked_points import POSITION, tracked_points
 
 Floats = NDArray[np.float64]
 
-POSITION = ("x", "y", "z")
-DISPLACEMENT = ("ux", "uy", "uz")
 NORMAL = ("nx", "ny", "nz")
 FORCE = ("fx", "fy", "fz")
 #: What a test of each mode may have recorded: imposed, response.
@@ -56,7 +53,8 @@ def read_points(
     moved: Path | None = None,
     moved_file: str | None = None,
 ) -> PointsRecording | None:
-    """Read tracked points from ``.csv``, ``.tag`` or a pair of 3D Slicer markups (``.mrk.json``, ``.fcsv``).
+    """Read tracked points from ``.csv``, ``.tag``, a pair of 3D Slicer markups (``.mrk.json``, ``.fcsv``), or an ending
+    that another package reads (`tracked_points.Reader`).
 
     Parameters
     ----------
@@ -79,20 +77,11 @@ def read_points(
         None if there were problems.
     """
     with collected(path, problems) as found:
-        ending = path.suffix.lower()
-        markup = is_markup(path)
-        if not markup and ending not in (".csv", ".tag"):
-            found.add(path, "", f"found ending {shown(ending)}, expected .csv, .tag, .mrk.json or .fcsv")
-            return None
-        if not markup and moved is not None:
-            found.add(path, "moved", f"a {ending} file holds where points went; 'moved' goes with 3D Slicer markups")
-            return None
-        columns = {".csv": _csv_points, ".tag": _tag_points}.get(ending)
-        parts = columns(path, frame, found) if columns else _markup_points(path, moved, found)
+        tracked = tracked_points(path, frame, moved, found)
         recording = None
-        if parts is not None and not found:
+        if tracked is not None and not found:
             recording = PointsRecording(
-                name=name, file=file, role=role, sigma=sigma, outside=outside, moved_file=moved_file, **parts
+                name=name, file=file, role=role, sigma=sigma, outside=outside, moved_file=moved_file, **vars(tracked)
             )
     return recording
 
@@ -304,59 +293,6 @@ def nominal_stress(mode: str, stretch: Floats, values: Floats, kind: str) -> Flo
     if kind == "nominal" or mode == "confined":
         return values
     return np.asarray(values / stretch)
-
-
-def _csv_points(path: Path, frame: Frame, problems: Problems) -> dict[str, Any] | None:
-    table = read_table(path, problems, (*POSITION, *DISPLACEMENT, "t", "id", "sigma", "weight"))
-    if table is None or not table.require(*POSITION, *DISPLACEMENT):
-        return None
-    ids = table.words("id") if "id" in table else None
-    if ids is not None and "t" not in table:
-        _check_unique(table, ids)
-    return {
-        "points": frame.lengths(table.vectors(*POSITION)),
-        "displacement": frame.lengths(table.vectors(*DISPLACEMENT)),
-        "time": table.times(strictly=ids is not None, of=ids) if "t" in table else None,
-        "ids": ids,
-        "sigmas": frame.metres * table.bounded("sigma", 0.0, itself=False) if "sigma" in table else None,
-        "weights": table.bounded("weight", 0.0, itself=True) if "weight" in table else None,
-    }
-
-
-def _tag_points(path: Path, _frame: Frame, problems: Problems) -> dict[str, Any] | None:
-    tags = read_tags(path, problems)
-    if tags is None:
-        return None
-    start, end, labels = tags
-    frame = Frame("mm", "RAS")
-    return {"points": frame.lengths(start), "displacement": frame.lengths(end - start), "ids": labels}
-
-
-def _markup_points(path: Path, moved: Path | None, problems: Problems) -> dict[str, Any] | None:
-    if moved is None:
-        cure = "name a second markup with the same labels as 'moved'"
-        problems.add(path, "moved", "a 3D Slicer markup holds where points are, not where they went", cure)
-        return None
-    if not is_markup(moved):
-        problems.add(moved, "", f"found ending {shown(moved.suffix)}, expected a 3D Slicer markup as {path.name} is")
-        return None
-    start, end = read_markup(path, problems), read_markup(moved, problems)
-    if start is None or end is None:
-        return None
-    positions = paired(start, end, path, moved, problems)
-    if positions is None:
-        return None
-    return {"points": start.points, "displacement": positions - start.points, "ids": start.labels}
-
-
-def _check_unique(table: Table, ids: tuple[str, ...]) -> None:
-    first: dict[str, int] = {}
-    for index, name in enumerate(ids):
-        if name in first:
-            found = f"found {shown(name)} again (row {table.rows[first[name]]})"
-            table.problem(index, "id", f"{found}, expected each id once where there is no time t")
-        elif name:
-            first[name] = index
 
 
 def _normals(table: Table, frame: Frame) -> Floats | None:

@@ -13,7 +13,7 @@ from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.mesh.vtu import write_vtu
-from warpbrain.recordings.reading import DISPLACEMENT, FORCE, NORMAL, POSITION
+from warpbrain.recordings.reading import FORCE, NORMAL
 from warpbrain.recordings.recording import (
     ForceRecording,
     PointsRecording,
@@ -21,6 +21,7 @@ from warpbrain.recordings.recording import (
     SurfaceRecording,
     TestRecording,
 )
+from warpbrain.recordings.tracked_points import DISPLACEMENT, POSITION
 
 Floats = NDArray[np.float64]
 Columns = dict[str, Floats | tuple[str, ...]]

@@ -1,4 +1,4 @@
-"""The registry of mechanisms: every file in this folder that defines one."""
+"""The registry of mechanisms: every file in this folder that defines one, and what other packages add."""
 
 from __future__ import annotations
 
@@ -7,16 +7,28 @@ import inspect
 import pkgutil
 from functools import cache
 
+from warpbrain.errors import InputError
 from warpbrain.physics.mechanism import Mechanism
+from warpbrain.plugins import added_by_packages
 
 
 @cache
 def mechanisms() -> dict[str, type[Mechanism]]:
-    """Mechanisms by kind, in the order of their names."""
+    """Mechanisms by kind, in the order of their names; those of other packages by entry points `warpbrain.mechanisms`.
+
+    Raises
+    ------
+    InputError
+        If another package names what is no mechanism, cannot be loaded, or has a name that is taken.
+    """
     found: dict[str, type[Mechanism]] = {}
     for module in pkgutil.iter_modules(__path__, f"{__name__}."):
         for _, member in inspect.getmembers(importlib.import_module(module.name), inspect.isclass):
             if issubclass(member, Mechanism) and member.__module__ == module.name and not inspect.isabstract(member):
                 assert member.kind not in found, f"two mechanisms are called '{member.kind}'"
                 found[member.kind] = member
+    for name, added in added_by_packages("mechanisms", found).items():
+        if not (inspect.isclass(added) and issubclass(added, Mechanism) and added.kind == name):
+            raise InputError(f"entry point '{name}' of warpbrain.mechanisms: expected a Mechanism of kind '{name}'")
+        found[name] = added
     return dict(sorted(found.items()))

@@ -1,0 +1,168 @@
+"""Files with tracked points: a reader for each ending, those of other packages among them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from warpbrain.arrays import Floats
+from warpbrain.errors import InputError
+from warpbrain.frame import Frame
+from warpbrain.plugins import added_by_packages
+from warpbrain.problems import Problems
+from warpbrain.recordings.markups import is_markup, paired, read_markup
+from warpbrain.recordings.tables import Table, read_table
+from warpbrain.recordings.tags import read_tags
+from warpbrain.recordings.text import is_readable, shown
+
+POSITION = ("x", "y", "z")
+DISPLACEMENT = ("ux", "uy", "uz")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrackedPoints:
+    """What a file tells of points: where each was at rest and how far it went.
+
+    Attributes
+    ----------
+    points, displacement : (n, 3) array
+        [m], RAS.
+    time : (n,) array or None
+        [s]
+    ids : tuple of n str, or None
+    sigmas : (n,) array or None
+        Noise of one component of each point [m].
+    weights : (n,) array or None
+    """
+
+    points: Floats
+    displacement: Floats
+    time: Floats | None = None
+    ids: tuple[str, ...] | None = None
+    sigmas: Floats | None = None
+    weights: Floats | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.points)
+        for name, shape in {
+            "points": (n, 3),
+            "displacement": (n, 3),
+            "time": (n,),
+            "sigmas": (n,),
+            "weights": (n,),
+        }.items():
+            values = getattr(self, name)
+            if values is not None and (np.shape(values) != shape or not np.isfinite(values).all()):
+                raise InputError(f"{name}: expected finite numbers of shape {shape}, found {np.shape(values)}")
+        if not n or (self.ids is not None and len(self.ids) != n):
+            raise InputError(f"ids: expected one for each of {n} points" if n else "points: found none")
+
+
+#: Reads a file of the ending that it is registered for (entry points of the group `warpbrain.recordings`, named like
+#: ``".trc"``). It raises `ValueError`, or an error that derives from it, with what is wrong; the file is named for it.
+Reader = Callable[[Path], TrackedPoints]
+
+
+@cache
+def added_readers() -> dict[str, Reader]:
+    """Readers of other packages, by ending in small letters."""
+    return added_by_packages("recordings", dict.fromkeys((".csv", ".tag", ".json", ".fcsv")))
+
+
+def tracked_points(path: Path, frame: Frame, moved: Path | None, problems: Problems) -> TrackedPoints | None:
+    """Points of a file; None if there were problems.
+
+    Parameters
+    ----------
+    path : Path
+    frame : Frame
+        Unit and axes of a CSV file; all others state theirs.
+    moved : Path or None
+        The second markup of a pair.
+    problems : Problems
+        Gets what is wrong.
+    """
+    ending = path.suffix.lower()
+    if is_markup(path):
+        return _of_markups(path, moved, problems)
+    if ending not in (".csv", ".tag", *added_readers()):
+        others = "".join(f"{name}, " for name in added_readers())
+        problems.add(path, "", f"found ending {shown(ending)}, expected .csv, .tag, {others}.mrk.json or .fcsv")
+        return None
+    if moved is not None:
+        problems.add(path, "moved", f"a {ending} file holds where points went; 'moved' goes with 3D Slicer markups")
+        return None
+    if ending == ".csv":
+        return _of_csv(path, frame, problems)
+    return _of_tags(path, problems) if ending == ".tag" else _of_package(path, added_readers()[ending], problems)
+
+
+def _of_package(path: Path, read: Reader, problems: Problems) -> TrackedPoints | None:
+    if not is_readable(path, problems):
+        return None
+    try:
+        tracked = read(path)
+    except (ValueError, OSError) as error:
+        problems.add(path, "", str(error))
+        return None
+    if tracked.ids is not None and tracked.time is None and len(set(tracked.ids)) < len(tracked.ids):
+        problems.add(path, "", "found an id twice, expected each once where there is no time")
+        return None
+    return tracked
+
+
+def _of_csv(path: Path, frame: Frame, problems: Problems) -> TrackedPoints | None:
+    table = read_table(path, problems, (*POSITION, *DISPLACEMENT, "t", "id", "sigma", "weight"))
+    if table is None or not table.require(*POSITION, *DISPLACEMENT):
+        return None
+    ids = table.words("id") if "id" in table else None
+    if ids is not None and "t" not in table:
+        _check_unique(table, ids)
+    points = table.vectors(*POSITION), table.vectors(*DISPLACEMENT)
+    time = table.times(strictly=ids is not None, of=ids) if "t" in table else None
+    sigmas = frame.metres * table.bounded("sigma", 0.0, itself=False) if "sigma" in table else None
+    weights = table.bounded("weight", 0.0, itself=True) if "weight" in table else None
+    if problems:
+        return None
+    start, displacement = (frame.lengths(vectors) for vectors in points)
+    return TrackedPoints(points=start, displacement=displacement, time=time, ids=ids, sigmas=sigmas, weights=weights)
+
+
+def _of_tags(path: Path, problems: Problems) -> TrackedPoints | None:
+    tags = read_tags(path, problems)
+    if tags is None:
+        return None
+    start, end, labels = tags
+    frame = Frame("mm", "RAS")
+    return TrackedPoints(points=frame.lengths(start), displacement=frame.lengths(end - start), ids=labels)
+
+
+def _of_markups(path: Path, moved: Path | None, problems: Problems) -> TrackedPoints | None:
+    if moved is None:
+        cure = "name a second markup with the same labels as 'moved'"
+        problems.add(path, "moved", "a 3D Slicer markup holds where points are, not where they went", cure)
+        return None
+    if not is_markup(moved):
+        problems.add(moved, "", f"found ending {shown(moved.suffix)}, expected a 3D Slicer markup as {path.name} is")
+        return None
+    start, end = read_markup(path, problems), read_markup(moved, problems)
+    if start is None or end is None:
+        return None
+    positions = paired(start, end, path, moved, problems)
+    if positions is None:
+        return None
+    return TrackedPoints(points=start.points, displacement=positions - start.points, ids=start.labels)
+
+
+def _check_unique(table: Table, ids: tuple[str, ...]) -> None:
+    first: dict[str, int] = {}
+    for index, name in enumerate(ids):
+        if name in first:
+            found = f"found {shown(name)} again (row {table.rows[first[name]]})"
+            table.problem(index, "id", f"{found}, expected each id once where there is no time t")
+        elif name:
+            first[name] = index
