@@ -26,6 +26,9 @@ from warpbrain.worlds.body.states import TOLERANCE, Hypothesis, States, steps_to
 from warpbrain.worlds.body.time_courses import AT_ONCE, EVENLY, time_courses
 from warpbrain.worlds.options import DiagnosisOptions
 
+# a diagnosis serves all tests of its cause, where tests are spread one by one
+pytestmark = pytest.mark.xdist_group("in time")
+
 _OPTIONS = DiagnosisOptions(candidates=("drainage", "viscoelasticity", "swelling"), mesh_error=False, draws=100)
 
 

@@ -17,6 +17,9 @@ import pytest
 from scipy.stats import binom, kstest
 from simulated_draws import Setting, ranks
 
+#: One process has the ranks of all settings, where tests are spread one by one.
+pytestmark = pytest.mark.xdist_group("calibration")
+
 PROBABILITIES = (0.5, 0.9, 0.95)
 DRAWS = 60
 #: Of the first setting; those from 0 were looked at before the number of draws was settled.
