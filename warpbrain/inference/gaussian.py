@@ -80,6 +80,18 @@ class _Spectrum:
         """`L^-T` times the directions (n, q)."""
         return np.asarray(self._whitened.dual @ self._combinations)
 
+    @cached_property
+    def _products(self) -> dict[bytes, Floats]:
+        return {}
+
+    def products(self, rows: Ints) -> Floats:
+        """Products of each two rows of `dual` of points with the rows (g, d), at all scales the same: (g d^2, q)."""
+        key = rows.tobytes()
+        if key not in self._products:
+            B = self.dual[rows]
+            self._products[key] = (B[:, :, None] * B[:, None, :]).reshape(-1, B.shape[2])
+        return self._products[key]
+
 
 @dataclass(frozen=True, eq=False)
 class GaussianModel:
@@ -164,14 +176,21 @@ class GaussianModel:
 
     def precision_blocks(self, rows: Ints) -> Floats:
         """Diagonal blocks (g, d, d) of `S^-1` of points with the rows (g, d)."""
-        B, weights = self._low_rank
         of_noise = self._noise.precision[rows[:, :, None], rows[:, None, :]]
-        return np.asarray((of_noise - np.einsum("gik,gjk->gij", B[rows] * weights, B[rows])) / self.scale**2)
+        of_columns = (self._spectrum.products(rows) @ self._low_rank[1]).reshape(of_noise.shape)
+        return np.asarray((of_noise - of_columns) / self.scale**2)
 
     def precision_times(self, rows: Floats) -> Floats:
         """`S^-1` times rows (n,) or (n, b)."""
-        B, weights = self._low_rank
-        return np.asarray((self._noise.precision @ rows - B @ (weights * (B.T @ rows).T).T) / self.scale**2)
+        return next(self.precision_times_at([self.scale], rows))
+
+    def precision_times_at(self, scales: Sequence[float], rows: Floats) -> Iterator[Floats]:
+        """The same with each of some factors on the noise: what they have in common is computed once."""
+        B, of_noise = self._spectrum.dual, self._noise.precision @ rows
+        projected = B.T @ rows
+        for scale in scales:
+            weights = 1.0 / (scale**2 + self._spectrum.values)
+            yield np.asarray((of_noise - B @ (weights * projected.T).T) / scale**2)
 
     @cached_property
     def _whitened(self) -> _Whitened:
@@ -220,15 +239,24 @@ class GaussianModel:
     @cached_property
     def log_determinant(self) -> float:
         """`ln |S|`."""
-        values = self._spectrum.values
-        n, k2 = len(self), self.scale**2
+        return self._log_determinant(self.scale)
+
+    def _log_determinant(self, scale: float) -> float:
         of_noise = 2.0 * float(np.log(np.diag(self.noise_factor)).sum())
-        return of_noise + n * float(np.log(k2)) + float(np.log1p(values / k2).sum())
+        of_columns = float(np.log1p(self._spectrum.values / scale**2).sum())
+        return of_noise + len(self) * float(np.log(scale**2)) + of_columns
 
     def log_density(self, rows: Floats) -> Floats:
         """`ln N(r; 0, S)` of rows (n,) or (n, b): () or (b,)."""
-        squares = np.sum(self.standardised(rows) ** 2, axis=0)
-        return np.asarray(-0.5 * (squares + self.log_determinant + len(self) * np.log(2.0 * np.pi)))
+        return self.log_density_at([self.scale], rows)[0]
+
+    def log_density_at(self, scales: Sequence[float], rows: Floats) -> Floats:
+        """The same with each of some factors (k,) on the noise: (k,) or (k, b)."""
+        logs = [
+            -0.5 * (np.sum(white**2, axis=0) + self._log_determinant(scale) + len(self) * np.log(2.0 * np.pi))
+            for scale, white in zip(scales, self.standardised_at(scales, rows), strict=True)
+        ]
+        return np.array(logs)
 
     def coefficients(self, rows: Floats) -> tuple[Floats, Floats]:
         """Mean (q,) and covariance (q, q) of the coefficients `xi` after rows (n,)."""
@@ -267,13 +295,10 @@ class GaussianModel:
 
     def log_marginal(self, rows: Floats, scales: Floats, log_prior: Floats) -> float:
         """Log density of rows (n,), summed over factors on the noise (k,) with the log of their prior probability."""
-        return float(np.logaddexp.reduce(self._log_densities_at(rows, scales) + log_prior))
+        return float(np.logaddexp.reduce(self.log_density_at(scales.tolist(), rows) + log_prior))
 
     def likely_scale(self, rows: Floats, scales: Floats, log_prior: Floats) -> float:
         """Mean of the factor on the noise after rows (n,); arguments as of `log_marginal`."""
         from scipy.special import softmax
 
-        return float(softmax(self._log_densities_at(rows, scales) + log_prior) @ scales)
-
-    def _log_densities_at(self, rows: Floats, scales: Floats) -> Floats:
-        return np.array([float(self.with_scale(scale).log_density(rows)) for scale in scales.tolist()])
+        return float(softmax(self.log_density_at(scales.tolist(), rows) + log_prior) @ scales)

@@ -12,7 +12,7 @@ by another, so no point is discarded before hypotheses are compared.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,6 +70,20 @@ class GrossErrors:
     inflation: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class Sound:
+    """Rows if all points are sound: `S^-1 r` (n,) and `ln N(r; 0, S)`."""
+
+    weighted: Floats
+    log_density: float
+
+    @classmethod
+    def at_scales(cls, model: GaussianModel, scales: Floats, residual: Floats) -> Iterator[Sound]:
+        """With each of some factors on the noise: what they have in common is computed once."""
+        logs = model.log_density_at(scales.tolist(), residual).tolist()
+        return map(cls, model.precision_times_at(scales.tolist(), residual), logs)
+
+
 def with_gross_errors(
     model: GaussianModel,
     residual: Floats,
@@ -77,6 +91,8 @@ def with_gross_errors(
     prior: Outliers,
     sweeps: int = 10,
     start: Floats | None = None,
+    sound: Sound | None = None,
+    further: Floats | None = None,
 ) -> GrossErrors:
     """Density of residuals where some points may be gross errors.
 
@@ -93,8 +109,14 @@ def with_gross_errors(
         Passes over the points at most. The point whose odds change sides the most goes first.
     start : (g,) array, optional
         The most probable inflation of each point under a hypothesis that is nearly the same; all are sound by default.
+    sound : Sound, optional
+        Of these rows under the model, if that is known.
+    further : (n, k) array, optional
+        Columns beside those of the model: few, with which nothing is factorised again.
     """
-    search = _Search(model, residual, points, prior)
+    if sound is None:
+        sound = next(Sound.at_scales(model, np.array([model.scale]), residual))
+    search = _Search(model, sound, points, prior, np.zeros((len(model), 0)) if further is None else further)
     if start is not None and (start > 1.0).any():
         search.begin_with(np.searchsorted(prior.inflations, start))
     log_prior = prior.log_probabilities
@@ -138,10 +160,13 @@ class _Search:
     """The inflation of each point, and the inverse of the covariance with them, as updates of that with none.
 
     With the rows R of all gross errors, `P = P_0 - P_0[:, R] (Delta_R^-1 + P_0[R, R])^-1 P_0[R, :]` (Woodbury) is
-    `P_0 - Z Z^T`, to which points are added as by Cholesky's method.
+    `P_0 - Z Z^T`, to which points are added as by Cholesky's method. Further columns G of the model are in `Z`, too:
+    `P_0 G (I + G^T P_0 G)^-1 G^T P_0`.
     """
 
-    def __init__(self, model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> None:
+    def __init__(
+        self, model: GaussianModel, sound: Sound, points: Sequence[Ints], prior: Outliers, further: Floats
+    ) -> None:
         self.kinds = np.zeros(len(points), dtype=np.int64)
         self._model, self._points = model, points
         # variance with each inflation, in units of that of a sound point
@@ -152,8 +177,8 @@ class _Search:
             numbers = np.flatnonzero(sizes == size)
             rows = np.array([points[number] for number in numbers.tolist()])
             self._groups.append(_Group(numbers, rows, model.noise_blocks(rows), model.precision_blocks(rows)))
-        self._sound = model.precision_times(residual)
-        self._log_sound = float(model.log_density(residual))
+        self._sound, self._further = sound, further
+        self._by_further = model.precision_times(further) if further.shape[1] else further
         self._begin()
 
     def change(self, number: int, kind: int) -> None:
@@ -173,9 +198,12 @@ class _Search:
 
     def _begin(self) -> None:
         """With all points sound."""
-        self._Z = np.zeros((len(self._sound), 0))
-        self._weighted, self._precisions = self._sound.copy(), [group.precision.copy() for group in self._groups]
+        G, u = self._further, self._by_further
+        self._Z, self._weighted = np.zeros((len(G), 0)), self._sound.weighted.copy()
+        self._precisions = [group.precision.copy() for group in self._groups]
         self._log_change = 0.0
+        if G.shape[1]:
+            self._add(u, np.eye(G.shape[1]) + G.T @ u, G.T @ self._weighted, 0.0)
 
     def _inflate(self, numbers: Sequence[int]) -> None:
         """Add the rows of some points to `Z`, and what follows to the inverse and the log density."""
@@ -191,9 +219,13 @@ class _Search:
             increase = (self._variances[self.kinds[number]] - 1.0) * self._model.noise_blocks(rows[None])[0]
             inner[part, part] += np.linalg.inv(increase)
             log_determinant += float(np.linalg.slogdet(increase)[1])
+        self._add(columns, inner, self._weighted[R], log_determinant)
+
+    def _add(self, columns: Floats, inner: Floats, weighted: Floats, log_determinant: float) -> None:
+        """Take `columns inner^-1 columns^T` off the inverse, of which `weighted` is the projection of the rows."""
         factor = np.linalg.cholesky(inner)
         inverse = np.linalg.inv(factor)
-        added, residual = columns @ inverse.T, inverse @ self._weighted[R]
+        added, residual = columns @ inverse.T, inverse @ weighted
         self._Z = np.concatenate([self._Z, added], axis=1)
         self._weighted -= added @ residual
         for group, precision in zip(self._groups, self._precisions, strict=True):
@@ -212,7 +244,7 @@ class _Search:
 
     def log_density(self) -> float:
         """Of the rows, with the current inflations."""
-        return self._log_sound + self._log_change
+        return self._sound.log_density + self._log_change
 
 
 def _log_ratios(v: Floats, P: Floats, noise: Floats, changes: Floats) -> Floats:

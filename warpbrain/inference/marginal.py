@@ -10,7 +10,7 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
+from warpbrain.inference.gross_errors import Sound, columns_of_inflation, with_gross_errors
 from warpbrain.inference.noise import outliers, scales
 
 #: The sum over scales ends where a term is below this part of the largest.
@@ -93,10 +93,11 @@ def marginal(
     values, log_prior = scales()
     logs = np.full(len(values), -np.inf)
     inflations: dict[int, Floats] = {}
+    sound = tuple(Sound.at_scales(model, values, residual))
 
     def add_scale(number: int) -> None:
         scaled = model.with_scale(float(values[number]))
-        at_scale = with_gross_errors(scaled, residual, points, outliers(), start=inflation)
+        at_scale = with_gross_errors(scaled, residual, points, outliers(), start=inflation, sound=sound[number])
         logs[number], inflations[number] = at_scale.log_density + log_prior[number], at_scale.inflation
 
     first = int(np.argmin(np.abs(np.log(values / scale))))

@@ -40,9 +40,9 @@ _DIFFERENCE = 0.05
 _KEPT = 9
 #: Steps shorter than this in standard deviations of the prior end the search.
 _SHORT = 0.03
-#: By what part an error of the mesh changes that is worth going on, and by how much [standard deviations of the noise,
-#: all sensors together].
-_SAME_MESH, _MATTERS = 0.05, 0.3
+#: By how much an error of the mesh changes that is worth going on [standard deviations: of the noise, all sensors
+#: together, and of what is not known of that error].
+_MATTERS = 0.3
 
 
 class FitSearch:
@@ -131,6 +131,7 @@ class FitSearch:
         if subset.mesh_share is not None:
             share = subset.mesh_share.extended(len(self.z) - first)
             self._take_mesh_share(share, z[first:])
+            self._outdated = True
         return z
 
     def _take_mesh_share(self, share: MeshShare, z: Floats) -> None:
@@ -142,7 +143,7 @@ class FitSearch:
         nuisances, unknown = self._base.nuisances, belief("mesh.share") * share.at(z)[:, None]
         self._U = nuisances.with_family(MESH_SHARE, self._U, unknown)
         self.columns = nuisances.with_family(MESH_SHARE, self.columns, unknown)
-        self._mesh_share, self._outdated = share, True
+        self._mesh_share = share
 
     def backtrack_to_base(self) -> None:
         """Move tissue and field toward the base while that is better: far from it the linear model may fail."""
@@ -171,6 +172,9 @@ class FitSearch:
                     self.columns = self._difference_columns()
             self.columns = self._rigid.renewed(self.columns, self.state.sensors, self.z)
             step, current = self._gauss_newton_step(by_differences), np.array_equal(self._linearised_at, self.z)
+            self.converged = bool(np.abs(step).max() < _SHORT)
+            if self.converged:
+                return
             if not self._line_search(step):
                 if relinearise and not current and np.abs(step).max() >= 2.0 * _SHORT:
                     # columns that were made elsewhere may point uphill
@@ -193,7 +197,7 @@ class FitSearch:
         self._marginal, self._noise = marginal, marginal.noise
         part = nuisances.part(UNKNOWN_MESH)
         unknown, before = fit.columns[:, part], self.columns[:, part]
-        if np.linalg.norm(unknown - before) > _SAME_MESH * np.linalg.norm(before):
+        if np.linalg.norm(unknown - before) > _MATTERS * np.linalg.norm(before):
             same = False
             self.residual = self.residual + before @ self.z[part] - unknown @ fit.nuisances[part]
             self.z = self.z.copy()
@@ -215,10 +219,17 @@ class FitSearch:
         if share is None:
             return False
         before, z = self._mesh_share, self.z[self._U.shape[1] :]
+        known = self._U @ self.z[: self._U.shape[1]]
         self._take_mesh_share(share, z)
-        change = share.at(z) - (0.0 if before is None else before.at(z))
-        size = float(np.linalg.norm(self._noise.whitened(share.at(z))))
-        return float(np.linalg.norm(self._noise.whitened(change))) > max(_MATTERS, _SAME_MESH * size)
+        change, by_coefficients = share.at(z), share.columns()
+        if before is not None:
+            change, by_coefficients = change - before.at(z), by_coefficients - before.columns()
+        self.columns[:, self._layout.coefficients] += by_coefficients
+        self._best = np.inf
+        residual = self.residual - change + known - self._U @ self.z[: self._U.shape[1]]
+        self._accept_if_better(self.z, self.state, residual)
+        least = _MATTERS * max(1.0, belief("mesh.share") * float(np.linalg.norm(self._noise.whitened(share.at(z)))))
+        return float(np.linalg.norm(self._noise.whitened(change))) > least
 
     def result(self) -> Refit:
         """The fit at its best point."""

@@ -85,7 +85,6 @@ class Fitter:
         for _ in range(_ROUNDS):
             if self.mesh_errors is None or not self._mesh_error_changed(search, screened, self.mesh_errors):
                 break
-            search.start([search.z], search.state)
             search.minimise(relinearise=True)
         fit = search.result()
         for _ in range(_ROUNDS):
@@ -122,9 +121,11 @@ class Fitter:
         """Compute the error of the mesh at the best point; whether the search has to go on with it."""
         if search.effects:
             return search.update_mesh_share(known, self.finer) or not search.converged
-        matters = self._update_mesh_errors(search.state, known, screened)
+        if not self._update_mesh_errors(search.state, known, screened):
+            return False
         search.mesh_errors = self.mesh_errors
-        return matters
+        search.start([search.z], search.state)
+        return True
 
     def _update_mesh_errors(self, state: SolvedState, known: MeshErrors, screened: Marginal) -> bool:
         """Take the error of the mesh from a fit without any cause, for all fits to come; whether it matters.
