@@ -8,7 +8,7 @@ products of n by q, the number of columns, which is smaller than the number n of
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -40,57 +40,46 @@ class _Noise:
         return np.asarray(np.tril(lower) + np.tril(lower, -1).T)
 
 
-class _Whitened:
-    """Columns (n, q) in coordinates in which the noise is `N(0, I)`: `W = L^-1 U`, and `L^-T W`."""
-
-    def __init__(self, factor: Floats, columns: Floats) -> None:
-        self._factor, self.columns = factor, columns
-
-    @cached_property
-    def dual(self) -> Floats:
-        """`L^-T W` (n, q), with which the inverse of the covariance is made."""
-        from scipy.linalg import solve_triangular
-
-        return np.asarray(solve_triangular(self._factor, self.columns, lower=True, trans="T", check_finite=False))
-
-
 class _Spectrum:
-    """Eigenvalues (q,) of `W^T W`, and `W` times its eigenvectors (n, q): the same at all scales.
+    """Eigenvalues (q,) of `W^T W`, `W = L^-1 U`, and `W` times its eigenvectors (n, q): the same at all scales.
 
     Parameters
     ----------
-    whitened : _Whitened
-    lengths : (q,) array
-        Factors on the columns.
+    factor : (n, n) array
+        `L`.
+    whitened : (n, q) array
+        `W`.
     """
 
-    def __init__(self, whitened: _Whitened, lengths: Floats) -> None:
-        self._whitened = whitened
-        W = whitened.columns * lengths
-        values, vectors = np.linalg.eigh(W.T @ W)
-        self.values, self.directions = np.maximum(values, 0.0), W @ vectors
+    def __init__(self, factor: Floats, whitened: Floats) -> None:
+        self._factor = factor
+        values, vectors = np.linalg.eigh(whitened.T @ whitened)
+        self.values, self.directions = np.maximum(values, 0.0), whitened @ vectors
         if np.finfo(np.float64).eps * values.max(initial=0.0) > _ROUNDED:
             # a column ten million times as long as the noise: its square has no digits left for the others
-            left, sizes, right = np.linalg.svd(W, full_matrices=False)
-            self.values, self.directions, vectors = sizes**2, left * sizes, right.T
-        self._combinations = lengths[:, None] * vectors
+            left, sizes, _ = np.linalg.svd(whitened, full_matrices=False)
+            self.values, self.directions = sizes**2, left * sizes
+        self._products: dict[bytes, Floats] = {}
 
     @cached_property
     def dual(self) -> Floats:
         """`L^-T` times the directions (n, q)."""
-        return np.asarray(self._whitened.dual @ self._combinations)
+        from scipy.linalg import solve_triangular
 
-    @cached_property
-    def _products(self) -> dict[bytes, Floats]:
-        return {}
+        return np.asarray(solve_triangular(self._factor, self.directions, lower=True, trans="T", check_finite=False))
 
     def products(self, rows: Ints) -> Floats:
-        """Products of each two rows of `dual` of points with the rows (g, d), at all scales the same: (g d^2, q)."""
+        """Products of each two rows of `dual` of points with the rows (g, d): (g d^2, q)."""
         key = rows.tobytes()
         if key not in self._products:
-            B = self.dual[rows]
-            self._products[key] = (B[:, :, None] * B[:, None, :]).reshape(-1, B.shape[2])
+            self._products[key] = products_of_rows(self.dual, rows)
         return self._products[key]
+
+
+def products_of_rows(columns: Floats, rows: Ints) -> Floats:
+    """Products of each two rows of points with the rows (g, d), of each of some columns (n, q): (g d^2, q)."""
+    of_points = columns[rows]
+    return np.asarray((of_points[:, :, None] * of_points[:, None]).reshape(-1, columns.shape[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,21 +108,12 @@ class GaussianModel:
         other = GaussianModel(self.noise_factor, self.columns, scale)
         other.__dict__["_noise"] = self._noise
         other.__dict__["_whitened"] = self._whitened
-        other.__dict__["_lengths"] = self._lengths
         other.__dict__["_spectrum"] = self._spectrum
         return other
 
-    def with_lengths(self, factors: Floats) -> GaussianModel:
-        """The same model with columns so many times (q,) as long; nothing is whitened again."""
-        other = GaussianModel(self.noise_factor, self.columns * factors, self.scale)
-        other.__dict__["_noise"] = self._noise
-        other.__dict__["_whitened"] = self._whitened
-        other.__dict__["_lengths"] = self._lengths * factors
-        return other
-
-    def of_noise(self, columns: Floats) -> GaussianModel:
-        """Other columns (n, q) with the same noise, at a scale of one; the noise is not factorised again."""
-        other = GaussianModel(self.noise_factor, columns)
+    def of_noise(self, columns: Floats, scale: float = 1.0) -> GaussianModel:
+        """Other columns (n, q) with the same noise, at a scale of their own; the noise is not factorised again."""
+        other = GaussianModel(self.noise_factor, columns, scale)
         other.__dict__["_noise"] = self._noise
         return other
 
@@ -141,8 +121,7 @@ class GaussianModel:
         """The same model with more columns (n, k) of normal coefficients."""
         other = GaussianModel(self.noise_factor, np.column_stack([self.columns, columns]), self.scale)
         other.__dict__["_noise"] = self._noise
-        whitened = np.column_stack([self._whitened_columns, self._by_noise(columns)])
-        other.__dict__["_whitened"] = _Whitened(self.noise_factor, whitened)
+        other.__dict__["_whitened"] = np.column_stack([self._whitened, self._by_noise(columns)])
         return other
 
     def rows(self, rows: Bools) -> GaussianModel:
@@ -176,38 +155,32 @@ class GaussianModel:
 
     def precision_blocks(self, rows: Ints) -> Floats:
         """Diagonal blocks (g, d, d) of `S^-1` of points with the rows (g, d)."""
+        B, weights = self._low_rank
         of_noise = self._noise.precision[rows[:, :, None], rows[:, None, :]]
-        of_columns = (self._spectrum.products(rows) @ self._low_rank[1]).reshape(of_noise.shape)
-        return np.asarray((of_noise - of_columns) / self.scale**2)
+        return np.asarray((of_noise - np.einsum("gik,gjk->gij", B[rows] * weights, B[rows])) / self.scale**2)
 
     def precision_times(self, rows: Floats) -> Floats:
         """`S^-1` times rows (n,) or (n, b)."""
-        return next(self.precision_times_at([self.scale], rows))
+        return self.precision_at(rows)(self.scale)
 
-    def precision_times_at(self, scales: Sequence[float], rows: Floats) -> Iterator[Floats]:
-        """The same with each of some factors on the noise: what they have in common is computed once."""
-        B, of_noise = self._spectrum.dual, self._noise.precision @ rows
-        projected = B.T @ rows
-        for scale in scales:
-            weights = 1.0 / (scale**2 + self._spectrum.values)
-            yield np.asarray((of_noise - B @ (weights * projected.T).T) / scale**2)
+    def precision_at(self, rows: Floats) -> Callable[[float], Floats]:
+        """The same by the factor on the noise: what all have in common is computed once."""
+        values, B = self._spectrum.values, self._spectrum.dual
+        of_noise, projected = self._noise.precision @ rows, B.T @ rows
 
-    @cached_property
-    def _whitened(self) -> _Whitened:
-        return _Whitened(self.noise_factor, self._by_noise(self.columns))
+        def times(scale: float) -> Floats:
+            return np.asarray((of_noise - B @ (projected.T / (scale**2 + values)).T) / scale**2)
+
+        return times
 
     @cached_property
-    def _lengths(self) -> Floats:
-        """Factors (q,) on the whitened columns."""
-        return np.ones(self.columns.shape[1])
-
-    @property
-    def _whitened_columns(self) -> Floats:
-        return self._whitened.columns * self._lengths
+    def _whitened(self) -> Floats:
+        """`W = L^-1 U` (n, q)."""
+        return self._by_noise(self.columns)
 
     @cached_property
     def _spectrum(self) -> _Spectrum:
-        return _Spectrum(self._whitened, self._lengths)
+        return _Spectrum(self.noise_factor, self._whitened)
 
     def _by_noise(self, rows: Floats) -> Floats:
         """`L^-1` of rows (n,) or (n, b)."""
@@ -239,28 +212,19 @@ class GaussianModel:
     @cached_property
     def log_determinant(self) -> float:
         """`ln |S|`."""
-        return self._log_determinant(self.scale)
-
-    def _log_determinant(self, scale: float) -> float:
+        values = self._spectrum.values
+        n, k2 = len(self), self.scale**2
         of_noise = 2.0 * float(np.log(np.diag(self.noise_factor)).sum())
-        of_columns = float(np.log1p(self._spectrum.values / scale**2).sum())
-        return of_noise + len(self) * float(np.log(scale**2)) + of_columns
+        return of_noise + n * float(np.log(k2)) + float(np.log1p(values / k2).sum())
 
     def log_density(self, rows: Floats) -> Floats:
         """`ln N(r; 0, S)` of rows (n,) or (n, b): () or (b,)."""
-        return self.log_density_at([self.scale], rows)[0]
-
-    def log_density_at(self, scales: Sequence[float], rows: Floats) -> Floats:
-        """The same with each of some factors (k,) on the noise: (k,) or (k, b)."""
-        logs = [
-            -0.5 * (np.sum(white**2, axis=0) + self._log_determinant(scale) + len(self) * np.log(2.0 * np.pi))
-            for scale, white in zip(scales, self.standardised_at(scales, rows), strict=True)
-        ]
-        return np.array(logs)
+        squares = np.sum(self.standardised(rows) ** 2, axis=0)
+        return np.asarray(-0.5 * (squares + self.log_determinant + len(self) * np.log(2.0 * np.pi)))
 
     def coefficients(self, rows: Floats) -> tuple[Floats, Floats]:
         """Mean (q,) and covariance (q, q) of the coefficients `xi` after rows (n,)."""
-        W = self._whitened_columns / self.scale
+        W = self._whitened / self.scale
         covariance: Floats = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
         return covariance @ (W.T @ self._by_noise(rows)) / self.scale, covariance
 
@@ -295,10 +259,13 @@ class GaussianModel:
 
     def log_marginal(self, rows: Floats, scales: Floats, log_prior: Floats) -> float:
         """Log density of rows (n,), summed over factors on the noise (k,) with the log of their prior probability."""
-        return float(np.logaddexp.reduce(self.log_density_at(scales.tolist(), rows) + log_prior))
+        return float(np.logaddexp.reduce(self._log_densities_at(rows, scales) + log_prior))
 
     def likely_scale(self, rows: Floats, scales: Floats, log_prior: Floats) -> float:
         """Mean of the factor on the noise after rows (n,); arguments as of `log_marginal`."""
         from scipy.special import softmax
 
-        return float(softmax(self.log_density_at(scales.tolist(), rows) + log_prior) @ scales)
+        return float(softmax(self._log_densities_at(rows, scales) + log_prior) @ scales)
+
+    def _log_densities_at(self, rows: Floats, scales: Floats) -> Floats:
+        return np.array([float(self.with_scale(scale).log_density(rows)) for scale in scales.tolist()])
