@@ -151,7 +151,7 @@ class GaussianModel:
     def precision_columns(self, rows: Ints) -> Floats:
         """Columns (n, d) of `S^-1` by their numbers (d,)."""
         B, weights = self._low_rank
-        return np.asarray((self._noise.precision[:, rows] - B @ (weights * B[rows]).T) / self.scale**2)
+        return np.asarray((self._noise.precision[rows].T - B @ (weights * B[rows]).T) / self.scale**2)
 
     def precision_blocks(self, rows: Ints) -> Floats:
         """Diagonal blocks (g, d, d) of `S^-1` of points with the rows (g, d)."""

@@ -119,16 +119,16 @@ class RowsAtScales:
         values = self._values
         logs, inflations = np.full(len(values), -np.inf), [np.zeros(0)] * len(values)
 
-        def add_scale(number: int) -> None:
-            at_scale = self.with_gross_errors(float(values[number]), length, inflation)
+        def add_scale(number: int, near: Floats | None) -> None:
+            at_scale = self.with_gross_errors(float(values[number]), length, near)
             logs[number], inflations[number] = at_scale.log_density + self._log_prior[number], at_scale.inflation
 
         first = int(np.argmin(np.abs(np.log(values / scale))))
-        add_scale(first)
+        add_scale(first, inflation)
         for step in (-1, 1):
             number = first + step
             while 0 <= number < len(values):
-                add_scale(number)
+                add_scale(number, inflations[first])
                 if logs[number] < logs.max() + np.log(_NEGLIGIBLE):
                     break
                 number += step

@@ -87,6 +87,8 @@ class FitSearch:
         # nonlinear coordinates and displacements of states of this fit
         self._solved: list[tuple[Floats, Floats]] = []
         self._mesh_share: MeshShare | None = None
+        # coefficients (k,) at which that was computed in this fit
+        self._share_computed_at: Floats | None = None
         # the state that was linearised last, and the coordinates of that of the columns
         self._nearby = base.at
         self._linearised_at = np.full(len(self._layout.nonlinear), np.inf)
@@ -212,24 +214,32 @@ class FitSearch:
     def update_mesh_share(self, known: MeshErrors, finer: FinerStates) -> bool:
         """Compute the mechanisms' share of the mesh's error at the best point; whether it is another than was known.
 
-        None is known to be another where a finer mesh does not tell.
+        None is known to be another where a finer mesh does not tell. It is in proportion to the mechanisms: where
+        these have hardly changed it is not computed again.
         """
         coefficients, prior = [self.z[part] for part in self._layout.effects], self._base.prior
+        least = _MATTERS * belief("mesh.share")
+        if self._share_computed_at is not None:
+            offsets = [effect.offset(z) for effect, z in zip(self.effects, coefficients, strict=True)]
+            moved = float(np.linalg.norm(self.z[self._layout.coefficients] - self._share_computed_at))
+            if moved <= least * float(np.linalg.norm(np.concatenate(offsets))):
+                return False
         share = mesh_share_of(self.effects, coefficients, self.state, known, finer, prior)
         if share is None:
             return False
-        before, z = self._mesh_share, self.z[self._U.shape[1] :]
-        known = self._U @ self.z[: self._U.shape[1]]
+        before, z = self._mesh_share, self.z[self._layout.coefficients]
+        self._share_computed_at = z
+        before_U = self._U
         self._take_mesh_share(share, z)
         change, by_coefficients = share.at(z), share.columns()
         if before is not None:
             change, by_coefficients = change - before.at(z), by_coefficients - before.columns()
         self.columns[:, self._layout.coefficients] += by_coefficients
         self._best = np.inf
-        residual = self.residual - change + known - self._U @ self.z[: self._U.shape[1]]
+        residual = self.residual - change + (before_U - self._U) @ self.z[: self._U.shape[1]]
         self._accept_if_better(self.z, self.state, residual)
-        least = _MATTERS * max(1.0, belief("mesh.share") * float(np.linalg.norm(self._noise.whitened(share.at(z)))))
-        return float(np.linalg.norm(self._noise.whitened(change))) > least
+        size, changed = (float(np.linalg.norm(self._noise.whitened(each))) for each in (share.at(z), change))
+        return changed > max(_MATTERS, least * size)
 
     def result(self) -> Refit:
         """The fit at its best point."""
