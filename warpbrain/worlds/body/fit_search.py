@@ -24,6 +24,7 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
 from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about
+from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.mesh_share import MeshShare, mesh_share_of
 from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH
@@ -111,8 +112,14 @@ class FitSearch:
                 if number == len(starts) and not np.isfinite(self._best):
                     raise
 
-    def begin_at(self, subset: Refit) -> Floats:
+    def begin_at(self, subset: Refit, about: Linearisation | None = None) -> Floats:
         """Take the columns for those about a fit with the first of the effects, or all; keep its share of the mesh.
+
+        Parameters
+        ----------
+        subset : Refit
+        about : Linearisation, optional
+            Of its state, if it was linearised.
 
         Returns
         -------
@@ -127,7 +134,7 @@ class FitSearch:
         sizes = [float(np.linalg.norm(columns[:, part])) for columns in (subset.columns, self.columns)]
         z[part] *= sizes[0] / sizes[1] if sizes[1] else 1.0
         z[first : first + len(coefficients)] = coefficients
-        self._linearised_at = z
+        self._linearised_at, self._nearby = z, about or self._nearby
         # a place that leads to no state nearby is given up soon: from rest, in load steps, that takes minutes
         self._solved = [(z[self._layout.nonlinear], subset.state.u)]
         if subset.mesh_share is not None:

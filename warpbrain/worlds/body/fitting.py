@@ -13,6 +13,7 @@ from warpbrain.inference.marginal import Marginal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.fit_search import FitSearch
+from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors
 from warpbrain.worlds.body.mesh_share import excess_error
 from warpbrain.worlds.body.refit import Refit
@@ -98,7 +99,7 @@ class Fitter:
             raise FloatingPointError("its evidence is not a number")
         return fit
 
-    def begin(self, effects: tuple[Effect, ...], refit: Refit) -> Refit:
+    def begin(self, effects: tuple[Effect, ...], refit: Refit, about: Linearisation | None) -> Refit:
         """State, residual and Laplace evidence with other effects at the coordinates of a fit, before any iteration.
 
         Parameters
@@ -107,6 +108,8 @@ class Fitter:
             As many as those of the fit, with as many coefficients each.
         refit : Refit
             Whose columns, noise and share of the mesh's error are kept.
+        about : Linearisation or None
+            Of its state, if it was linearised.
 
         Raises
         ------
@@ -114,7 +117,7 @@ class Fitter:
             If there is no equilibrium.
         """
         search = FitSearch(self.base, self.mesh_errors, effects, refit.columns, refit.marginal)
-        search.start([search.begin_at(refit)], refit.state)
+        search.start([search.begin_at(refit, about)], refit.state)
         return search.result()
 
     def _mesh_error_changed(self, search: FitSearch, screened: Marginal, known: MeshErrors) -> bool:
