@@ -8,7 +8,7 @@ products of n by q, the number of columns, which is smaller than the number n of
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -40,45 +40,46 @@ class _Noise:
         return np.asarray(np.tril(lower) + np.tril(lower, -1).T)
 
 
-class _Whitened:
-    """Columns (n, q) in coordinates in which the noise is `N(0, I)`: `W = L^-1 U`, and `L^-T W`."""
-
-    def __init__(self, factor: Floats, columns: Floats) -> None:
-        self._factor, self.columns = factor, columns
-
-    @cached_property
-    def dual(self) -> Floats:
-        """`L^-T W` (n, q), with which the inverse of the covariance is made."""
-        from scipy.linalg import solve_triangular
-
-        return np.asarray(solve_triangular(self._factor, self.columns, lower=True, trans="T", check_finite=False))
-
-
 class _Spectrum:
-    """Eigenvalues (q,) of `W^T W`, and `W` times its eigenvectors (n, q): the same at all scales.
+    """Eigenvalues (q,) of `W^T W`, `W = L^-1 U`, and `W` times its eigenvectors (n, q): the same at all scales.
 
     Parameters
     ----------
-    whitened : _Whitened
-    lengths : (q,) array
-        Factors on the columns.
+    factor : (n, n) array
+        `L`.
+    whitened : (n, q) array
+        `W`.
     """
 
-    def __init__(self, whitened: _Whitened, lengths: Floats) -> None:
-        self._whitened = whitened
-        W = whitened.columns * lengths
-        values, vectors = np.linalg.eigh(W.T @ W)
-        self.values, self.directions = np.maximum(values, 0.0), W @ vectors
+    def __init__(self, factor: Floats, whitened: Floats) -> None:
+        self._factor = factor
+        values, vectors = np.linalg.eigh(whitened.T @ whitened)
+        self.values, self.directions = np.maximum(values, 0.0), whitened @ vectors
         if np.finfo(np.float64).eps * values.max(initial=0.0) > _ROUNDED:
             # a column ten million times as long as the noise: its square has no digits left for the others
-            left, sizes, right = np.linalg.svd(W, full_matrices=False)
-            self.values, self.directions, vectors = sizes**2, left * sizes, right.T
-        self._combinations = lengths[:, None] * vectors
+            left, sizes, _ = np.linalg.svd(whitened, full_matrices=False)
+            self.values, self.directions = sizes**2, left * sizes
+        self._products: dict[bytes, Floats] = {}
 
     @cached_property
     def dual(self) -> Floats:
         """`L^-T` times the directions (n, q)."""
-        return np.asarray(self._whitened.dual @ self._combinations)
+        from scipy.linalg import solve_triangular
+
+        return np.asarray(solve_triangular(self._factor, self.directions, lower=True, trans="T", check_finite=False))
+
+    def products(self, rows: Ints) -> Floats:
+        """Products of each two rows of `dual` of points with the rows (g, d): (g d^2, q)."""
+        key = rows.tobytes()
+        if key not in self._products:
+            self._products[key] = products_of_rows(self.dual, rows)
+        return self._products[key]
+
+
+def products_of_rows(columns: Floats, rows: Ints) -> Floats:
+    """Products of each two rows of points with the rows (g, d), of each of some columns (n, q): (g d^2, q)."""
+    of_points = columns[rows]
+    return np.asarray((of_points[:, :, None] * of_points[:, None]).reshape(-1, columns.shape[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,21 +108,12 @@ class GaussianModel:
         other = GaussianModel(self.noise_factor, self.columns, scale)
         other.__dict__["_noise"] = self._noise
         other.__dict__["_whitened"] = self._whitened
-        other.__dict__["_lengths"] = self._lengths
         other.__dict__["_spectrum"] = self._spectrum
         return other
 
-    def with_lengths(self, factors: Floats) -> GaussianModel:
-        """The same model with columns so many times (q,) as long; nothing is whitened again."""
-        other = GaussianModel(self.noise_factor, self.columns * factors, self.scale)
-        other.__dict__["_noise"] = self._noise
-        other.__dict__["_whitened"] = self._whitened
-        other.__dict__["_lengths"] = self._lengths * factors
-        return other
-
-    def of_noise(self, columns: Floats) -> GaussianModel:
-        """Other columns (n, q) with the same noise, at a scale of one; the noise is not factorised again."""
-        other = GaussianModel(self.noise_factor, columns)
+    def of_noise(self, columns: Floats, scale: float = 1.0) -> GaussianModel:
+        """Other columns (n, q) with the same noise, at a scale of their own; the noise is not factorised again."""
+        other = GaussianModel(self.noise_factor, columns, scale)
         other.__dict__["_noise"] = self._noise
         return other
 
@@ -129,8 +121,7 @@ class GaussianModel:
         """The same model with more columns (n, k) of normal coefficients."""
         other = GaussianModel(self.noise_factor, np.column_stack([self.columns, columns]), self.scale)
         other.__dict__["_noise"] = self._noise
-        whitened = np.column_stack([self._whitened_columns, self._by_noise(columns)])
-        other.__dict__["_whitened"] = _Whitened(self.noise_factor, whitened)
+        other.__dict__["_whitened"] = np.column_stack([self._whitened, self._by_noise(columns)])
         return other
 
     def rows(self, rows: Bools) -> GaussianModel:
@@ -160,7 +151,7 @@ class GaussianModel:
     def precision_columns(self, rows: Ints) -> Floats:
         """Columns (n, d) of `S^-1` by their numbers (d,)."""
         B, weights = self._low_rank
-        return np.asarray((self._noise.precision[:, rows] - B @ (weights * B[rows]).T) / self.scale**2)
+        return np.asarray((self._noise.precision[rows].T - B @ (weights * B[rows]).T) / self.scale**2)
 
     def precision_blocks(self, rows: Ints) -> Floats:
         """Diagonal blocks (g, d, d) of `S^-1` of points with the rows (g, d)."""
@@ -170,25 +161,26 @@ class GaussianModel:
 
     def precision_times(self, rows: Floats) -> Floats:
         """`S^-1` times rows (n,) or (n, b)."""
-        B, weights = self._low_rank
-        return np.asarray((self._noise.precision @ rows - B @ (weights * (B.T @ rows).T).T) / self.scale**2)
+        return self.precision_at(rows)(self.scale)
+
+    def precision_at(self, rows: Floats) -> Callable[[float], Floats]:
+        """The same by the factor on the noise: what all have in common is computed once."""
+        values, B = self._spectrum.values, self._spectrum.dual
+        of_noise, projected = self._noise.precision @ rows, B.T @ rows
+
+        def times(scale: float) -> Floats:
+            return np.asarray((of_noise - B @ (projected.T / (scale**2 + values)).T) / scale**2)
+
+        return times
 
     @cached_property
-    def _whitened(self) -> _Whitened:
-        return _Whitened(self.noise_factor, self._by_noise(self.columns))
-
-    @cached_property
-    def _lengths(self) -> Floats:
-        """Factors (q,) on the whitened columns."""
-        return np.ones(self.columns.shape[1])
-
-    @property
-    def _whitened_columns(self) -> Floats:
-        return self._whitened.columns * self._lengths
+    def _whitened(self) -> Floats:
+        """`W = L^-1 U` (n, q)."""
+        return self._by_noise(self.columns)
 
     @cached_property
     def _spectrum(self) -> _Spectrum:
-        return _Spectrum(self._whitened, self._lengths)
+        return _Spectrum(self.noise_factor, self._whitened)
 
     def _by_noise(self, rows: Floats) -> Floats:
         """`L^-1` of rows (n,) or (n, b)."""
@@ -232,7 +224,7 @@ class GaussianModel:
 
     def coefficients(self, rows: Floats) -> tuple[Floats, Floats]:
         """Mean (q,) and covariance (q, q) of the coefficients `xi` after rows (n,)."""
-        W = self._whitened_columns / self.scale
+        W = self._whitened / self.scale
         covariance: Floats = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
         return covariance @ (W.T @ self._by_noise(rows)) / self.scale, covariance
 

@@ -8,17 +8,31 @@ inflations of the other points, another inflation, which changes it by `D_i`, ha
 
 with `v = (S^-1 r)_i` and `P_ii = (S^-1)_ii`. Points that are gross errors under one hypothesis may be explained
 by another, so no point is discarded before hypotheses are compared.
+
+Hypotheses that differ in some columns `G` alone, or in their length f, share all else: with
+`G^T S_0^-1 G = V diag(l) V^T` and `D = S_0^-1 G V`
+
+    S^-1 = S_0^-1 - D diag(f^2 / (1 + f^2 l)) D^T
+
+Hypotheses that differ in some columns `G` alone, or in their length f, share all else: with
+`G^T S_0^-1 G = V diag(l) V^T` and `D = S_0^-1 G V`
+
+    S^-1 = S_0^-1 - D diag(f^2 / (1 + f^2 l)) D^T
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from warpbrain.arrays import Floats, Ints
-from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.gaussian import GaussianModel, products_of_rows
+
+#: Passes over the points at most.
+_SWEEPS = 10
 
 
 @dataclass(frozen=True)
@@ -63,22 +77,127 @@ class GrossErrors:
         Of each point to be a gross error, given the others.
     inflation : (g,) array
         The most probable one of each point, 1 of a sound one.
+    weighted : (n,) array
+        The inverse of the covariance with these, times the rows.
     """
 
     log_density: float
     log_odds: Floats
     inflation: Floats
+    weighted: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Points with equally many rows: numbers (g,), rows (g, d), noise (g, d, d), and `P_ii` if all are sound."""
+
+    numbers: Ints
+    rows: Ints
+    noise: Floats
+    precision: Floats
+
+
+class PointRows:
+    """Rows of recorded points under a model: what hypotheses with further columns have in common.
+
+    Parameters
+    ----------
+    model : GaussianModel
+    residual : (n,) array
+        Less what is expected of the causes.
+    points : sequence of int arrays
+        Rows of each point; rows of none are never gross errors.
+    weighted : (n,) array, optional
+        `S^-1 r`, if it is known.
+    """
+
+    def __init__(
+        self, model: GaussianModel, residual: Floats, points: Sequence[Ints], weighted: Floats | None = None
+    ) -> None:
+        self.model, self.points, self.residual = model, points, residual
+        self.weighted = model.precision_times(residual) if weighted is None else weighted
+        self.log_density = float(model.log_density(residual))
+        sizes = np.array([len(rows) for rows in points], dtype=np.int64)
+        self.groups = []
+        for size in np.unique(sizes).tolist():
+            numbers = np.flatnonzero(sizes == size)
+            rows = np.array([points[number] for number in numbers.tolist()])
+            self.groups.append(_Group(numbers, rows, model.noise_blocks(rows), model.precision_blocks(rows)))
+
+    def less(self, mean: Floats) -> PointRows:
+        """The same less a change (n,) of the rows."""
+        if not mean.any():
+            return self
+        other = copy.copy(self)
+        other.residual = self.residual - mean
+        other.weighted = self.model.precision_times(other.residual)
+        other.log_density = float(self.model.log_density(other.residual))
+        return other
+
+    def with_gross_errors(
+        self,
+        prior: Outliers,
+        start: Floats | None = None,
+        further: FurtherColumns | None = None,
+        length: float = 1.0,
+    ) -> GrossErrors:
+        """Density of the rows where some points may be gross errors.
+
+        Parameters
+        ----------
+        prior : Outliers
+        start : (g,) array, optional
+            The most probable inflation of each point under a hypothesis that is nearly the same; all are sound by
+            default.
+        further : FurtherColumns, optional
+            Of these rows.
+        length : float
+            A factor on these.
+        """
+        search = _Search(self, prior, further, length)
+        if start is not None and (start > 1.0).any():
+            search.begin_with(np.searchsorted(prior.inflations, start))
+        log_prior = prior.log_probabilities
+        numbers = np.arange(len(self.points))
+        # the point whose odds change sides the most goes first
+        for _ in range(_SWEEPS * max(len(numbers), 1)):
+            logs = search.log_ratios() + log_prior
+            logs -= logs[numbers, search.kinds][:, None]
+            best = np.argmax(logs, axis=1)
+            if not (best != search.kinds).any():
+                break
+            worst = int(np.argmax(logs[numbers, best]))
+            search.change(worst, int(best[worst]))
+        sums = np.logaddexp.reduce(logs, axis=1)
+        log_density = search.log_density + float(log_prior[search.kinds].sum() + sums.sum())
+        odds = np.logaddexp.reduce(logs[:, 1:], axis=1) - logs[:, 0]
+        return GrossErrors(log_density, odds, prior.inflations[search.kinds], search.weighted)
+
+
+class FurtherColumns:
+    """Columns (n, k) beside those of a model of rows.
+
+    Parameters
+    ----------
+    rows : PointRows
+    columns : (n, k) array
+    weighted : (n, k) array, optional
+        `S_0^-1 G`, if it is known.
+    """
+
+    def __init__(self, rows: PointRows, columns: Floats, weighted: Floats | None = None) -> None:
+        weighted = rows.model.precision_times(columns) if weighted is None else weighted
+        values, vectors = np.linalg.eigh(columns.T @ weighted)
+        #: `l` (k,) and `D` (n, k).
+        self.values, self.dual = np.maximum(values, 0.0), weighted @ vectors
+        #: Of each group of points, products of the rows of `D`.
+        self.products = [products_of_rows(self.dual, group.rows) for group in rows.groups]
 
 
 def with_gross_errors(
-    model: GaussianModel,
-    residual: Floats,
-    points: Sequence[Ints],
-    prior: Outliers,
-    sweeps: int = 10,
-    start: Floats | None = None,
+    model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers, start: Floats | None = None
 ) -> GrossErrors:
-    """Density of residuals where some points may be gross errors.
+    """Density of residuals where some points may be gross errors; see `PointRows` and its method of this name.
 
     Parameters
     ----------
@@ -89,28 +208,10 @@ def with_gross_errors(
     points : sequence of int arrays
         Rows of each point; rows of none are never gross errors.
     prior : Outliers
-    sweeps : int
-        Passes over the points at most. The point whose odds change sides the most goes first.
     start : (g,) array, optional
         The most probable inflation of each point under a hypothesis that is nearly the same; all are sound by default.
     """
-    search = _Search(model, residual, points, prior)
-    if start is not None and (start > 1.0).any():
-        search.begin_with(np.searchsorted(prior.inflations, start))
-    log_prior = prior.log_probabilities
-    numbers = np.arange(len(points))
-    for _ in range(sweeps * max(len(points), 1)):
-        logs = search.log_ratios() + log_prior
-        logs -= logs[numbers, search.kinds][:, None]
-        best = np.argmax(logs, axis=1)
-        if not (best != search.kinds).any():
-            break
-        worst = int(np.argmax(logs[numbers, best]))
-        search.change(worst, int(best[worst]))
-    sums = np.logaddexp.reduce(logs, axis=1)
-    log_density = search.log_density() + float(log_prior[search.kinds].sum() + sums.sum())
-    odds = np.logaddexp.reduce(logs[:, 1:], axis=1) - logs[:, 0]
-    return GrossErrors(log_density, odds, prior.inflations[search.kinds])
+    return PointRows(model, residual, points).with_gross_errors(prior, start)
 
 
 def columns_of_inflation(model: GaussianModel, points: Sequence[Ints], inflation: Floats) -> Floats:
@@ -124,37 +225,34 @@ def columns_of_inflation(model: GaussianModel, points: Sequence[Ints], inflation
     return np.concatenate(blocks, axis=1)
 
 
-@dataclass(frozen=True, eq=False)
-class _Group:
-    """Points with equally many rows: numbers (g,), rows (g, d), noise (g, d, d), and `P_ii` if all are sound."""
-
-    numbers: Ints
-    rows: Ints
-    noise: Floats
-    precision: Floats
-
-
 class _Search:
     """The inflation of each point, and the inverse of the covariance with them, as updates of that with none.
 
     With the rows R of all gross errors, `P = P_0 - P_0[:, R] (Delta_R^-1 + P_0[R, R])^-1 P_0[R, :]` (Woodbury) is
-    `P_0 - Z Z^T`, to which points are added as by Cholesky's method.
+    `P_0 - Z Z^T`, to which points are added as by Cholesky's method. Further columns are in `Z`, too.
     """
 
-    def __init__(self, model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> None:
-        self.kinds = np.zeros(len(points), dtype=np.int64)
-        self._model, self._points = model, points
+    def __init__(self, rows: PointRows, prior: Outliers, further: FurtherColumns | None, length: float) -> None:
+        self.kinds = np.zeros(len(rows.points), dtype=np.int64)
+        self._rows = rows
         # variance with each inflation, in units of that of a sound point
         self._variances = prior.inflations**2
-        sizes = np.array([len(rows) for rows in points], dtype=np.int64)
-        self._groups = []
-        for size in np.unique(sizes).tolist():
-            numbers = np.flatnonzero(sizes == size)
-            rows = np.array([points[number] for number in numbers.tolist()])
-            self._groups.append(_Group(numbers, rows, model.noise_blocks(rows), model.precision_blocks(rows)))
-        self._sound = model.precision_times(residual)
-        self._log_sound = float(model.log_density(residual))
-        self._begin()
+        self._Z = np.zeros((len(rows.residual), 0))
+        self.weighted, self.log_density = rows.weighted, rows.log_density
+        self._precisions = [group.precision for group in rows.groups]
+        if further is not None:
+            self._add_columns(further, length)
+        self._sound = self._Z, self.weighted, self.log_density, self._precisions
+        self.begin_with(self.kinds)
+
+    def _add_columns(self, further: FurtherColumns, length: float) -> None:
+        lengthened = 1.0 + length**2 * further.values
+        weights, projected = length**2 / lengthened, further.dual.T @ self._rows.residual
+        self._Z = further.dual * np.sqrt(weights)
+        self.weighted = self.weighted - further.dual @ (weights * projected)
+        self.log_density += 0.5 * float(weights @ projected**2) - 0.5 * float(np.log(lengthened).sum())
+        pairs = zip(self._precisions, further.products, strict=True)
+        self._precisions = [P - (products @ weights).reshape(P.shape) for P, products in pairs]
 
     def change(self, number: int, kind: int) -> None:
         """Give a point another inflation."""
@@ -168,51 +266,43 @@ class _Search:
     def begin_with(self, kinds: Ints) -> None:
         """Give all points their inflations at once."""
         self.kinds = kinds.copy()
-        self._begin()
+        self._Z, weighted, self.log_density, precisions = self._sound
+        self.weighted, self._precisions = weighted.copy(), [precision.copy() for precision in precisions]
         self._inflate(np.flatnonzero(kinds).tolist())
-
-    def _begin(self) -> None:
-        """With all points sound."""
-        self._Z = np.zeros((len(self._sound), 0))
-        self._weighted, self._precisions = self._sound.copy(), [group.precision.copy() for group in self._groups]
-        self._log_change = 0.0
 
     def _inflate(self, numbers: Sequence[int]) -> None:
         """Add the rows of some points to `Z`, and what follows to the inverse and the log density."""
         if not numbers:
             return
-        R = np.concatenate([self._points[number] for number in numbers])
-        P_0 = self._model.precision_columns(R)
+        points, model = self._rows.points, self._rows.model
+        R = np.concatenate([points[number] for number in numbers])
+        P_0 = model.precision_columns(R)
         columns = P_0 - self._Z @ self._Z[R].T
         inner, at, log_determinant = columns[R], 0, 0.0
         for number in numbers:
-            rows = self._points[number]
+            rows = points[number]
             part = slice(at, at := at + len(rows))
-            increase = (self._variances[self.kinds[number]] - 1.0) * self._model.noise_blocks(rows[None])[0]
+            increase = (self._variances[self.kinds[number]] - 1.0) * model.noise_blocks(rows[None])[0]
             inner[part, part] += np.linalg.inv(increase)
             log_determinant += float(np.linalg.slogdet(increase)[1])
         factor = np.linalg.cholesky(inner)
         inverse = np.linalg.inv(factor)
-        added, residual = columns @ inverse.T, inverse @ self._weighted[R]
+        added, residual = columns @ inverse.T, inverse @ self.weighted[R]
         self._Z = np.concatenate([self._Z, added], axis=1)
-        self._weighted -= added @ residual
-        for group, precision in zip(self._groups, self._precisions, strict=True):
+        self.weighted -= added @ residual
+        for group, precision in zip(self._rows.groups, self._precisions, strict=True):
             of_points = added[group.rows]
             precision -= np.einsum("gik,gjk->gij", of_points, of_points)
         log_determinant += 2.0 * float(np.log(np.diag(factor)).sum())
-        self._log_change += 0.5 * float(residual @ residual) - 0.5 * log_determinant
+        self.log_density += 0.5 * float(residual @ residual) - 0.5 * log_determinant
 
     def log_ratios(self) -> Floats:
         """Log density (g, k) with every inflation of each point, less that with its current one."""
         logs = np.empty((len(self.kinds), len(self._variances)))
-        for group, precision in zip(self._groups, self._precisions, strict=True):
+        for group, precision in zip(self._rows.groups, self._precisions, strict=True):
             changes = self._variances - self._variances[self.kinds[group.numbers]][:, None]
-            logs[group.numbers] = _log_ratios(self._weighted[group.rows], precision, group.noise, changes)
+            logs[group.numbers] = _log_ratios(self.weighted[group.rows], precision, group.noise, changes)
         return logs
-
-    def log_density(self) -> float:
-        """Of the rows, with the current inflations."""
-        return self._log_sound + self._log_change
 
 
 def _log_ratios(v: Floats, P: Floats, noise: Floats, changes: Floats) -> Floats:

@@ -10,7 +10,12 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
+from warpbrain.inference.gross_errors import (
+    FurtherColumns,
+    GrossErrors,
+    PointRows,
+    columns_of_inflation,
+)
 from warpbrain.inference.noise import outliers, scales
 
 #: The sum over scales ends where a term is below this part of the largest.
@@ -68,14 +73,17 @@ class Marginal:
         return self.model.columns.shape[1] - self.excess_columns
 
 
-def marginal(
-    model: GaussianModel,
-    residual: Floats,
-    points: Sequence[Ints],
-    scale: float = 1.0,
-    inflation: Floats | None = None,
-) -> Marginal:
-    """Evidence of residuals (n,).
+@dataclass(frozen=True, eq=False)
+class Summed:
+    """A sum over scales of the noise and over gross errors: its logarithm, and the most probable of both."""
+
+    log_evidence: float
+    scale: float
+    inflation: Floats
+
+
+class RowsAtScales:
+    """Rows under columns of given lengths and further ones of any, at all scales of the noise.
 
     Parameters
     ----------
@@ -85,36 +93,68 @@ def marginal(
         Less what is expected of the causes.
     points : sequence of int arrays
         Rows of each point.
-    scale : float
-        A factor on the noise near the most probable one, where the sum begins.
-    inflation : (g,) array, optional
-        Of gross errors under a hypothesis that is nearly the same.
+    further : (n, k) array, optional
     """
-    values, log_prior = scales()
-    logs = np.full(len(values), -np.inf)
-    inflations: dict[int, Floats] = {}
 
-    def add_scale(number: int) -> None:
-        scaled = model.with_scale(float(values[number]))
-        at_scale = with_gross_errors(scaled, residual, points, outliers(), start=inflation)
-        logs[number], inflations[number] = at_scale.log_density + log_prior[number], at_scale.inflation
+    def __init__(
+        self, model: GaussianModel, residual: Floats, points: Sequence[Ints], further: Floats | None = None
+    ) -> None:
+        self._model, self._residual, self._points, self._further = model, residual, points, further
+        self._values, self._log_prior = scales()
+        self._weighted = model.precision_at(residual)
+        self._weighted_further = None if further is None else model.precision_at(further)
+        self._at: dict[float, tuple[PointRows, FurtherColumns | None]] = {}
 
-    first = int(np.argmin(np.abs(np.log(values / scale))))
-    add_scale(first)
-    for step in (-1, 1):
-        number = first + step
-        while 0 <= number < len(values):
-            add_scale(number)
-            if logs[number] < logs.max() + np.log(_NEGLIGIBLE):
-                break
-            number += step
-    best = int(np.argmax(logs))
-    at_best = model.with_scale(float(values[best]))
-    columns = columns_of_inflation(at_best, points, inflations[best])
-    return Marginal(
-        float(np.logaddexp.reduce(logs)),
-        at_best.scale,
-        inflations[best],
-        at_best.with_columns(columns),
-        columns.shape[1],
-    )
+    def summed(self, length: float = 1.0, scale: float = 1.0, inflation: Floats | None = None) -> Summed:
+        """The evidence where the further columns are so many times as long.
+
+        Parameters
+        ----------
+        length : float
+        scale : float
+            A factor on the noise near the most probable one, where the sum begins.
+        inflation : (g,) array, optional
+            Of gross errors under a hypothesis that is nearly the same.
+        """
+        values = self._values
+        logs, inflations = np.full(len(values), -np.inf), [np.zeros(0)] * len(values)
+
+        def add_scale(number: int, near: Floats | None) -> None:
+            at_scale = self.with_gross_errors(float(values[number]), length, near)
+            logs[number], inflations[number] = at_scale.log_density + self._log_prior[number], at_scale.inflation
+
+        first = int(np.argmin(np.abs(np.log(values / scale))))
+        add_scale(first, inflation)
+        for step in (-1, 1):
+            number = first + step
+            while 0 <= number < len(values):
+                add_scale(number, inflations[first])
+                if logs[number] < logs.max() + np.log(_NEGLIGIBLE):
+                    break
+                number += step
+        best = int(np.argmax(logs))
+        return Summed(float(np.logaddexp.reduce(logs)), float(values[best]), inflations[best])
+
+    def with_gross_errors(self, scale: float, length: float = 1.0, start: Floats | None = None) -> GrossErrors:
+        """At one scale, with further columns so many times as long."""
+        if scale not in self._at:
+            rows = PointRows(self._model.with_scale(scale), self._residual, self._points, self._weighted(scale))
+            further = None
+            if self._further is not None and self._weighted_further is not None:
+                further = FurtherColumns(rows, self._further, self._weighted_further(scale))
+            self._at[scale] = rows, further
+        rows, further = self._at[scale]
+        return rows.with_gross_errors(outliers(), start, further, length)
+
+
+def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], scale: float = 1.0) -> Marginal:
+    """Evidence of residuals (n,) under a model; see `RowsAtScales`."""
+    return marginal_of(model, points, RowsAtScales(model, residual, points).summed(scale=scale))
+
+
+def marginal_of(model: GaussianModel, points: Sequence[Ints], summed: Summed) -> Marginal:
+    """What a sum has come to, with the columns of the hypothesis at any scale."""
+    at_best = model.of_noise(model.columns, summed.scale)
+    excess = columns_of_inflation(at_best, points, summed.inflation)
+    with_excess = model.of_noise(np.column_stack([model.columns, excess]), summed.scale)
+    return Marginal(summed.log_evidence, summed.scale, summed.inflation, with_excess, excess.shape[1])

@@ -48,7 +48,7 @@ class SparseFactors:
         pattern.sum_duplicates()
         factors: rslab.Ldlt | rslab.Lu
         if symmetric:
-            factors = rslab.ldlt(pattern, threads=thread_count())
+            factors = _analysed(pattern).factor(pattern.data)
             self.is_definite = factors.inertia[0] == matrix.shape[0]
         else:
             factors = rslab.lu(pattern, threads=thread_count())
@@ -71,6 +71,24 @@ class SparseFactors:
         columns = np.asarray(columns, dtype=np.float64)
         solution = np.asarray(self._solve(np.asfortranarray(columns.reshape(len(columns), -1))))
         return solution.reshape(columns.shape)
+
+
+#: Symbolic analyses of the last symmetric patterns, a quarter of the work each: a body has one for all of its states.
+_analyses: list[tuple[int, Any, Any]] = []
+_KEPT = 4
+
+
+def _analysed(lower: Any) -> Any:
+    """The symbolic analysis of a lower triangle, SciPy CSC without duplicates; it does not depend on the values."""
+    import rslab
+
+    for threads, known, analysis in _analyses:
+        same = threads == thread_count() and np.array_equal(known.indptr, lower.indptr)
+        if same and np.array_equal(known.indices, lower.indices):
+            return analysis
+    analysis = rslab.analyze(lower, path="ldlt", threads=thread_count())
+    _analyses[:] = [(thread_count(), lower, analysis), *_analyses[: _KEPT - 1]]
+    return analysis
 
 
 #: Whether RSLAB was used, and whether this is a fork of a process in which it was: its threads do not live on in a

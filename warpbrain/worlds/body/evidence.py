@@ -15,11 +15,8 @@ from functools import cache
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import beliefs
-from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
-from warpbrain.inference.marginal import Marginal, marginal
-from warpbrain.inference.noise import outliers
+from warpbrain.inference.marginal import Marginal, RowsAtScales, Summed, marginal_of
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 
@@ -47,30 +44,30 @@ def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.
         With these columns and the most probable noise; its log evidence is the mean over all sizes.
     """
     nuisances, fractions = base.nuisances, beliefs("mesh.unknown")
+    part = nuisances.part(UNKNOWN_MESH)
     # of nothing that moves, or where no displacement was recorded, there is one size
     moving = nuisances.families[-1].columns.any()
+    fractions = fractions if moving else np.ones(1)
+    others = np.delete(columns, np.r_[part], axis=1) if moving else columns
+    models, relative = [noise.of_noise(others) for noise in base.noises], None
     if moving:
-        unknown = _displacement(base, columns, residual, scale)[:, None] * nuisances.relative
-    else:
-        fractions, unknown = np.ones(1), nuisances.families[-1].columns
-    weighed: dict[tuple[int, int], tuple[Floats, Marginal]] = {}
-    columns = nuisances.with_family(UNKNOWN_MESH, columns, unknown)
-    lengths = np.ones(columns.shape[1])
+        as_given = RowsAtScales(models[0], residual, base.points, columns[:, part]).with_gross_errors(scale)
+        moved = _displacement(base, residual - others @ (others.T @ as_given.weighted))
+        relative = moved[:, None] * nuisances.relative
 
     @cache
-    def of_noise(number: int) -> GaussianModel:
-        return base.noises[number].of_noise(columns)
+    def rows(noise: int) -> RowsAtScales:
+        return RowsAtScales(models[noise], residual, base.points, relative)
+
+    summed: dict[tuple[int, int], Summed] = {}
 
     def log_evidence(fraction: int, noise: int) -> float:
-        if (fraction, noise) not in weighed:
-            lengths[nuisances.part(UNKNOWN_MESH)] = fractions[fraction]
-            model = of_noise(noise).with_lengths(lengths)
+        if (fraction, noise) not in summed:
             # gross errors are nearly the same whatever the smooth part; what is not resolved may look like some
-            known = next((result for (_, other), (_, result) in weighed.items() if other == noise), None)
+            known = next((result for (_, other), result in summed.items() if other == noise), None)
             near = (scale, None) if known is None else (known.scale, known.inflation)
-            result = marginal(model, residual, base.points, *near)
-            weighed[fraction, noise] = (model.columns, result)
-        return weighed[fraction, noise][1].log_evidence
+            summed[fraction, noise] = rows(noise).summed(float(fractions[fraction]), *near)
+        return summed[fraction, noise].log_evidence
 
     first = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction))))
     by_fraction = _around(lambda number: log_evidence(number, 0), first, len(fractions))
@@ -81,20 +78,17 @@ def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.
         by_fraction = _around(lambda number: log_evidence(number, noise), best, len(fractions))
         best = int(np.argmax(by_fraction))
     # as if the evidence were a product of what depends on one size, and on the other
-    best_columns, found = weighed[best, noise]
+    if relative is not None:
+        columns = nuisances.with_family(UNKNOWN_MESH, columns, fractions[best] * relative)
+    found = marginal_of(base.noises[noise].of_noise(columns), base.points, summed[best, noise])
     means = [float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs.max()) for logs in (by_fraction, by_noise)]
-    return best_columns, replace(found, log_evidence=found.log_evidence + sum(means))
+    return columns, replace(found, log_evidence=found.log_evidence + sum(means))
 
 
-def _displacement(base: Base, columns: Floats, residual: Floats, scale: float) -> Floats:
-    """Of the rows under a hypothesis (n,) [m], all that was recorded of a point: no less than at the base."""
-    model = base.noises[0].of_noise(columns).with_scale(scale)
-    inflation = with_gross_errors(model, residual, base.points, outliers()).inflation
-    excess = columns_of_inflation(model, base.points, inflation)
-    z = model.with_columns(excess).coefficients(residual)[0][: columns.shape[1]]
-    z[base.nuisances.part(UNKNOWN_MESH)] = 0.0
+def _displacement(base: Base, left: Floats) -> Floats:
+    """Of the rows (n,) [m], all that was recorded of a point, where some is left (n,): no less than at the base."""
     sensors = base.at.sensors
-    explained = sensors.residual + sensors.computed - (residual - columns @ z)
+    explained = sensors.residual + sensors.computed - left
     moved = np.sqrt(np.bincount(sensors.groups, explained**2))[sensors.groups]
     return np.where(sensors.is_displacement, np.maximum(moved, base.nuisances.displacement), 0.0)
 

@@ -24,6 +24,7 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
 from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about
+from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.mesh_share import MeshShare, mesh_share_of
 from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH
@@ -40,9 +41,9 @@ _DIFFERENCE = 0.05
 _KEPT = 9
 #: Steps shorter than this in standard deviations of the prior end the search.
 _SHORT = 0.03
-#: By what part an error of the mesh changes that is worth going on, and by how much [standard deviations of the noise,
-#: all sensors together].
-_SAME_MESH, _MATTERS = 0.05, 0.3
+#: By how much an error of the mesh changes that is worth going on [standard deviations: of the noise, all sensors
+#: together, and of what is not known of that error].
+_MATTERS = 0.3
 
 
 class FitSearch:
@@ -87,6 +88,8 @@ class FitSearch:
         # nonlinear coordinates and displacements of states of this fit
         self._solved: list[tuple[Floats, Floats]] = []
         self._mesh_share: MeshShare | None = None
+        # coefficients (k,) at which that was computed in this fit
+        self._share_computed_at: Floats | None = None
         # the state that was linearised last, and the coordinates of that of the columns
         self._nearby = base.at
         self._linearised_at = np.full(len(self._layout.nonlinear), np.inf)
@@ -109,8 +112,14 @@ class FitSearch:
                 if number == len(starts) and not np.isfinite(self._best):
                     raise
 
-    def begin_at(self, subset: Refit) -> Floats:
+    def begin_at(self, subset: Refit, about: Linearisation | None = None) -> Floats:
         """Take the columns for those about a fit with the first of the effects, or all; keep its share of the mesh.
+
+        Parameters
+        ----------
+        subset : Refit
+        about : Linearisation, optional
+            Of its state, if it was linearised.
 
         Returns
         -------
@@ -125,12 +134,13 @@ class FitSearch:
         sizes = [float(np.linalg.norm(columns[:, part])) for columns in (subset.columns, self.columns)]
         z[part] *= sizes[0] / sizes[1] if sizes[1] else 1.0
         z[first : first + len(coefficients)] = coefficients
-        self._linearised_at = z
+        self._linearised_at, self._nearby = z, about or self._nearby
         # a place that leads to no state nearby is given up soon: from rest, in load steps, that takes minutes
         self._solved = [(z[self._layout.nonlinear], subset.state.u)]
         if subset.mesh_share is not None:
             share = subset.mesh_share.extended(len(self.z) - first)
             self._take_mesh_share(share, z[first:])
+            self._outdated = True
         return z
 
     def _take_mesh_share(self, share: MeshShare, z: Floats) -> None:
@@ -142,7 +152,7 @@ class FitSearch:
         nuisances, unknown = self._base.nuisances, belief("mesh.share") * share.at(z)[:, None]
         self._U = nuisances.with_family(MESH_SHARE, self._U, unknown)
         self.columns = nuisances.with_family(MESH_SHARE, self.columns, unknown)
-        self._mesh_share, self._outdated = share, True
+        self._mesh_share = share
 
     def backtrack_to_base(self) -> None:
         """Move tissue and field toward the base while that is better: far from it the linear model may fail."""
@@ -171,6 +181,9 @@ class FitSearch:
                     self.columns = self._difference_columns()
             self.columns = self._rigid.renewed(self.columns, self.state.sensors, self.z)
             step, current = self._gauss_newton_step(by_differences), np.array_equal(self._linearised_at, self.z)
+            self.converged = bool(np.abs(step).max() < _SHORT)
+            if self.converged:
+                return
             if not self._line_search(step):
                 if relinearise and not current and np.abs(step).max() >= 2.0 * _SHORT:
                     # columns that were made elsewhere may point uphill
@@ -193,7 +206,7 @@ class FitSearch:
         self._marginal, self._noise = marginal, marginal.noise
         part = nuisances.part(UNKNOWN_MESH)
         unknown, before = fit.columns[:, part], self.columns[:, part]
-        if np.linalg.norm(unknown - before) > _SAME_MESH * np.linalg.norm(before):
+        if np.linalg.norm(unknown - before) > _MATTERS * np.linalg.norm(before):
             same = False
             self.residual = self.residual + before @ self.z[part] - unknown @ fit.nuisances[part]
             self.z = self.z.copy()
@@ -208,17 +221,32 @@ class FitSearch:
     def update_mesh_share(self, known: MeshErrors, finer: FinerStates) -> bool:
         """Compute the mechanisms' share of the mesh's error at the best point; whether it is another than was known.
 
-        None is known to be another where a finer mesh does not tell.
+        None is known to be another where a finer mesh does not tell. It is in proportion to the mechanisms: where
+        these have hardly changed it is not computed again.
         """
         coefficients, prior = [self.z[part] for part in self._layout.effects], self._base.prior
+        least = _MATTERS * belief("mesh.share")
+        if self._share_computed_at is not None:
+            offsets = [effect.offset(z) for effect, z in zip(self.effects, coefficients, strict=True)]
+            moved = float(np.linalg.norm(self.z[self._layout.coefficients] - self._share_computed_at))
+            if moved <= least * float(np.linalg.norm(np.concatenate(offsets))):
+                return False
         share = mesh_share_of(self.effects, coefficients, self.state, known, finer, prior)
         if share is None:
             return False
-        before, z = self._mesh_share, self.z[self._U.shape[1] :]
+        before, z = self._mesh_share, self.z[self._layout.coefficients]
+        self._share_computed_at = z
+        before_U = self._U
         self._take_mesh_share(share, z)
-        change = share.at(z) - (0.0 if before is None else before.at(z))
-        size = float(np.linalg.norm(self._noise.whitened(share.at(z))))
-        return float(np.linalg.norm(self._noise.whitened(change))) > max(_MATTERS, _SAME_MESH * size)
+        change, by_coefficients = share.at(z), share.columns()
+        if before is not None:
+            change, by_coefficients = change - before.at(z), by_coefficients - before.columns()
+        self.columns[:, self._layout.coefficients] += by_coefficients
+        self._best = np.inf
+        residual = self.residual - change + (before_U - self._U) @ self.z[: self._U.shape[1]]
+        self._accept_if_better(self.z, self.state, residual)
+        size, changed = (float(np.linalg.norm(self._noise.whitened(each))) for each in (share.at(z), change))
+        return changed > max(_MATTERS, least * size)
 
     def result(self) -> Refit:
         """The fit at its best point."""

@@ -13,6 +13,7 @@ from warpbrain.inference.marginal import Marginal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.fit_search import FitSearch
+from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors
 from warpbrain.worlds.body.mesh_share import excess_error
 from warpbrain.worlds.body.refit import Refit
@@ -85,7 +86,6 @@ class Fitter:
         for _ in range(_ROUNDS):
             if self.mesh_errors is None or not self._mesh_error_changed(search, screened, self.mesh_errors):
                 break
-            search.start([search.z], search.state)
             search.minimise(relinearise=True)
         fit = search.result()
         for _ in range(_ROUNDS):
@@ -99,7 +99,7 @@ class Fitter:
             raise FloatingPointError("its evidence is not a number")
         return fit
 
-    def begin(self, effects: tuple[Effect, ...], refit: Refit) -> Refit:
+    def begin(self, effects: tuple[Effect, ...], refit: Refit, about: Linearisation | None) -> Refit:
         """State, residual and Laplace evidence with other effects at the coordinates of a fit, before any iteration.
 
         Parameters
@@ -108,6 +108,8 @@ class Fitter:
             As many as those of the fit, with as many coefficients each.
         refit : Refit
             Whose columns, noise and share of the mesh's error are kept.
+        about : Linearisation or None
+            Of its state, if it was linearised.
 
         Raises
         ------
@@ -115,16 +117,18 @@ class Fitter:
             If there is no equilibrium.
         """
         search = FitSearch(self.base, self.mesh_errors, effects, refit.columns, refit.marginal)
-        search.start([search.begin_at(refit)], refit.state)
+        search.start([search.begin_at(refit, about)], refit.state)
         return search.result()
 
     def _mesh_error_changed(self, search: FitSearch, screened: Marginal, known: MeshErrors) -> bool:
         """Compute the error of the mesh at the best point; whether the search has to go on with it."""
         if search.effects:
             return search.update_mesh_share(known, self.finer) or not search.converged
-        matters = self._update_mesh_errors(search.state, known, screened)
+        if not self._update_mesh_errors(search.state, known, screened):
+            return False
         search.mesh_errors = self.mesh_errors
-        return matters
+        search.start([search.z], search.state)
+        return True
 
     def _update_mesh_errors(self, state: SolvedState, known: MeshErrors, screened: Marginal) -> bool:
         """Take the error of the mesh from a fit without any cause, for all fits to come; whether it matters.

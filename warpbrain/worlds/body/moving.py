@@ -50,14 +50,21 @@ def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: fl
 def _moved_once(base: Base, fitter: Fitter, refit: Refit, step: float) -> Refit | None:
     """The fit with one mechanism a step from where it is; None if none is better."""
     begun = refit
-    for number in range(len(refit.effects)):
-        for effect in _elsewhere(base, refit.effects[number], step):
-            effects = (*refit.effects[:number], effect, *refit.effects[number + 1 :])
-            try:
-                tried = fitter.begin(effects, refit)
-            except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError):
-                continue
-            begun = max(begun, tried, key=lambda fit: fit.log_evidence)
+    tried = [
+        (*refit.effects[:number], effect, *refit.effects[number + 1 :])
+        for number in range(len(refit.effects))
+        for effect in _elsewhere(base, refit.effects[number], step)
+    ]
+    try:
+        # all states are near to that of the fit, whose factors lead to each
+        about = refit.state.linearised() if tried else None
+    except SolveError:
+        about = None
+    for effects in tried:
+        try:
+            begun = max(begun, fitter.begin(effects, refit, about), key=lambda fit: fit.log_evidence)
+        except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError):
+            continue
     if begun.log_evidence < refit.log_evidence + _BETTER:
         return None
     try:

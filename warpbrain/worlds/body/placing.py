@@ -14,7 +14,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.inference import GaussianModel
-from warpbrain.inference.gross_errors import with_gross_errors
+from warpbrain.inference.gross_errors import FurtherColumns, PointRows
 from warpbrain.inference.noise import outliers
 from warpbrain.mesh.extent import principal_axes
 from warpbrain.physics.proposal import Patch, Proposal
@@ -70,9 +70,11 @@ def best_in_cell(
         Less what is expected of all else.
     """
 
+    everywhere = PointRows(without, residual, base.points)
+
     def log_density(tried: Effect) -> float:
-        model = without.with_columns(tried.columns)
-        return with_gross_errors(model, residual - tried.mean, base.points, outliers()).log_density
+        rows = everywhere.less(tried.mean)
+        return rows.with_gross_errors(outliers(), further=FurtherColumns(rows, tried.columns)).log_density
 
     def logs_of(places: Sequence[Proposal]) -> tuple[list[Effect], Floats]:
         tried = [best, *(scaled(other, size) for other in _effects_of(effects, places))]
