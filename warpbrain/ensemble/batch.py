@@ -35,26 +35,14 @@ Ints = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class States:
-    """What is known of the state of each slot after a pass; arrays over all slots.
+    """What is known of the state of each slot after a pass; arrays over all slots."""
 
-    Attributes
-    ----------
-    ready : bool array
-        The state is new: the others are still being solved for, or empty.
-    min_J : array
-    unbalanced, internal : array
-        Norms of what is out of balance on the free components and of the internal forces [N].
-    cg_iterations : int array
-    cg_residual, cg_goal : array
-        Of the linear solve that led to the state.
-    """
-
-    ready: NDArray[np.bool_]
+    ready: NDArray[np.bool_]  # the state is new: the others are still being solved for, or empty
     min_J: Floats
-    unbalanced: Floats
-    internal: Floats
+    unbalanced: Floats  # norm of what is out of balance on the free components [N]
+    internal: Floats  # norm of the internal forces [N]
     cg_iterations: Ints
-    cg_residual: Floats
+    cg_residual: Floats  # of the linear solve that led to the state
     cg_goal: Floats
 
 

@@ -27,27 +27,14 @@ def code_of(material: Material) -> tuple[type[Law], str]:
 
 @dataclass(frozen=True)
 class BatchGroup:
-    """Elements that share a law and formulation.
-
-    Attributes
-    ----------
-    kernels : BatchedElementKernels
-    elements, tissue : wp.array of int
-        Elements, and which tissue of the group each is of.
-    parameters : wp.array2d
-        One row for a tissue and a slot, slots fastest.
-    rows : array
-        The same on the host, shape (tissues, slots, parameters).
-    known : mapping of int to array
-        Rows of each sample by its number, shape (tissues, parameters).
-    """
+    """Elements that share a law and formulation."""
 
     kernels: BatchedElementKernels
-    elements: wp.array
+    elements: wp.array  # elements, and which tissue of the group each is of
     tissue: wp.array
-    parameters: wp.array
-    rows: Floats
-    known: Mapping[int, Floats]
+    parameters: wp.array  # one row for a tissue and a slot, slots fastest
+    rows: Floats  # the same on the host, shape (tissues, slots, parameters)
+    known: Mapping[int, Floats]  # rows of each sample by its number, shape (tissues, parameters)
 
 
 class BatchMaterials:

@@ -37,17 +37,11 @@ def least_stretch(model: Model, device: str | None = None) -> float:
 
 @dataclass(frozen=True)
 class Overload:
-    """Samples that are too soft for the load, by `least_stretch`.
-
-    Attributes
-    ----------
-    numbers : tuple of int
-    share : float
-        Part of the load that leaves some tissue of every element of the softest one, in that estimate; 1 if none is
-        too soft, nan if it has no linear estimate.
-    """
+    """Samples that are too soft for the load, by `least_stretch`."""
 
     numbers: tuple[int, ...]
+    #: Part of the load that leaves some tissue of every element of the softest one, in that estimate; 1 if none is too
+    #: soft, nan if it has no linear estimate
     share: float
 
 

@@ -17,24 +17,12 @@ Slots = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is to become of the slots whose state is new.
+    """What is to become of the slots whose state is new."""
 
-    Attributes
-    ----------
-    go : array of int
-        They begin a step.
-    back : array of int
-        They go back to where their last step began.
-    done : array of int
-        Their samples have their answer.
-    failed : dict of int to str
-        Their samples have none, and why.
-    """
-
-    go: Slots
-    back: Slots
-    done: Slots
-    failed: dict[int, str]
+    go: Slots  # they begin a step
+    back: Slots  # they go back to where their last step began
+    done: Slots  # their samples have their answer
+    failed: dict[int, str]  # their samples have none, and why
 
 
 class Course(abc.ABC):

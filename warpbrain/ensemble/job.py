@@ -31,31 +31,15 @@ def _versions() -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Job:
-    """Samples of a model and the course that they take.
+    """Samples of a model and the course that they take."""
 
-    Attributes
-    ----------
-    model : Model
-        Its own materials are not used.
-    samples : tuple of Sample
-    steps : int or None
-        Time steps; None: to rest.
-    time_step : float
-        Of a motion [s].
-    tolerance : float
-        Of rest; see `warpbrain.simulation.relaxation.RelaxationOptions`.
-    precision : str
-        ``"double"`` or ``"single"``.
-    versions : dict of str
-        Of this machine's packages; a worker must have the same.
-    """
-
-    model: Model
+    model: Model  # its own materials are not used
     samples: tuple[Sample, ...]
-    steps: int | None = None
-    time_step: float = 0.001
-    tolerance: float = 1e-8
-    precision: str = "double"
+    steps: int | None = None  # time steps; None: to rest
+    time_step: float = 0.001  # of a motion [s]
+    tolerance: float = 1e-8  # of rest; see `warpbrain.simulation.relaxation.RelaxationOptions`
+    precision: str = "double"  # ``"double"`` or ``"single"``
+    #: Of this machine's packages; a worker must have the same
     versions: dict[str, str] = field(default_factory=_versions)
 
     def __post_init__(self) -> None:

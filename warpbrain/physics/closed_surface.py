@@ -10,21 +10,11 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class ClosedSurface:
-    """A closed surface of triangles.
+    """A closed surface of triangles."""
 
-    Parameters
-    ----------
-    file : str
-        Where it came from, for people.
-    points : (n, 3) array
-        [m]
-    faces : (k, 3) int array
-        Oriented in one way, inwards or outwards.
-    """
-
-    file: str
-    points: NDArray[np.float64] = field(repr=False, compare=False)
-    faces: NDArray[np.int32] = field(repr=False, compare=False)
+    file: str  # where it came from, for people
+    points: NDArray[np.float64] = field(repr=False, compare=False)  # (n, 3) [m]
+    faces: NDArray[np.int32] = field(repr=False, compare=False)  # (k, 3), oriented in one way, inwards or outwards
 
     def __str__(self) -> str:
         return self.file

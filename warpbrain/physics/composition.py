@@ -61,23 +61,12 @@ def require_left(acting: Sequence[Mechanism], mesh: TetMesh) -> TetMesh:
 
 @dataclass(frozen=True)
 class Pair:
-    """What two kinds of mechanisms, or one twice, are together.
-
-    Attributes
-    ----------
-    kinds : (str, str)
-    potential : str
-        The total potential with both, as a formula; empty if a case cannot have both.
-    remark : str
-        What the formula leaves open; empty if nothing.
-    refused : str
-        Where, or why, a case cannot have both; empty if it always can.
-    """
+    """What two kinds of mechanisms, or one twice, are together."""
 
     kinds: tuple[str, str]
-    potential: str
-    remark: str
-    refused: str
+    potential: str  # the total potential with both, as a formula; empty if a case cannot have both
+    remark: str  # what the formula leaves open; empty if nothing
+    refused: str  # where, or why, a case cannot have both; empty if it always can
 
 
 def pairs() -> list[Pair]:

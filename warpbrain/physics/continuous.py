@@ -31,22 +31,11 @@ _AXES = "xyz"
 
 @dataclass(frozen=True)
 class Continuous:
-    """A number of a mechanism.
+    """A number of a mechanism."""
 
-    Attributes
-    ----------
-    kind : str
-        Of the mechanism.
-    key : str
-        Name of the parameter.
-    component : int or None
-        Of a position, a vector or numbers.
-    says : Says
-    """
-
-    kind: str
-    key: str
-    component: int | None
+    kind: str  # of the mechanism
+    key: str  # name of the parameter
+    component: int | None  # of a position, a vector or numbers
     says: Says
 
     @property

@@ -21,22 +21,14 @@ from warpbrain.physics.term import Body, Term
 
 @dataclass(frozen=True)
 class ExtraEnergy:
-    """Device functions of an added energy; see `warpbrain.kernels.extra_energy`.
+    """Device functions of an added energy; see `warpbrain.kernels.extra_energy`."""
 
-    Attributes
-    ----------
-    key : str
-        Part of the name of the compiled module.
-    energy, stress, moduli : wp.func
-    goes_with : str
-        ``"moduli"``: times the factor on the moduli of an element (fibres); ``"tissue"``: times the part of it that is
-        left (a tension, which is no modulus).
-    """
-
-    key: str
+    key: str  # part of the name of the compiled module
     energy: Any
     stress: Any
     moduli: Any
+    #: ``"moduli"``: times the factor on the moduli of an element (fibres); ``"tissue"``: times the part of it that is
+    #: left (a tension, which is no modulus)
     goes_with: str = "moduli"
 
 

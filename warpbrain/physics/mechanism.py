@@ -69,53 +69,25 @@ KINDS = ("number", "text", "node set", "element set", "directions", "surface", "
 
 @dataclass(frozen=True)
 class Says:
-    """What is known of a parameter.
+    """What is known of a parameter."""
 
-    Attributes
-    ----------
-    doc : str
-        One sentence.
-    kind : str
-        One of `KINDS`.
-    unit : str
-        In which users give it.
-    si : float
-        How many of its SI unit one of these is.
-    above, below : float
-        Limits in the user's unit, themselves not allowed.
-    choices : tuple of str
-    needed : bool
-        Whether a case must give it, whatever default the class has.
-    absent : str
-        What it is taken to be where a case does not give it, in words, if that is not the default of the class.
-    expectation : Expectation or None
-        In the user's unit; None: never estimated.
-    typical : str
-        Range in the literature, with unit.
-    source : str
-    size : float
-        By how much it must change to change much where it is zero and nothing is expected of it, in the user's unit.
-    method : bool
-        It is a setting of the method, or weighed and known: never differentiated or estimated.
-    adds_up : bool
-        Of several numbers, whether their sum is a number of its own.
-    """
-
-    doc: str
-    kind: str = "number"
-    unit: str = ""
-    si: float = 1.0
-    above: float = -math.inf
+    doc: str  # one sentence
+    kind: str = "number"  # one of `KINDS`
+    unit: str = ""  # in which users give it
+    si: float = 1.0  # how many of its SI unit one of these is
+    above: float = -math.inf  # limits in the user's unit, themselves not allowed
     below: float = math.inf
     choices: tuple[str, ...] = ()
-    needed: bool = False
+    needed: bool = False  # whether a case must give it, whatever default the class has
+    #: What it is taken to be where a case does not give it, in words, if that is not the default of the class
     absent: str = ""
-    expectation: Expectation | None = None
-    typical: str = ""
+    expectation: Expectation | None = None  # in the user's unit; None: never estimated
+    typical: str = ""  # range in the literature, with unit
     source: str = ""
+    #: By how much it must change to change much where it is zero and nothing is expected of it, in the user's unit
     size: float = 1.0
-    method: bool = False
-    adds_up: bool = False
+    method: bool = False  # it is a setting of the method, or weighed and known: never differentiated or estimated
+    adds_up: bool = False  # of several numbers, whether their sum is a number of its own
 
 
 def parameter(doc: str, *, default: Any = dataclasses.MISSING, **known: Any) -> Any:
@@ -141,39 +113,20 @@ class ParameterError(InputError):
 
 @dataclass(frozen=True)
 class Reading:
-    """How the size of a mechanism can be read, without what it does to tissue.
+    """How the size of a mechanism can be read, without what it does to tissue."""
 
-    Attributes
-    ----------
-    error : float
-        Standard deviation [SI].
-    words : str
-        What is read, and how well.
-    """
-
-    error: float
-    words: str
+    error: float  # standard deviation [SI]
+    words: str  # what is read, and how well
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What a mechanism may know of the case that assumes it.
+    """What a mechanism may know of the case that assumes it."""
 
-    Attributes
-    ----------
-    mesh : TetMesh
-        The imaged anatomy, whole.
-    gravity_axis : (float, float, float) or None
-    density : float
-        [kg/m3]
-    removing : tuple of Mechanism
-        What else the case assumes that removes elements.
-    """
-
-    mesh: TetMesh
+    mesh: TetMesh  # the imaged anatomy, whole
     gravity_axis: tuple[float, float, float] | None = None
-    density: float = 1211.5
-    removing: tuple[Mechanism, ...] = ()
+    density: float = 1211.5  # [kg/m3]
+    removing: tuple[Mechanism, ...] = ()  # what else the case assumes that removes elements
 
     @cached_property
     def left(self) -> TetMesh:

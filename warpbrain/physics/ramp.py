@@ -17,14 +17,9 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Ramped:
-    """Something that acts with a factor over time.
+    """Something that acts with a factor over time."""
 
-    Parameters
-    ----------
-    ramp : sequence of (time, factor)
-        Factor over time [s], linear between the points and constant outside them; 1 if empty.
-    """
-
+    #: Factor over time [s], linear between the points and constant outside them; 1 if empty
     ramp: Sequence[tuple[float, float]] = field(default=())
 
     def __post_init__(self) -> None:

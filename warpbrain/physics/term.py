@@ -101,28 +101,17 @@ class Coupling:
 
     Of the forces `-(db/du)^T p`, blocks can hold what they do at the same `p`. That `p` changes with `u` adds
     `(db/du)^T A^-1 (db/du)`, which is dense: linear solvers take `A` and `db/du` themselves.
-
-    Attributes
-    ----------
-    offsets, columns : wp.array of int
-        Sparse rows; a node without unknown has none.
-    compliance : wp.array
-        `A_ij`, positive definite.
-    yielding : wp.array
-        About `(db/du) K^-1 (db/du)^T`: how the solid gives way to `p`, in the same rows. Of a preconditioner, which no
-        solution depends on.
-    own, others : wp.array of vec3
-        `db_i/du_j` and `db_j/du_i`.
-    content : wp.array
-        `b(u) + A p` where the term advanced last, without what flowed in that step; zero once it has forgotten.
     """
 
-    offsets: wp.array
+    offsets: wp.array  # sparse rows; a node without unknown has none
     columns: wp.array
-    compliance: wp.array
+    compliance: wp.array  # `A_ij`, positive definite
+    #: About `(db/du) K^-1 (db/du)^T`: how the solid gives way to `p`, in the same rows. Of a preconditioner, which no
+    #: solution depends on.
     yielding: wp.array
-    own: wp.array
-    others: wp.array
+    own: wp.array  # `db_i/du_j`
+    others: wp.array  # `db_j/du_i`
+    #: `b(u) + A p` where the term advanced last, without what flowed in that step; zero once it has forgotten
     content: wp.array
 
 

@@ -33,17 +33,7 @@ from warpbrain.physics.term import Body
 
 @dataclass(frozen=True, kw_only=True)
 class Cavity(Mechanism):
-    """Tissue of an element set that is taken out gradually.
-
-    Parameters
-    ----------
-    elements : str
-        Element set.
-    pressure : float
-        Of the fluid in the cavity [Pa], relative to that on the rest of the surface.
-    left : float
-        Part of stiffness, weight and mass that is left in the end.
-    """
+    """Tissue of an element set that is taken out gradually."""
 
     elements: str = parameter("Element set that is taken out.", default="resection", kind="element set")
     pressure: float = parameter(
@@ -91,11 +81,9 @@ class Cavity(Mechanism):
         return faces
 
     def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
-        """See `warpbrain.physics.mechanism.Weakening`."""
         return self.remaining_part(mesh, scale)
 
     def remaining_part(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
-        """See `warpbrain.physics.mechanism.Emptying`."""
         return np.where(mesh.element_sets[self.elements], 1.0 - scale * (1.0 - self.left), 1.0)
 
     def excludes(self, other: Mechanism, mesh: TetMesh) -> str:
@@ -114,5 +102,4 @@ class Cavity(Mechanism):
         return f"where {other.kind} acts on tissue that the cavity takes out: nothing would be left to act on"
 
     def bind(self, body: Body) -> PressureTerm:
-        """See `warpbrain.physics.term.Following`."""
         return PressureTerm(body, self.wall(body.mesh), self.pressure, self.factor)

@@ -57,21 +57,7 @@ _SETTLED = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(Mechanism):
-    """Contact of a node set with a rigid surface.
-
-    Parameters
-    ----------
-    nodes : str
-        Node set.
-    state : str
-        One of `STATES`.
-    penalty : float
-        `k`, relative to the stiffness of a layer of surface elements.
-    friction : float
-        Coefficient.
-    surface : ClosedSurface, optional
-        Which the nodes stay inside of; the body's own if absent.
-    """
+    """Contact of a node set with a rigid surface."""
 
     nodes: str = parameter("Node set that touches the skull.", kind="node set")
     state: str = parameter("What it does there.", kind="text", choices=STATES, default="sliding")
@@ -135,14 +121,12 @@ class Contact(Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "radius" not in values:
             return []
         return [f"what lets go has a radius of {measured(values['radius'].value, values['radius'].sd, 'mm')}"]
 
     @property
     def lifts(self) -> bool:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         return self.state == "lifting"
 
     @classmethod
@@ -185,7 +169,6 @@ class Contact(Mechanism):
         return members, vertex_normals(mesh)[members]
 
     def bind(self, body: Body) -> "ContactTerm":
-        """See `warpbrain.physics.term.Following`."""
         return ContactTerm(body, self)
 
 

@@ -56,27 +56,9 @@ _LOOKED_FOR = 11
 
 @dataclass(frozen=True, kw_only=True)
 class Drainage(Mechanism):
-    """Fluid in the pores of tissue.
+    """Fluid in the pores of tissue."""
 
-    Parameters
-    ----------
-    permeability : float
-        `k` [m4/(N s)].
-    storage : float
-        `S` [1/Pa].
-    drained : str
-        Node set whose faces are open; empty: the whole surface.
-    pressure : float
-        Of the fluid at drained faces [Pa].
-    exchange : float
-        `k_c` [1/(Pa s)].
-    capillary_pressure : float
-        `p_c` [Pa].
-    elements : str
-        Element set that has pores; empty: all.
-    """
-
-    permeability: float = parameter(
+    permeability: float = parameter(  # `k`
         "Permeability over the viscosity of the fluid.",
         unit="m4/(N s)",
         above=0.0,
@@ -86,7 +68,7 @@ class Drainage(Mechanism):
         "and Bilston 2007), 5.6e-12 (Rey and Sarntinoranont 2018, who cite 1e-16 to 1e-7); 5e-12 grey, 1e-10 white "
         "(Paulsen 1999)",
     )
-    storage: float = parameter(
+    storage: float = parameter(  # `S`
         "Fluid that a pressure stores without a change of volume; zero if nothing is compressible.",
         default=0.0,
         unit="1/Pa",
@@ -100,7 +82,7 @@ class Drainage(Mechanism):
     pressure: float = parameter(
         "Pressure of the fluid at drained faces.", default=0.0, unit="Pa", expectation=Normal(0.0, 500.0)
     )
-    exchange: float = parameter(
+    exchange: float = parameter(  # `k_c`
         "Fluid that comes out of the blood vessels, for each Pa below the capillary pressure.",
         default=0.0,
         unit="1/(Pa s)",
@@ -108,7 +90,7 @@ class Drainage(Mechanism):
         # as much in 100 s
         size=1e-6,
     )
-    capillary_pressure: float = parameter(
+    capillary_pressure: float = parameter(  # `p_c`
         "Pressure at which nothing is exchanged with the blood vessels; lower under mannitol, higher in oedema.",
         default=0.0,
         unit="Pa",
@@ -202,7 +184,6 @@ class Drainage(Mechanism):
         return nodes & porous
 
     def bind(self, body: Body) -> "DrainageTerm":
-        """See `warpbrain.physics.term.Following`."""
         return DrainageTerm(body, self)
 
 

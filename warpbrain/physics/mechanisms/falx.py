@@ -30,17 +30,7 @@ from warpbrain.physics.triangle_term import TriangleTerm
 
 @dataclass(frozen=True, kw_only=True)
 class Falx(Mechanism):
-    """A membrane on the faces of a node set, inside the tissue or on its surface.
-
-    Parameters
-    ----------
-    nodes : str
-        Node set.
-    stiffness : float
-        Young's modulus [Pa].
-    thickness : float
-        [m]
-    """
+    """A membrane on the faces of a node set, inside the tissue or on its surface."""
 
     nodes: str = parameter("Node set of the membrane: faces of which all nodes are in it.", kind="node set")
     stiffness: float = parameter(
@@ -98,7 +88,6 @@ class Falx(Mechanism):
         return own
 
     def bind(self, body: Body) -> "MembraneTerm":
-        """See `warpbrain.physics.term.Following`."""
         return MembraneTerm(body, self)
 
 

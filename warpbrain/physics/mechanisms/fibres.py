@@ -92,23 +92,7 @@ _CODE = ExtraEnergy("fibres", _energy, _stress, _moduli)
 
 @dataclass(frozen=True, kw_only=True)
 class Fibres(Mechanism):
-    """Fibres in all tissue or in an element set.
-
-    Parameters
-    ----------
-    direction : (float, float, float), optional
-        Of any length but zero.
-    field : str
-        Vectors of the mesh's elements, in the place of one direction.
-    stiffness : float
-        `k1` [Pa].
-    exponent : float
-        `k2`.
-    dispersion : float
-        `d`, 0 to 1/3.
-    elements : str
-        Element set; empty: everywhere.
-    """
+    """Fibres in all tissue or in an element set."""
 
     direction: tuple[float, float, float] | None = parameter(
         "Direction of the fibres, if it is the same everywhere.", kind="vector", default=None
@@ -174,13 +158,11 @@ class Fibres(Mechanism):
 
     @classmethod
     def check_tests(cls, tests: Tests) -> None:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if tests.loads < 2:
             raise NotTestableError(f"needs {' and '.join(cls.needs)}")
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         known = {
             "stiffness": "their stiffness is",
             "exponent": "the exponent with which they stiffen is",
@@ -204,7 +186,6 @@ class Fibres(Mechanism):
         return np.asarray(self.stiffness / (2.0 * self.exponent) * np.expm1(self.exponent * E**2))
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
-        """See `warpbrain.physics.term.Following`."""
         elements = elements_of(body.mesh, self.elements)
         directions = element_directions(body.mesh, elements, self.direction, self.field)
         row = np.tile([self.stiffness, self.exponent, self.dispersion], (len(elements), 1))

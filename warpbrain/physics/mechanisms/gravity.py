@@ -219,7 +219,6 @@ class Gravity(BodyForce, Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         found = []
         if "csf_level" in values:
             level = values["csf_level"]

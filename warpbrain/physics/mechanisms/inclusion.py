@@ -29,17 +29,7 @@ _USUAL, _RADII = 1.2, (0.012, 0.018, 0.027)
 
 @dataclass(frozen=True, kw_only=True)
 class Inclusion(Mechanism):
-    """Another stiffness in an element set or a ball.
-
-    Parameters
-    ----------
-    ratio : float
-        Of the moduli there to those around, positive.
-    elements : str
-        Element set.
-    centre, radius : optional
-        A ball in its place [m].
-    """
+    """Another stiffness in an element set or a ball."""
 
     ratio: float = parameter(
         "Of its moduli to those of the tissue around.",
@@ -75,7 +65,6 @@ class Inclusion(Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "ratio" not in values or not values["ratio"].value > 0.0:
             return radius_in_words(values)
         ratio = values["ratio"]
@@ -85,7 +74,6 @@ class Inclusion(Mechanism):
 
     @classmethod
     def smallest_in_words(cls, smallest: Smallest) -> str:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if smallest.name != "ratio":
             return super().smallest_in_words(smallest)
         return f"from {number(1.0 + smallest.size)} times the stiffness around it"

@@ -55,15 +55,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Pressure(Mechanism):
-    """A pressure that follows the faces of a node set.
-
-    Parameters
-    ----------
-    nodes : str
-        Node set; its faces of the mesh's surface carry the pressure.
-    value : float
-        [Pa], positive pushes on the tissue.
-    """
+    """A pressure that follows the faces of a node set."""
 
     nodes: str = parameter("Node set whose faces carry it.", kind="node set")
     value: float = parameter(
@@ -119,7 +111,6 @@ class Pressure(Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "value" not in values:
             return []
         found = values["value"]
@@ -133,7 +124,6 @@ class Pressure(Mechanism):
         return [f"it is {measured(abs(found.value), found.sd, 'Pa')} {word} there than elsewhere, and {does}"]
 
     def bind(self, body: Body) -> "PressureTerm":
-        """See `warpbrain.physics.term.Following`."""
         return PressureTerm(body, self.faces(body.mesh), self.value, self.factor)
 
 

@@ -54,21 +54,9 @@ _CODE = ExtraEnergy("residual_stress", _energy, _stress, _moduli, "tissue")
 
 @dataclass(frozen=True, kw_only=True)
 class ResidualStress(Mechanism):
-    """A tension along a direction in all tissue or in an element set.
+    """A tension along a direction in all tissue or in an element set."""
 
-    Parameters
-    ----------
-    tension : float
-        `sigma` [Pa]; negative is compression.
-    direction : (float, float, float), optional
-        Of any length but zero.
-    field : str
-        Vectors of the mesh's elements, in the place of one direction.
-    elements : str
-        Element set; empty: everywhere.
-    """
-
-    tension: float = parameter(
+    tension: float = parameter(  # `sigma`
         "Stress before anything is done; negative is compression.",
         unit="Pa",
         expectation=Normal(0.0, 300.0),
@@ -117,7 +105,6 @@ class ResidualStress(Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "tension" not in values:
             return []
         tension, where = values["tension"], along(vector_in(values, "direction"))
@@ -127,7 +114,6 @@ class ResidualStress(Mechanism):
         return [f"{found}, {HARDLY}" if unsure(tension) else found]
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
-        """See `warpbrain.physics.term.Following`."""
         elements = elements_of(body.mesh, self.elements)
         directions = element_directions(body.mesh, elements, self.direction, self.field)
         row = np.full((len(elements), 1), self.tension)

@@ -27,19 +27,9 @@ _EVERYWHERE, _SOMEWHERE, _RADII = 0.03, 0.2, (0.012, 0.018, 0.027)
 
 @dataclass(frozen=True, kw_only=True)
 class Swelling(Mechanism):
-    """A change of volume of all tissue, of an element set or of a ball.
+    """A change of volume of all tissue, of an element set or of a ball."""
 
-    Parameters
-    ----------
-    amount : float
-        `g`, relative change of volume without stress; above -1.
-    elements : str
-        Element set; empty: everywhere.
-    centre, radius : optional
-        A ball in its place [m].
-    """
-
-    amount: float = parameter(
+    amount: float = parameter(  # `g`
         "Relative change of volume where nothing holds the tissue; negative shrinks.",
         unit="%",
         si=1e-2,
@@ -80,7 +70,6 @@ class Swelling(Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "amount" not in values:
             return radius_in_words(values)
         amount = values["amount"]
@@ -96,5 +85,4 @@ class Swelling(Mechanism):
         region_weights(mesh, self.elements, self.centre, self.radius)
 
     def growth(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
-        """See `warpbrain.physics.mechanism.Growing`."""
         return scale * self.amount * region_weights(mesh, self.elements, self.centre, self.radius)

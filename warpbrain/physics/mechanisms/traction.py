@@ -34,17 +34,7 @@ _KEPT = 1024
 
 @dataclass(frozen=True, kw_only=True)
 class Traction(Load, Mechanism):
-    """A traction around a point of the surface.
-
-    Parameters
-    ----------
-    centre : (float, float, float)
-        Point [m].
-    value : (float, float, float)
-        Traction at the centre [Pa].
-    radius : float
-        Where it has fallen to zero [m].
-    """
+    """A traction around a point of the surface."""
 
     centre: tuple[float, float, float] = parameter("Point of the surface around which it acts.", kind="position")
     value: tuple[float, float, float] = parameter(
@@ -91,7 +81,6 @@ class Traction(Load, Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "value_size" not in values:
             return radius_in_words(values)
         size = values["value_size"]

@@ -52,17 +52,9 @@ _LEAST = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Viscoelasticity(Mechanism):
-    """Branches of a Prony series, in all tissues.
+    """Branches of a Prony series, in all tissues."""
 
-    Parameters
-    ----------
-    moduli : tuple of floats
-        `beta_i`, relative to the case's own shear modulus; positive.
-    times : tuple of floats
-        `tau_i` [s], as many; positive.
-    """
-
-    moduli: tuple[float, ...] = parameter(
+    moduli: tuple[float, ...] = parameter(  # `beta_i`
         "Modulus of each branch, relative to the case's own, which is what is left in the end.",
         kind="numbers",
         expectation=LogNormal(1.0, 2.7),
@@ -70,7 +62,7 @@ class Viscoelasticity(Mechanism):
         typical="0.7 kPa left and 2.0 kPa that relax in 9.7 s (cortex); 0.3 and 0.9 kPa, 14.9 s (corona radiata)",
         source="Budday et al. 2017 (diagnosis design, M8)",
     )
-    times: tuple[float, ...] = parameter(
+    times: tuple[float, ...] = parameter(  # `tau_i`
         "Relaxation time of each branch.",
         kind="numbers",
         unit="s",
@@ -136,7 +128,6 @@ class Viscoelasticity(Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         found = []
         if "moduli" in values:
             moduli = values["moduli"]
@@ -159,7 +150,6 @@ class Viscoelasticity(Mechanism):
 
     @classmethod
     def smallest_in_words(cls, smallest: Smallest) -> str:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if not smallest.name.startswith("moduli"):
             return super().smallest_in_words(smallest)
         return f"from a tissue that at first is {number(1.0 + smallest.size)} times as stiff as in the end"
@@ -173,11 +163,9 @@ class Viscoelasticity(Mechanism):
         return cls(moduli=tuple(moduli[order].tolist()), times=tuple(times[order].tolist()))
 
     def branches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """See `warpbrain.physics.mechanism.Relaxing`."""
         return self.moduli, self.times
 
     def bind(self, body: Body) -> "ViscoelasticTerm":
-        """See `warpbrain.physics.term.Following`."""
         return ViscoelasticTerm(body, self)
 
 
