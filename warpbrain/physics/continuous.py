@@ -111,18 +111,9 @@ def scales_of(mechanisms: Sequence[Mechanism]) -> Floats:
 
 
 def with_numbers(mechanisms: Sequence[Mechanism], numbers: ArrayLike) -> tuple[Mechanism, ...]:
-    """The same mechanisms with other numbers.
+    """The same mechanisms with other numbers (p,), in the order of `numbers_of` [SI].
 
-    Parameters
-    ----------
-    mechanisms : sequence of Mechanism
-    numbers : (p,) array
-        In the order of `numbers_of` [SI].
-
-    Raises
-    ------
-    InputError
-        If there are more or fewer numbers than the mechanisms have, or a mechanism refuses them.
+    `InputError` if there are more or fewer than the mechanisms have, or a mechanism refuses them.
     """
     given = np.asarray(numbers, dtype=np.float64)
     places = [continuous(mechanism) for mechanism in mechanisms]

@@ -24,21 +24,9 @@ def unit_vector(key: str, direction: ArrayLike) -> Floats:
 def element_directions(
     mesh: TetMesh, elements: NDArray[np.integer], direction: tuple[float, float, float] | None, field: str
 ) -> Floats:
-    """Unit vectors (k, 3) of some elements, from one direction or from a field of the mesh.
+    """Unit vectors (k, 3) of some elements (k,), from one direction or from vectors that the mesh has by that name.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-    elements : (k,) int array
-    direction : (float, float, float) or None
-        Of any length but zero.
-    field : str
-        Name of vectors of the mesh's elements, of any lengths but zero; empty: `direction` is meant.
-
-    Raises
-    ------
-    ParameterError
-        If neither or both are given, the mesh has no such vectors, or one of them is no direction.
+    `ParameterError` if neither or both are given, the mesh has no such vectors, or one of them is no direction.
     """
     if (direction is None) == (not field):
         raise ParameterError("direction", "give either one direction or a field of them")

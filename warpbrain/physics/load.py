@@ -36,11 +36,7 @@ class Load(Ramped, abc.ABC):
     def unit_forces_rate(self, mesh: TetMesh | QuadraticMesh, along: Along) -> Floats:
         """Derivative of `unit_forces` along a path of loads that begins here, by differences unless overridden.
 
-        Parameters
-        ----------
-        mesh : TetMesh or QuadraticMesh
-        along : callable
-            Differentiates any smooth function of a load along the path, such as a parameter.
+        `along` differentiates any smooth function of a load along the path, such as a parameter.
         """
         return along(lambda load: load.unit_forces(mesh))
 

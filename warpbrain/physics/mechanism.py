@@ -98,13 +98,7 @@ def parameter(doc: str, *, default: Any = dataclasses.MISSING, **known: Any) -> 
 
 
 class ParameterError(InputError):
-    """A parameter that is wrong.
-
-    Attributes
-    ----------
-    key : str
-        Its name.
-    """
+    """A parameter that is wrong; `key` is its name."""
 
     def __init__(self, key: str, message: str) -> None:
         super().__init__(message)
@@ -140,12 +134,7 @@ class Facts:
 
 @dataclass(frozen=True, kw_only=True)
 class Mechanism(Ramped, abc.ABC):
-    """A piece of physics that a case assumes.
-
-    Parameters
-    ----------
-    ramp : sequence of (time, factor)
-    """
+    """A piece of physics that a case assumes."""
 
     #: Its name in `case.toml`, on the command line and in a diagnosis.
     kind: ClassVar[str]
@@ -190,11 +179,11 @@ class Mechanism(Ramped, abc.ABC):
     @classmethod
     def required(cls) -> tuple[str, ...]:
         """Names of the parameters that a case must give."""
-        fields = (f for f in dataclasses.fields(cls) if "says" in f.metadata)
+        known, defaults = cls.parameters(), {f.name: f.default for f in dataclasses.fields(cls)}
         return tuple(
-            f.name
-            for f in fields
-            if f.metadata["says"].needed or (f.default is dataclasses.MISSING and not f.metadata["says"].absent)
+            name
+            for name, says in known.items()
+            if says.needed or (defaults[name] is dataclasses.MISSING and not says.absent)
         )
 
     @classmethod
@@ -216,31 +205,16 @@ class Mechanism(Ramped, abc.ABC):
 
     @classmethod
     def of_case(cls, values: Mapping[str, Any], facts: Facts) -> Self:
-        """The mechanism of a case.
+        """The mechanism of a case, from its parameters in SI units and RAS axes, and the ramp.
 
-        Parameters
-        ----------
-        values : mapping
-            Parameters in SI units and RAS axes, and the ramp.
-        facts : Facts
-
-        Raises
-        ------
-        ParameterError
-            If a parameter makes no sense in this case.
+        `ParameterError` if one of them makes no sense in this case.
         """
         made = cls(**values)
         made.check_in(facts)
         return made
 
     def in_case(self, facts: Facts) -> dict[str, Any]:
-        """Parameters by name, in SI units and RAS axes, of which `of_case` makes what does the same.
-
-        Parameters
-        ----------
-        facts : Facts
-            Of the case that is to say them.
-        """
+        """Parameters by name, in SI units and RAS axes, of which `of_case` makes what does the same in a case."""
         values = {name: getattr(self, name) for name in self.parameters()}
         return {name: value for name, value in values.items() if value is not None}
 
@@ -267,8 +241,14 @@ class Mechanism(Ramped, abc.ABC):
     def check(self, mesh: TetMesh) -> None:
         """Raise `ParameterError` if a parameter makes no sense with a mesh: a set that is not there, or is empty."""
         for name, says in self.parameters().items():
-            if says.kind in ("node set", "element set") and getattr(self, name):
-                _require_set(name, says.kind, getattr(self, name), mesh)
+            if says.kind not in ("node set", "element set") or not (value := getattr(self, name)):
+                continue
+            sets = mesh.node_sets if says.kind == "node set" else mesh.element_sets
+            if value not in sets:
+                known = ", ".join(sorted(sets)) or "none"
+                raise ParameterError(name, f"the mesh has no {says.kind} '{value}' (it has {known})")
+            if not sets[value].any():
+                raise ParameterError(name, f"the {says.kind} '{value}' is empty")
 
     def held(self, mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Nodes (k,), repeated if need be, and directions (k, 3) in which it holds them."""
@@ -289,25 +269,14 @@ class Mechanism(Ramped, abc.ABC):
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
-        """How it may act where a case does not declare it.
-
-        Raises
-        ------
-        NotTestableError
-            If the data of the case cannot show it.
-        """
+        """How it may act where a case does not declare it; `NotTestableError` if the data cannot show it."""
         raise NotTestableError(f"needs {' and '.join(cls.needs) or 'more than is known of this case'}")
 
     @classmethod
     def about_law(cls, poisson: float, sd: float) -> Proposal:
         """It about the law that a case has, where it does nothing; of mechanisms that are `always` there a little.
 
-        Parameters
-        ----------
-        poisson : float
-            Of the case.
-        sd : float
-            Standard deviation of its coefficient.
+        `poisson` is the ratio of the case, `sd` the standard deviation of its coefficient.
         """
         raise NotImplementedError(cls.kind)
 
@@ -319,13 +288,9 @@ class Mechanism(Ramped, abc.ABC):
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
         """What was found of it, one clause for each thing that can be known, with direction and sign.
 
-        Parameters
-        ----------
-        values : mapping of str to Value
-            Finite parameters by name, each in the unit it has in `parameters`; components of vectors as ``value_x``,
-            their length as ``value_size``, of its ramp the last factor as ``share``.
-        gravity_axis : (float, float, float), optional
-            Where 'down' was said to be.
+        Of finite parameters by name, each in the unit it has in `parameters`; components of vectors as ``value_x``,
+        their length as ``value_size``, of its ramp the last factor as ``share``. `gravity_axis` is where 'down' was
+        said to be.
         """
         return clauses(cls.parameters(), values)
 
@@ -347,10 +312,7 @@ class Mechanism(Ramped, abc.ABC):
     def turned(self, rotation: NDArray[np.float64]) -> Self:
         """The same in a body that is turned: every direction `a` becomes `R a`, (3, 3).
 
-        Raises
-        ------
-        ParameterError
-            If it acts in a part of the body, or has directions of its own in each element: these would turn too.
+        `ParameterError` if it acts in a part of the body, or has directions in each element: these would turn too.
         """
         if np.allclose(rotation, np.eye(3)):
             return self
@@ -381,16 +343,6 @@ class Mechanism(Ramped, abc.ABC):
                 numbers = ", ".join(f"{v / si:g}" for v in np.ravel(value))
                 said.append(f"{name} {numbers}{f' {unit}' if unit else ''}")
         return f" ({'; '.join(said)})" if said else ""
-
-
-def _require_set(key: str, kind: str, name: str, mesh: TetMesh) -> None:
-    sets = mesh.node_sets if kind == "node set" else mesh.element_sets
-    members = sets.get(name)
-    if members is None:
-        known = ", ".join(sorted(sets)) or "none"
-        raise ParameterError(key, f"the mesh has no {kind} '{name}' (it has {known})")
-    if not members.any():
-        raise ParameterError(key, f"the {kind} '{name}' is empty")
 
 
 @runtime_checkable

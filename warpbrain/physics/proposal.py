@@ -258,41 +258,30 @@ class Proposal:
     ) -> list[Proposal]:
         """Smooth ones of one coefficient, nothing at zero, in balls of some radii [m] throughout the tissue.
 
-        Parameters
-        ----------
-        make : callable
-            From the coefficient, the centre [m] and the radius [m] to the mechanism.
-        sd : float
-        radii : sequence of float
-        situation : Situation
-        varying : tuple of int
+        `make` is from the coefficient, the centre [m] and the radius [m] to the mechanism.
         """
 
         def ball(centre: Floats, radius: float) -> Proposal:
             x, y, z = centre.tolist()
-            one = partial(_placed, make, (x, y, z), radius)
-            return cls.of_one(one, 0.0, sd, "smooth", elsewhere=ball, centre=centre, radius=radius, varying=varying)
+
+            def made(coefficient: float) -> Mechanism:
+                return make(coefficient, (x, y, z), radius)
+
+            return cls.of_one(made, 0.0, sd, "smooth", elsewhere=ball, centre=centre, radius=radius, varying=varying)
 
         return [ball(site, radius) for site in situation.volume_sites for radius in radii]
 
     @classmethod
     def along_axes(
-        cls, make: Callable[[float, Place], Mechanism], sd: float, what: str, situation: Situation
+        cls, make: Callable[[Place, float], Mechanism], sd: float, what: str, situation: Situation
     ) -> list[Proposal]:
         """Proportional ones of one coefficient along each axis of the anatomy.
 
-        Parameters
-        ----------
-        make : callable
-            From the coefficient and the axis to the mechanism.
-        sd : float
-        what : str
-            What lies along the axis, for people.
-        situation : Situation
+        `make` is from the axis and the coefficient to the mechanism; `what` says to people what lies along the axis.
         """
         axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         return [
-            cls.of_one(partial(_along, make, axis), 0.0, sd, region=f"{what} {name}")
+            cls.of_one(partial(make, axis), 0.0, sd, region=f"{what} {name}")
             for name, axis in zip(situation.axes, axes, strict=True)
         ]
 
@@ -314,13 +303,3 @@ class Proposal:
 
     def __len__(self) -> int:
         return len(self.mean)
-
-
-def _placed(
-    make: Callable[[float, Place, float], Mechanism], centre: Place, radius: float, coefficient: float
-) -> Mechanism:
-    return make(coefficient, centre, radius)
-
-
-def _along(make: Callable[[float, Place], Mechanism], axis: Place, coefficient: float) -> Mechanism:
-    return make(coefficient, axis)

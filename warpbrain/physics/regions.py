@@ -19,23 +19,10 @@ _KEPT = 1024
 def region_weights(
     mesh: TetMesh, elements: str, centre: tuple[float, float, float] | None, radius: float | None
 ) -> Floats:
-    """How much each element belongs to a region, 0 to 1, shape (m,).
+    """How much each element belongs to a region, 0 to 1, shape (m,): to an element set, a ball [m], or all if neither.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-    elements : str
-        Element set; empty: not by a set.
-    centre : (float, float, float) or None
-        Of a ball [m].
-    radius : float or None
-        Of the ball [m]; its weight falls smoothly from 1 at its centre to 0 at twice this distance, and is 1/2 at the
-        radius.
-
-    Raises
-    ------
-    ParameterError
-        If both a set and a ball are given, or half a ball, or the region holds nothing.
+    In a ball it falls smoothly from 1 at the centre to 0 at twice the radius, and is 1/2 at the radius.
+    `ParameterError` if both a set and a ball are given, or half a ball, or the region holds nothing.
     """
     if (centre is None) != (radius is None):
         missing = "radius" if radius is None else "centre"

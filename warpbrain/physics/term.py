@@ -9,7 +9,7 @@ The system knows no term by name.
 from __future__ import annotations
 
 import abc
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
@@ -17,6 +17,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import QuadraticMesh, TetMesh
 
@@ -268,6 +269,64 @@ class Term(abc.ABC):
     def array(self, values: Any, dtype: Any) -> wp.array:
         """An array on the body's device."""
         return wp.array(values, dtype=dtype, device=self.body.device)
+
+
+class KernelTerm(Term):
+    """A term of kernels with a thread for each stencil: for forces, for forces with blocks, and for energies."""
+
+    def __init__(
+        self, body: Body, stencils: NDArray[np.integer], kernels: Sequence[Any], ramp: Callable[[float], float]
+    ) -> None:
+        super().__init__(body, stencils, ramp)
+        self._kernels = kernels
+        self._energies = wp.zeros(len(stencils), dtype=body.precision.scalar, device=body.device)
+
+    @abc.abstractmethod
+    def _inputs(self) -> list[Any]:
+        """What the kernels take before displacements [m] and outputs."""
+
+    def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
+        launch(kernel, len(self.stencils), [*self._inputs(), u, *outputs], self.body.device)
+
+    def evaluate_forces(self, u: wp.array) -> None:
+        self._launch(self._kernels[0], u, self.forces)
+
+    def evaluate_tangents(self, u: wp.array) -> None:
+        self._launch(self._kernels[1], u, self.forces, self.blocks)
+
+    def energy(self, u: wp.array) -> float:
+        self._launch(self._kernels[2], u, self._energies)
+        return float(np.sum(self._energies.numpy(), dtype=np.float64))
+
+
+class TriangleTerm(KernelTerm):
+    """Forces, tangent blocks and energies of triangles (k, 3) or (k, 6): ids that ascend, of six the corners first.
+
+    `points` (n, 3) are reference positions of the body's nodes [m], from any origin, `data` (k,) or (k, c) numbers of
+    each triangle. The three kernels are ``(nodes, points, data, scale, u) -> forces``, ``-> blocks`` and
+    ``-> energies``, with a thread for each triangle. The ramp is a factor over time [s].
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        triangles: NDArray[np.integer],
+        points: NDArray[np.float64],
+        data: NDArray[np.float64],
+        kernels: tuple[Any, Any, Any],
+        ramp: Callable[[float], float],
+    ) -> None:
+        super().__init__(body, triangles, kernels, ramp)
+        self._nodes = self.array(self.stencils, wp.vec3i if self.stencils.shape[1] == 3 else int)
+        self._points = self.array(points, body.precision.vec3)
+        self._data = self.array(data, body.precision.scalar)
+
+    def _inputs(self) -> list[Any]:
+        return [self._nodes, self._points, self._data, self.scale]
+
+    def evaluate_tangents(self, u: wp.array) -> None:
+        self.evaluate_forces(u)
+        self._launch(self._kernels[1], u, self.blocks)
 
 
 @runtime_checkable

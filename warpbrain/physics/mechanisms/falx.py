@@ -24,8 +24,7 @@ from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
-from warpbrain.physics.term import Body
-from warpbrain.physics.triangle_term import TriangleTerm
+from warpbrain.physics.term import Body, TriangleTerm
 
 
 @dataclass(frozen=True, kw_only=True)

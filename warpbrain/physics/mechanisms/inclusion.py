@@ -57,11 +57,9 @@ class Inclusion(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Balls of two sizes throughout the tissue; the coefficient is the logarithm of the ratio."""
-
-        def ball(s: float, centre: tuple[float, float, float], radius: float) -> Inclusion:
-            return cls(ratio=math.exp(s), centre=centre, radius=radius)
-
-        return Proposal.in_balls(ball, _USUAL, _RADII, situation)
+        return Proposal.in_balls(
+            lambda s, centre, radius: cls(ratio=math.exp(s), centre=centre, radius=radius), _USUAL, _RADII, situation
+        )
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:

@@ -45,8 +45,7 @@ from warpbrain.physics.mechanism import Mechanism, ParameterError, Reading, para
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_with
-from warpbrain.physics.term import Body
-from warpbrain.physics.triangle_term import TriangleTerm
+from warpbrain.physics.term import Body, TriangleTerm
 from warpbrain.physics.words import HARDLY, Values, measured, unsure
 
 Ints = NDArray[np.int32]

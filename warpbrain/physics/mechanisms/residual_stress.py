@@ -100,7 +100,7 @@ class ResidualStress(Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy, in all tissue."""
         return Proposal.along_axes(
-            lambda tension, axis: cls(tension=tension, direction=axis), 300.0, "tension", situation
+            lambda axis, tension: cls(tension=tension, direction=axis), 300.0, "tension", situation
         )
 
     @classmethod

@@ -62,11 +62,14 @@ class Swelling(Mechanism):
         everywhere = Proposal.of_one(
             lambda g: cls(amount=g), 0.0, _EVERYWHERE, "smooth", region="all tissue", varying=(0,)
         )
-
-        def ball(g: float, centre: tuple[float, float, float], radius: float) -> Swelling:
-            return cls(amount=g, centre=centre, radius=radius)
-
-        return [everywhere, *Proposal.in_balls(ball, _SOMEWHERE, _RADII, situation, varying=(0,))]
+        balls = Proposal.in_balls(
+            lambda g, centre, radius: cls(amount=g, centre=centre, radius=radius),
+            _SOMEWHERE,
+            _RADII,
+            situation,
+            varying=(0,),
+        )
+        return [everywhere, *balls]
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
