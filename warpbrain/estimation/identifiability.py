@@ -116,7 +116,7 @@ def in_words(parameters: Sequence[Parameter], row: Floats, words: tuple[str, str
     weights = row / row[np.abs(row).argmax()]
     parts = [(parameters[k], float(weights[k])) for k in np.flatnonzero(weights).tolist()]
     if len(parts) == 1:
-        return single.format(_noun(parts[0][0]))
+        return single.format(f"{parts[0][0].coordinate.noun} of {parts[0][0].tissue}")
     if all(parameter.is_modulus for parameter, _ in parts):
         tissues = enumerated([parameter.tissue for parameter, _ in parts])
         if max(weight for _, weight in parts) - min(weight for _, weight in parts) < _ALIKE:
@@ -124,10 +124,3 @@ def in_words(parameters: Sequence[Parameter], row: Floats, words: tuple[str, str
         if len(parts) == 2 and abs(parts[0][1] + parts[1][1]) < _ALIKE:
             return single.format(f"ratio of the shear moduli of {tissues}")
     return other.format(" ".join(f"{weight:+.2g} [{parameter.name}]" for parameter, weight in parts))
-
-
-def _noun(parameter: Parameter) -> str:
-    what = {"ln(mu0 / Pa)": "shear modulus", "alpha": "exponent"}.get(
-        parameter.coordinate.name, f"ratio {parameter.coordinate.name}"
-    )
-    return f"{what} of {parameter.tissue}"

@@ -37,9 +37,9 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
+from warpbrain.physics.load import Ramped
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
-from warpbrain.physics.ramp import Ramped
 from warpbrain.physics.term import Following
 from warpbrain.physics.values import Smallest
 from warpbrain.physics.words import Values, clauses, label, number

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
 from warpbrain.physics.laws.device import InvariantLaw
-from warpbrain.physics.laws.law import Law, require_finite
+from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, require_finite
 
 
 @wp.func
@@ -87,6 +87,7 @@ class NeoHookean(Law):
     mu: float
     name: ClassVar[str] = "neo-hookean"
     keys: ClassVar[Mapping[str, type]] = {"mu": float}
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (MODULUS,)
 
     def __post_init__(self) -> None:
         require_finite(self.name, "mu", self.mu)

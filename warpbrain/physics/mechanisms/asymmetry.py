@@ -78,4 +78,4 @@ class Asymmetry(Mechanism):
             raise NotTestableError(f"needs {' and '.join(cls.needs)}")
 
     def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
-        return Ogden((2.0 * law.shear_modulus / self.exponent,), (self.exponent,)), poisson, formulation
+        return Ogden.of_shear_modulus(law.shear_modulus, self.exponent), poisson, formulation

@@ -36,12 +36,12 @@ from warpbrain.mesh import (
     integrals_on_plane,
     tangents,
 )
-from warpbrain.physics.directions import unit_vector
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Along, BodyForce
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
+from warpbrain.physics.regions import unit_vector
 from warpbrain.physics.words import Values, measured, towards, vector_in
 
 #: Standard gravity [m/s2] as used by the verification cases of this project.

@@ -1,7 +1,7 @@
 """Swelling or shrinkage: tissue would have another volume if nothing held it.
 
 `F = F_e F_g` with `F_g = (1 + g)^(1/3) I`; only `F_e` makes stress (Rodriguez et al. 1994), in the law
-(`warpbrain.physics.laws.grown`), in fibres, in viscosity: swelling that nothing holds makes none.
+(`warpbrain.physics.laws.device`), in fibres, in viscosity: swelling that nothing holds makes none.
 """
 
 from __future__ import annotations
