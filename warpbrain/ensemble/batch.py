@@ -32,6 +32,9 @@ from warpbrain.simulation.system import System
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
+#: Iterations of a linear solve.
+_MAX_CG = 2000
+
 
 @dataclass(frozen=True)
 class States:
@@ -47,32 +50,11 @@ class States:
 
 
 class Batch:
-    """Slots for samples on a device.
+    """Slots on a device for samples, which share the mesh, pattern and masses of a system, and not its fields.
 
-    Parameters
-    ----------
-    system : System
-        Mesh, pattern and masses, which all samples share; its own fields are not used.
-    samples : sequence of Sample
-        All that may ever be placed.
-    slots : int
-    tolerance : float
-        Relative tolerance of each linear solve; never finer than 20 rounding errors of the precision.
-    max_cg : int
-        Iterations of a linear solve.
-    linger : float
-        A pass ends when this part of the solves that it began with, or less, has not ended.
-
-    Attributes
-    ----------
-    time_step : array
-        `h` [s] of each slot in the step that it begins next.
-    load_factors : (loads, slots) array
-        Factors of the model's loads at the end of that step.
-    amounts : (shapes, slots) array
-        How much of each of `shapes` is to be reached at the end of that step.
-    shapes : (shapes, n, 3) array
-        Prescribed displacements [m] are sums of these.
+    Linear solves have a relative tolerance, never finer than 20 rounding errors of the precision. A pass ends when the
+    part `linger` of those that it began with, or less, has not ended. Prescribed displacements are sums of `shapes`
+    (shapes, n, 3) [m].
     """
 
     def __init__(
@@ -83,7 +65,6 @@ class Batch:
         *,
         tolerance: float,
         shapes: Floats | None = None,
-        max_cg: int = 2000,
         linger: float = 0.0,
     ) -> None:
         self.system, self.slots = system, slots
@@ -93,8 +74,7 @@ class Batch:
         self._kernels = batched_assembly_kernels(system.precision)
         self._motion = batched_motion_kernels(system.precision)
         self._sums_kernels = batched_solve_kernels(system.precision)
-        n = system.size
-        self.shapes = np.zeros((0, n, 3)) if shapes is None else shapes
+        self.shapes = np.zeros((0, system.size, 3)) if shapes is None else shapes
         self._place_state()
         self._place_lists()
         self._place_coefficients()
@@ -110,7 +90,7 @@ class Batch:
             self._dv,
             system.precision,
             tolerance=finest_tolerance(tolerance, system.precision),
-            max_iterations=max_cg,
+            max_iterations=_MAX_CG,
         )
         self._graph: Any = None
 
@@ -145,6 +125,7 @@ class Batch:
 
     def _place_coefficients(self) -> None:
         model, p, b = self.system.model, self._precision, self.slots
+        # of the step that each slot begins next: `h` [s]; factors of loads and amounts of shapes at its end
         self.time_step = np.ones(b)
         self.load_factors = np.zeros((len(model.loads), b))
         self.amounts = np.zeros((len(self.shapes), b))
@@ -206,15 +187,7 @@ class Batch:
     # -- a pass ---------------------------------------------------------------------------------------------------
 
     def advance(self, start: NDArray[np.intp], marked: NDArray[np.intp]) -> States:
-        """One pass.
-
-        Parameters
-        ----------
-        start : array of int
-            Slots that begin a step, of the lengths `time_step`, from a state that has been evaluated.
-        marked : array of int
-            Slots whose state is to be evaluated.
-        """
+        """One pass: slots `start` begin a step from an evaluated state, the states of `marked` are to be evaluated."""
         self._unsolved[start] = True
         stepping = np.flatnonzero(self._unsolved)
         self._write_list(self._start, self._start_count, start)

@@ -38,30 +38,27 @@ class BatchGroup:
 
 
 class BatchMaterials:
-    """The laws of the samples that are in the slots.
+    """The laws of the samples that are in the slots, of all that may ever be placed, each with materials.
 
-    Parameters
-    ----------
-    system : System
-        The mesh and its arrays.
-    samples : sequence of Sample
-        All that may ever be placed, each with materials.
-    slots : int
-
-    Raises
-    ------
-    InputError
-        If the samples are not all of the same laws.
+    `InputError` if they are not all of the same laws.
     """
 
     def __init__(self, system: System, samples: Sequence[Sample], slots: int) -> None:
         self._system = system
         self._slots = slots
-        by_number = {sample.number: _materials(sample) for sample in samples}
+        by_number = {sample.number: sample.materials for sample in samples if sample.materials is not None}
         first = next(iter(by_number.values()))
         for number, materials in by_number.items():
-            _require_alike(first, number, materials)
-        self.groups = [self._group(labels, by_number) for labels in _by_code(first).values()]
+            for label, material in materials.items():
+                if label not in first or code_of(material) != code_of(first[label]):
+                    raise InputError(
+                        f"sample {number}: tissue {label}: {material.law.name} ({material.formulation}): all samples "
+                        "of an ensemble have the same laws, with parameters of their own"
+                    )
+        labels: dict[tuple[type[Law], str], list[int]] = {}
+        for label in sorted(first):
+            labels.setdefault(code_of(first[label]), []).append(label)
+        self.groups = [self._group(alike, by_number) for alike in labels.values()]
 
     def _group(self, labels: list[int], samples: Mapping[int, Mapping[int, Material]]) -> BatchGroup:
         system, p = self._system, self._system.precision
@@ -94,25 +91,3 @@ class BatchMaterials:
             for slot, number in numbers.items():
                 group.rows[:, slot] = group.known[number]
             group.parameters.assign(group.rows.reshape(-1, group.rows.shape[2]))
-
-
-def _materials(sample: Sample) -> Mapping[int, Material]:
-    if sample.materials is None:
-        raise ValueError(f"sample {sample.number} has no materials: {sample.reason}")
-    return sample.materials
-
-
-def _by_code(materials: Mapping[int, Material]) -> dict[tuple[type[Law], str], list[int]]:
-    groups: dict[tuple[type[Law], str], list[int]] = {}
-    for label in sorted(materials):
-        groups.setdefault(code_of(materials[label]), []).append(label)
-    return groups
-
-
-def _require_alike(first: Mapping[int, Material], number: int, materials: Mapping[int, Material]) -> None:
-    for label, material in materials.items():
-        if label not in first or code_of(material) != code_of(first[label]):
-            raise InputError(
-                f"sample {number}: tissue {label}: {material.law.name} ({material.formulation}): all samples of an "
-                "ensemble have the same laws, with parameters of their own"
-            )

@@ -21,12 +21,8 @@ def least_stretch(model: Model, device: str | None = None) -> float:
     """The least principal stretch of any element in linear elasticity; below zero no tissue is left of one.
 
     ``min eig(I + (H + H^T) / 2)`` with the displacement gradient H of the body under its full load, with the stiffness
-    that it has at rest. A body stiffens as it is compressed, so it may bear what this says it does not.
-
-    Raises
-    ------
-    InputError, SolveError
-        As `EquilibriumSolver.linear_estimate`.
+    that it has at rest. A body stiffens as it is compressed, so it may bear what this says it does not. Errors are
+    those of `EquilibriumSolver.linear_estimate`.
     """
     system = System(model, device)
     solver = EquilibriumSolver(system, EquilibriumOptions(cg_tolerance=_TOLERANCE))
@@ -49,15 +45,14 @@ def overloaded(model: Model, samples: Sequence[Sample], device: str | None = Non
     """Samples that are too soft for the load, and what part of it all of them bear.
 
     Samples are taken in the order of their stiffness and the first that bears the load is found by bisection: a few
-    linear solves, however many samples there are.
-
-    Raises
-    ------
-    InputError
-        As `least_stretch`.
+    linear solves, however many samples there are. `InputError` as of `least_stretch`.
     """
-    known = [(_stiffness(sample), sample) for sample in samples if sample.materials is not None]
-    ordered = [sample for _, sample in sorted(known, key=lambda one: one[0])]
+
+    def stiffness(sample: Sample) -> float:
+        """Mean logarithm of the shear moduli [Pa]."""
+        return float(np.mean([np.log(one.law.shear_modulus) for one in (sample.materials or {}).values()]))
+
+    ordered = sorted((sample for sample in samples if sample.materials is not None), key=stiffness)
 
     def stretch_of(sample: Sample) -> float:
         assert sample.materials is not None
@@ -73,9 +68,3 @@ def overloaded(model: Model, samples: Sequence[Sample], device: str | None = Non
     # the stretch is one less what grows with the load
     share = 1.0 / (1.0 - stretch_of(ordered[0])) if first else 1.0
     return Overload(tuple(sorted(sample.number for sample in ordered[:first])), share)
-
-
-def _stiffness(sample: Sample) -> float:
-    """Mean logarithm of the shear moduli [Pa]."""
-    materials = sample.materials or {}
-    return float(np.mean([np.log(one.law.shear_modulus) for one in materials.values()]))

@@ -26,12 +26,8 @@ def drawn_samples(
 ) -> list[Sample]:
     """Draws 0 to `count` - 1 of the joint prior of a case's tissues.
 
-    A draw of which no stable law is found is a sample without materials.
-
-    Raises
-    ------
-    InputError
-        If a tissue has no group, or one that the process has seen no study of.
+    A draw of which no stable law is found is a sample without materials. `InputError` if a tissue has no group, or one
+    that the process has seen no study of.
     """
     require_groups(case, tuple(sorted(case.tissues)), process)
     samples = []
@@ -52,12 +48,8 @@ def swept_samples(case: Case, process: Process) -> list[Sample]:
     """The paper's sweep: the laws of the curves `k` standard deviations from the mean, 17 `k` in [-2, 2] a tissue.
 
     One tissue makes 17 samples, two make the 289 pairs, the last tissue fastest. A law that is not stable is a sample
-    without materials.
-
-    Raises
-    ------
-    InputError
-        If a tissue has no group, or one that the process has seen no study of; for more than two tissues.
+    without materials. `InputError` if a tissue has no group, or one that the process has seen no study of; for more
+    than two tissues.
     """
     labels = tuple(sorted(case.tissues))
     require_groups(case, labels, process)

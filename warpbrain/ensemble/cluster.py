@@ -27,13 +27,7 @@ _DEATHS = 2
 
 
 def local_workers(address: str) -> int | None:
-    """Workers that ``local[:N]`` asks for, 0 if it does not say how many; None if it is the address of a scheduler.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
+    """Workers that ``local[:N]`` asks for, 0 if it does not say how many; None if it is the address of a scheduler."""
     if address == "local":
         return 0
     if address.startswith("local:"):
@@ -49,23 +43,9 @@ def local_workers(address: str) -> int | None:
 class Cluster:
     """A Dask cluster, or one of processes of this machine that lives as long as this object's context.
 
-    Parameters
-    ----------
-    address : str
-        Of a scheduler; ``local`` or ``local:N`` starts processes here.
-    workers : int
-        How many ``local`` starts.
-    device : str or None
-        Warp device of each worker.
-    batch : int or None
-        Samples at a time on a worker; None for what it has memory for and pays.
-    prepare : callable
-        Called on a worker before each part.
-
-    Raises
-    ------
-    InputError
-        If Dask is not installed, or no scheduler or worker answers.
+    The address is of a scheduler; ``local:N`` starts processes here, ``local`` so many `workers`. Each has a Warp
+    device and takes a batch of samples at a time, None for what it has memory for and pays; it is prepared before each
+    part. `InputError` if Dask is not installed, or no scheduler or worker answers.
     """
 
     def __init__(self, address: str, workers: int, device: str | None, batch: int | None, prepare: Prepare) -> None:
@@ -103,13 +83,7 @@ class Cluster:
         self._stack.close()
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
-        """Outcomes of all samples of a job, as they become known.
-
-        Raises
-        ------
-        InputError
-            If a worker has other versions than this machine, or no such device.
-        """
+        """See `Workers`; `InputError` if a worker has other versions than this machine, or no such device."""
         import distributed
 
         pending: dict[str, Job] = {}

@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain import __version__
-from warpbrain.ensemble.course import Course
-from warpbrain.ensemble.moving import Moving
-from warpbrain.ensemble.resting import Resting
+from warpbrain.ensemble.course import Course, Moving, Resting
 from warpbrain.ensemble.sample import Outcome, Sample
 from warpbrain.ensemble.stepping import step_samples
 from warpbrain.errors import InputError
@@ -64,13 +62,7 @@ class Job:
         return Resting(self.model, RelaxationOptions(tolerance=self.tolerance), find_precision(self.precision))
 
     def system(self, device: str | None) -> System:
-        """The model on a device.
-
-        Raises
-        ------
-        InputError
-            If this machine does not have the versions that the job was made with: its bits would be others.
-        """
+        """The model on a device; `InputError` on a machine of other versions than the job's: bits would be others."""
         if self.versions != _versions():
             raise InputError(f"a worker has {_versions()}, the job was made with {self.versions}")
         return System(self.model, device, self.precision)

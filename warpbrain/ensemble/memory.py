@@ -44,13 +44,7 @@ def free_bytes(system: System) -> int:
 
 
 def batch_size(system: System, asked: int | None = None) -> int:
-    """Samples of a batch: as many as are asked for, or as many as the memory holds and pay.
-
-    Raises
-    ------
-    InputError
-        If the device has no memory for so many, or not for one.
-    """
+    """Samples of a batch: as many as are asked for, or as many as the memory holds and pay; `InputError` if not one."""
     each = bytes_per_slot(system)
     room = int(SHARE * free_bytes(system)) // each
     if room < (asked or 1):

@@ -13,6 +13,7 @@ from warpbrain.ensemble.sample import Outcome, Sample
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.comparison import Comparison
 from warpbrain.shown import Shown
+from warpbrain.simulation.mesh_error import Found
 from warpbrain.simulation.observation import observe
 from warpbrain.simulation.result import Statistics, displacement_statistics
 
@@ -123,15 +124,6 @@ class EnsembleResult(Shown):
         return min(self.done, key=lambda row: row.error(recording))
 
 
-@dataclass(frozen=True)
-class _Reached:
-    """A state for `observe`."""
-
-    mesh: TetMesh
-    u: Floats
-    reactions: Floats
-
-
 def results_of(
     case: Case,
     mesh: TetMesh,
@@ -140,20 +132,9 @@ def results_of(
     to_rest: bool,
     on_sample: Callable[[int], None] | None = None,
 ) -> EnsembleResult:
-    """Sum up the outcomes of samples.
+    """Sum up the outcomes of samples, one for each in any order, on the mesh of the case's model.
 
-    Parameters
-    ----------
-    case : Case
-    mesh : TetMesh
-        Of the case's model.
-    samples : sequence of Sample
-    outcomes : iterable of Outcome
-        One for each sample, in any order.
-    to_rest : bool
-        They are states at rest, which are compared with the end of each recording.
-    on_sample : callable, optional
-        Called with the count of samples so far.
+    States at rest (`to_rest`) are compared with the end of each recording. `on_sample` is called with the count so far.
     """
     by_number = {sample.number: sample for sample in samples}
     rows: dict[int, Row] = {}
@@ -165,7 +146,7 @@ def results_of(
         if not outcome.failed:
             states[outcome.number] = outcome.u
             displacement = displacement_statistics(mesh, outcome.u)
-            observed = observe(case, _Reached(mesh, outcome.u, outcome.reactions), None if to_rest else outcome.time)
+            observed = observe(case, Found(mesh, outcome.u, outcome.reactions), None if to_rest else outcome.time)
             comparisons = observed.comparisons
             not_compared.update(dict.fromkeys(observed.skipped))
         ended = replace(outcome, u=_NOTHING, reactions=_NOTHING)

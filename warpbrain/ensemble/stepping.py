@@ -16,21 +16,8 @@ from warpbrain.simulation.system import System
 def step_samples(system: System, course: Course, samples: Sequence[Sample], slots: int) -> Iterator[list[Outcome]]:
     """Compute samples, at most `slots` at a time.
 
-    The outcome of a sample is the same to the last bit whatever the others are, and however many there are at a time.
-
-    Parameters
-    ----------
-    system : System
-        Of the course's model.
-    course : Course
-    samples : sequence of Sample
-        In any order; samples of like stiffness go together.
-    slots : int
-
-    Yields
-    ------
-    list of Outcome
-        Of the samples that have ended together.
+    The outcome of a sample is the same to the last bit whatever the others are, and however many there are at a time;
+    those of like stiffness go together. Yields the outcomes of samples that have ended together.
     """
     impossible = [failure(sample.number, sample.reason) for sample in samples if sample.materials is None]
     if impossible:

@@ -30,32 +30,17 @@ Prepare = Callable[[], object]
 
 
 class Workers(Protocol):
-    """Computes jobs.
+    """Computes jobs."""
 
-    Attributes
-    ----------
-    kind : str
-        Of its devices, ``"cpu"`` or ``"cuda"``: bits differ between the two.
-    name : str
-        For people.
-    """
-
-    kind: str
-    name: str
+    kind: str  # of its devices, ``"cpu"`` or ``"cuda"``: bits differ between the two
+    name: str  # for people
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
         """Outcomes of all samples of a job, as they become known."""
 
 
 class Here:
-    """This process and one device.
-
-    Parameters
-    ----------
-    device : str or None
-    batch : int or None
-        Samples at a time; None for as many as the memory holds and pay.
-    """
+    """This process and one device; samples at a time as many as the memory holds and pay, unless `batch` is said."""
 
     def __init__(self, device: str | None, batch: int | None) -> None:
         self._device, self._batch = find_device(device), batch
@@ -63,21 +48,13 @@ class Here:
         self.name = f"{self._device.name} ({self._device.alias})"
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
-        """Outcomes of all samples of a job, as they become known."""
+        """See `Workers`."""
         system = job.system(self._device.alias)
         yield from job.outcomes(system, batch_size(system, self._batch))
 
 
 class Processes:
-    """Processes of this machine, each on the CPU.
-
-    Parameters
-    ----------
-    count : int
-    batch : int or None
-    prepare : callable
-        Called in a process before each part.
-    """
+    """Processes of this machine, each on the CPU, and prepared before each part."""
 
     def __init__(self, count: int, batch: int | None, prepare: Prepare) -> None:
         self._count, self._batch, self._prepare = count, batch, prepare
@@ -85,13 +62,7 @@ class Processes:
         self.name = f"{count} processes on {find_device('cpu').name}"
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
-        """Outcomes of all samples of a job, as they become known.
-
-        Raises
-        ------
-        SolveError
-            If a process is ended from outside.
-        """
+        """See `Workers`; `SolveError` if a process is ended from outside."""
         context = get_context("spawn")
         stop = context.Event()
         pool = ProcessPoolExecutor(self._count, context, _live_with, (os.getpid(), stop))
