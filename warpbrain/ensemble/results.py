@@ -26,23 +26,12 @@ _NOTHING = np.zeros((0, 3))
 
 @dataclass(frozen=True)
 class Row:
-    """A sample and how it ended.
-
-    Attributes
-    ----------
-    sample : Sample
-    outcome : Outcome
-        Without its fields, which `Fields` sums up.
-    displacement : mapping of str to Statistics
-        By node set; empty if it failed.
-    comparisons : tuple of Comparison
-        With the case's recordings; empty if it failed.
-    """
+    """A sample and how it ended."""
 
     sample: Sample
-    outcome: Outcome
-    displacement: Mapping[str, Statistics]
-    comparisons: tuple[Comparison, ...]
+    outcome: Outcome  # without its fields, which `Fields` sums up
+    displacement: Mapping[str, Statistics]  # by node set; empty if it failed
+    comparisons: tuple[Comparison, ...]  # with the case's recordings; empty if it failed
 
     def error(self, recording: str) -> float:
         """Root mean square error at a recording, in its unit."""
@@ -51,38 +40,21 @@ class Row:
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean, standard deviation and percentiles of a quantity over the samples.
-
-    Attributes
-    ----------
-    mean, sd : array
-        The standard deviation is that of the samples themselves, with their number as its divisor.
-    percentiles : mapping of int to array
-    """
+    """Mean, standard deviation and percentiles of a quantity over the samples."""
 
     mean: Floats
-    sd: Floats
+    sd: Floats  # of the samples themselves, with their number as its divisor
     percentiles: Mapping[int, Floats]
 
 
 @dataclass(frozen=True)
 class Fields:
-    """The displacement over the samples that have an answer.
-
-    Attributes
-    ----------
-    mesh : TetMesh
-    count : int
-    components : Spread
-        Of each component [m], arrays (n, 3).
-    size : Spread
-        Of its size [m], arrays (n,).
-    """
+    """The displacement over the samples that have an answer."""
 
     mesh: TetMesh
     count: int
-    components: Spread
-    size: Spread
+    components: Spread  # of each component [m], arrays (n, 3)
+    size: Spread  # of its size [m], arrays (n,)
 
 
 @dataclass(frozen=True)

@@ -91,13 +91,7 @@ def estimate(
 
 
 class Estimation:
-    """The stages of an estimation; parameters as of `estimate`.
-
-    Attributes
-    ----------
-    seconds : dict
-        Wall time by stage so far.
-    """
+    """The stages of an estimation; parameters as of `estimate`."""
 
     def __init__(
         self,

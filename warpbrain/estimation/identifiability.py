@@ -31,22 +31,13 @@ _CHANGE = "a change of the {}", "a change of the shear moduli of {} by one facto
 
 @dataclass(frozen=True)
 class Identifiability:
-    """A verdict.
+    """A verdict."""
 
-    Attributes
-    ----------
-    informed, weakly_informed : tuple of str
-        Combinations of parameters that the data tell, and that they tell a little.
-    hidden : tuple of str
-        Changes of the parameters that the data do not see.
-    scale_is_hidden : bool
-        All shear moduli together can be changed by a factor, and the data do not see it: the loads are displacements
-        only, and no force was recorded.
-    """
-
-    informed: tuple[str, ...]
-    weakly_informed: tuple[str, ...]
-    hidden: tuple[str, ...]
+    informed: tuple[str, ...]  # combinations of parameters that the data tell
+    weakly_informed: tuple[str, ...]  # and that they tell a little
+    hidden: tuple[str, ...]  # changes of the parameters that the data do not see
+    #: All shear moduli together can be changed by a factor, and the data do not see it: the loads are displacements
+    #: only, and no force was recorded
     scale_is_hidden: bool
 
     @property

@@ -90,20 +90,8 @@ def _declared_prior(case: Case, parameters: Parameters, count: int, seed: int) -
 def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed: int = 0) -> Prior:
     """What the generative model says of a case's tissues; about what the case declares where none is of a group of it.
 
-    Parameters
-    ----------
-    case : Case
-    model : Process, optional
-        The one that is the default unless given.
-    count, seed : int
-        Draws on which it rests.
-
-    Raises
-    ------
-    InputError
-        With file, tissue and key, if a tissue has no group, or one that the model has seen no study of.
-    SolveError
-        If no stable law is found.
+    It rests on so many draws. `InputError` if a tissue has no group, or one that the model has seen no study of;
+    `SolveError` if no stable law is found.
     """
     parameters = Parameters.of(case)
     if not any(parameters.groups) and all(case.tissues[labels[0]].law is not None for labels in parameters.labels):
@@ -130,10 +118,7 @@ class PriorMode:
 def prior_modes(prior: Prior, parameters: Parameters) -> tuple[PriorMode, ...]:
     """Modes of a prior, the most probable first; what lies in rarer clusters counts with the others.
 
-    Raises
-    ------
-    InputError
-        If the prior is not of these parameters.
+    `InputError` if the prior is not of these parameters.
     """
     if prior.theta.shape[1] != len(parameters):
         names = ", ".join(parameters.names)

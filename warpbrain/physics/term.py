@@ -119,26 +119,10 @@ class Coupling:
 class Term(abc.ABC):
     """A family of stencils with forces, tangent blocks and, if there is one, an energy.
 
-    Forces are internal ones: minus what pushes the nodes. The tangent is symmetric: conjugate gradients need that, and
-    of a term that is not, the symmetric part is taken, at the price of a slower Newton's method.
-
-    Parameters
-    ----------
-    body : Body
-    stencils : (k, s) int array
-        Node ids, ascending in each row.
-    ramp : callable, optional
-        Factor over time [s]; 1 throughout if absent.
-
-    Attributes
-    ----------
-    scale : wp.array, shape (1,)
-        Factor on what it does, from 0 to 1 in load steps, times its ramp over time. On the device, so that a captured
-        graph follows it.
-    forces : wp.array of vec3, shape (k, s)
-        [N]
-    blocks : wp.array of mat33, shape (k, s (s + 1) / 2)
-        Tangent blocks [N/m] of the node pairs (a, b), a <= b, row by row.
+    Stencils are node ids (k, s) that ascend in each row. Forces (k, s) [N] are internal ones: minus what pushes the
+    nodes. The tangent is symmetric: conjugate gradients need that, and of a term that is not, the symmetric part is
+    taken, at the price of a slower Newton's method. Its blocks (k, s (s + 1) / 2) [N/m] are of the node pairs (a, b),
+    a <= b, row by row. The ramp is a factor over time [s], 1 throughout if absent.
     """
 
     #: Whether `energy` is the potential of the forces. If not, the work along a step stands for its change.
@@ -163,6 +147,7 @@ class Term(abc.ABC):
         self._ramp = ramp
         self.stencils = np.ascontiguousarray(stencils, dtype=np.int32)
         assert bool(np.all(np.diff(self.stencils, axis=1) > 0)), "nodes of a stencil ascend"
+        #: Factor on what it does, from 0 to 1 in load steps, times its ramp; a captured graph follows it on the device.
         self.scale = wp.ones(1, dtype=body.precision.scalar, device=body.device)
         self.forces: wp.array = None
         self.blocks: wp.array = None
@@ -200,14 +185,10 @@ class Term(abc.ABC):
     def add_stiffness(  # noqa: B027
         self, x: wp.array, factor: float, y: wp.array, columns: wp.array, rows: wp.array
     ) -> None:
-        """Add to `y` a factor times that part of its tangent times `x` which is not in the blocks.
+        """Add to `y` (n,) a factor times that part of its tangent times `x` (n,) which is not in the blocks.
 
-        Parameters
-        ----------
-        x, y : wp.array of vec3, shape (n,)
-        factor : float
-        columns, rows : wp.array of vec3, shape (n,)
-            1 for the components of `x` that count, and for those of `y` that are added to; 0 for others.
+        `columns` and `rows` (n,) are 1 for the components of `x` that count, and for those of `y` that are added to; 0
+        for others.
         """
 
     def skew_stiffness(self, u: NDArray[np.float64]) -> Any:

@@ -7,53 +7,27 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Value:
-    """A parameter of a mechanism after the fit.
-
-    Attributes
-    ----------
-    name : str
-    value, sd : float
-        In the unit.
-    unit : str
-    """
+    """A parameter of a mechanism after the fit."""
 
     name: str
-    value: float
+    value: float  # in the unit
     sd: float
     unit: str
 
 
 @dataclass(frozen=True)
 class Smallest:
-    """The smallest effect of a kind that these data show.
+    """The smallest effect of a kind that these data show."""
 
-    Attributes
-    ----------
-    size : float
-        In the unit: nine of ten raise an alarm.
-    unit : str
-    name : str
-        Of the parameter.
-    named : float
-        The size of which half would be named; infinite if none would.
-    """
-
-    size: float
+    size: float  # in the unit: nine of ten raise an alarm
     unit: str
-    name: str
-    named: float = float("inf")
+    name: str  # of the parameter
+    named: float = float("inf")  # the size of which half would be named; infinite if none would
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """Something that could be measured next.
-
-    Attributes
-    ----------
-    what : str
-    expected_nats : float
-        By which it would tell the two most probable causes apart, expected log Bayes factor.
-    """
+    """Something that could be measured next."""
 
     what: str
-    expected_nats: float
+    expected_nats: float  # by which it would tell the two most probable causes apart, expected log Bayes factor

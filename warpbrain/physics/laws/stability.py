@@ -26,8 +26,7 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.laws.law import Law
-from warpbrain.physics.laws.paths import Path, derivatives
-from warpbrain.physics.laws.total_energy import total_energy
+from warpbrain.physics.laws.total_energy import Path, derivatives, total_energy
 
 Floats = NDArray[np.float64]
 

@@ -190,12 +190,8 @@ class Drainage(Mechanism):
 class DrainageTerm(Term):
     """`Drainage` on a device, with the fluid that it remembers.
 
-    The pressure is held as that of the drained nodes and what is `beyond` it, zero there.
-
-    Attributes
-    ----------
-    softness : wp.array, shape (k,)
-        `1/(2 mu)` of each element [1/Pa], of the stabilisation; with the factor that its moduli have.
+    The pressure is held as that of the drained nodes and what is `beyond` it, zero there. `softness` (k,) is `1/(2 mu)`
+    of each element [1/Pa], of the stabilisation; with the factor that its moduli have.
     """
 
     memory = ("_held", "_shape", "_beyond")

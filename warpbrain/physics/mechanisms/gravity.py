@@ -202,19 +202,9 @@ class Gravity(BodyForce, Mechanism):
             sd = np.array([_SHARE, _POSE, _POSE])
             usual = np.array([1.0, 0.0, 0.0])
             found.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(3)))
-            found.append(
-                Proposal(
-                    drained,
-                    np.append(usual, 0.0),
-                    np.append(sd, _FALL * height),
-                    "smooth",
-                    np.append(usual, 0.0),
-                    np.zeros(4),
-                    varying=(3,),
-                    in_turns=True,
-                    only_over_time=True,
-                )
-            )
+            sd, usual = np.append(sd, _FALL * height), np.append(usual, 0.0)
+            over_time: dict[str, Any] = {"varying": (3,), "in_turns": True, "only_over_time": True}
+            found.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(4), **over_time))
         return found
 
     @classmethod

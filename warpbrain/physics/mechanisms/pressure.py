@@ -131,18 +131,7 @@ def _pressing(nodes: str, value: float) -> Pressure:
 
 
 class PressureTerm(TriangleTerm):
-    """A pressure on triangles of a body, on a device.
-
-    Parameters
-    ----------
-    body : Body
-    faces : (k, 3) int array
-        Corners of the triangles, oriented away from the tissue that the pressure pushes on.
-    value : float
-        [Pa]
-    ramp : callable
-        Factor over time [s].
-    """
+    """A pressure [Pa] on triangles (k, 3) of a body, oriented away from the tissue that it pushes on."""
 
     def __init__(self, body: Body, faces: Ints, value: float, ramp: Callable[[float], float]) -> None:
         order = np.argsort(faces, axis=1)
