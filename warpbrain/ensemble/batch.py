@@ -18,6 +18,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.ensemble.batch_materials import BatchMaterials
 from warpbrain.ensemble.sample import Sample
 from warpbrain.kernels.batched.assembly import batched_assembly_kernels
@@ -29,7 +30,6 @@ from warpbrain.kernels.tetrahedron import PAIRS
 from warpbrain.simulation.dynamics import finest_tolerance
 from warpbrain.simulation.system import System
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 #: Iterations of a linear solve.
@@ -40,7 +40,7 @@ _MAX_CG = 2000
 class States:
     """What is known of the state of each slot after a pass; arrays over all slots."""
 
-    ready: NDArray[np.bool_]  # the state is new: the others are still being solved for, or empty
+    ready: Bools  # the state is new: the others are still being solved for, or empty
     min_J: Floats
     unbalanced: Floats  # norm of what is out of balance on the free components [N]
     internal: Floats  # norm of the internal forces [N]

@@ -8,16 +8,14 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.ensemble.sample import Sample
 from warpbrain.errors import InputError
 from warpbrain.kernels.batched.elements import BatchedElementKernels, batched_element_kernels
 from warpbrain.physics.laws import Law
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 
 def code_of(material: Material) -> tuple[type[Law], str]:

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.ensemble.batch import Batch, States
 from warpbrain.kernels.precision import Precision
 from warpbrain.simulation.held import require_held
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.relaxation import LINEAR_TOLERANCE, RelaxationOptions, least_residual
 
-Floats = NDArray[np.float64]
 Slots = NDArray[np.intp]
 
 

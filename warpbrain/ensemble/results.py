@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.ensemble.sample import Outcome, Sample
 from warpbrain.mesh import TetMesh
@@ -16,8 +16,6 @@ from warpbrain.shown import Shown
 from warpbrain.simulation.mesh_error import Found
 from warpbrain.simulation.observation import observe
 from warpbrain.simulation.result import Statistics, displacement_statistics
-
-Floats = NDArray[np.float64]
 
 #: Percentiles of the fields.
 PERCENTILES = (5, 50, 95)

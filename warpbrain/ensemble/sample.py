@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.simulation.model import Material
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

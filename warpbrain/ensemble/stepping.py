@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.ensemble.batch import Batch
 from warpbrain.ensemble.course import Course
 from warpbrain.ensemble.sample import Outcome, Sample, failure
@@ -62,7 +63,7 @@ def step_batch(batch: Batch, course: Course, numbers: Sequence[int]) -> Iterator
 
 
 def _answers(
-    batch: Batch, course: Course, slots: list[int], number_in: NDArray[np.int_], min_J: NDArray[np.float64]
+    batch: Batch, course: Course, slots: list[int], number_in: NDArray[np.int_], min_J: Floats
 ) -> list[Outcome]:
     """Outcomes of the samples in some slots, which have their answer."""
     if not slots:

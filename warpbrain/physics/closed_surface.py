@@ -7,13 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
+
 
 @dataclass(frozen=True)
 class ClosedSurface:
     """A closed surface of triangles."""
 
     file: str  # where it came from, for people
-    points: NDArray[np.float64] = field(repr=False, compare=False)  # (n, 3) [m]
+    points: Floats = field(repr=False, compare=False)  # (n, 3) [m]
     faces: NDArray[np.int32] = field(repr=False, compare=False)  # (k, 3), oriented in one way, inwards or outwards
 
     def __str__(self) -> str:

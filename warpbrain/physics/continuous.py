@@ -13,12 +13,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.mechanism import Mechanism, Says
-
-Floats = NDArray[np.float64]
 
 #: Kinds of parameters that are numbers, and those of which the components are.
 _ONE, _SEVERAL = ("number",), ("position", "vector", "numbers")

@@ -8,11 +8,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.kernels.distance_field import distance_kernels
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh.feature_normals import feature_normals
-
-Floats = NDArray[np.float64]
 
 #: Nodes of the largest grid; a finer one is made coarser.
 LARGEST_GRID = 2_000_000

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.kernels.extra_energy import extra_kernels, quadratic_extra_kernels
 from warpbrain.physics.term import Body, KernelTerm
 
@@ -38,7 +39,7 @@ class ExtraEnergyTerm(KernelTerm):
         body: Body,
         code: ExtraEnergy,
         elements: NDArray[np.integer],
-        data: NDArray[np.float64],
+        data: Floats,
         ramp: Callable[[float], float],
     ) -> None:
         made = extra_kernels if body.quadratic is None else quadratic_extra_kernels

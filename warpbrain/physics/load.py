@@ -10,12 +10,11 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
 
-Floats = NDArray[np.float64]
 #: The derivative, along a path of loads, of what a function finds for each load on it.
 Along = Callable[[Callable[[Any], Floats]], Floats]
 #: Rounding of factors that users write.

@@ -32,6 +32,7 @@ from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.closed_surface import ClosedSurface
@@ -172,7 +173,7 @@ class Mechanism(Ramped, abc.ABC):
         """What is known of each parameter, by name."""
         return {f.name: f.metadata["says"] for f in dataclasses.fields(cls) if "says" in f.metadata}
 
-    def with_body_turned(self, rotation: NDArray[np.float64]) -> Mechanism:
+    def with_body_turned(self, rotation: Floats) -> Mechanism:
         """As it acts on a body that is turned in the room by a rotation (3, 3); itself if it turns with the body."""
         return self
 
@@ -250,11 +251,11 @@ class Mechanism(Ramped, abc.ABC):
             if not sets[value].any():
                 raise ParameterError(name, f"the {says.kind} '{value}' is empty")
 
-    def held(self, mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def held(self, mesh: TetMesh) -> tuple[Ints, Floats]:
         """Nodes (k,), repeated if need be, and directions (k, 3) in which it holds them."""
         return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
 
-    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+    def acts_on(self, mesh: TetMesh) -> Bools:
         """Elements (m,) whose tissue carries what it does, so that it means nothing without them; none by default."""
         return np.zeros(len(mesh.tetrahedra), dtype=bool)
 
@@ -309,7 +310,7 @@ class Mechanism(Ramped, abc.ABC):
         """Whether what it lets go can leave the wall too, where it is pulled."""
         return False
 
-    def turned(self, rotation: NDArray[np.float64]) -> Self:
+    def turned(self, rotation: Floats) -> Self:
         """The same in a body that is turned: every direction `a` becomes `R a`, (3, 3).
 
         `ParameterError` if it acts in a part of the body, or has directions in each element: these would turn too.
@@ -349,7 +350,7 @@ class Mechanism(Ramped, abc.ABC):
 class Weakening(Protocol):
     """A mechanism that makes the tissue's own elements softer or stiffer."""
 
-    def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+    def stiffness_factor(self, mesh: TetMesh, scale: float) -> Floats:
         """Factor (m,) on all moduli of each element, where the mechanism acts with a scale from 0 to 1."""
 
 
@@ -360,7 +361,7 @@ class Emptying(Protocol):
     def factor(self, time: float = math.inf) -> float:
         """Its scale at a time [s]; by default long after its ramp."""
 
-    def remaining_part(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+    def remaining_part(self, mesh: TetMesh, scale: float) -> Floats:
         """Part (m,) of each element that is left, where the mechanism acts with a scale from 0 to 1."""
 
 
@@ -368,7 +369,7 @@ class Emptying(Protocol):
 class Growing(Protocol):
     """A mechanism that makes the tissue's own elements larger or smaller."""
 
-    def growth(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+    def growth(self, mesh: TetMesh, scale: float) -> Floats:
         """Relative change of volume (m,) of each element without stress, at a scale from 0 to 1."""
 
 
@@ -384,7 +385,7 @@ class Substituting(Protocol):
 class Storing(Protocol):
     """A mechanism that stores energy where the deformation is homogeneous, beside the law's."""
 
-    def stored_energy(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+    def stored_energy(self, F: Floats) -> Floats:
         """Energy (n,) [Pa] per volume at rest, at deformation gradients (n, 3, 3)."""
 
 

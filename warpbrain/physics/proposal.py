@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.free_surfaces import FreeSurface
 
 if TYPE_CHECKING:
     from warpbrain.physics.mechanism import Mechanism
 
-Floats = NDArray[np.float64]
 #: A point or a direction.
 Place = tuple[float, float, float]
 
@@ -40,13 +40,13 @@ class Patch:
 
     name: str  # of the node set that they become
     surface: str  # of the one that they are a part of
-    members: NDArray[np.bool_]  # (n,), they
-    held: NDArray[np.bool_]  # (n,), all nodes of that surface
+    members: Bools  # (n,), they
+    held: Bools  # (n,), all nodes of that surface
     centre: Floats  # (3,) [m]
     radius: float  # [m]
 
     @classmethod
-    def disc(cls, mesh: TetMesh, nodes: str, held: NDArray[np.bool_], centre: Floats, radius: float) -> Patch | None:
+    def disc(cls, mesh: TetMesh, nodes: str, held: Bools, centre: Floats, radius: float) -> Patch | None:
         """Nodes of a held set `nodes` (n,) within a radius [m] of a point; None if they have no face."""
         members = held & (np.linalg.norm(mesh.points - centre, axis=1) <= radius)
         if not members[mesh.boundary].all(axis=1).any():

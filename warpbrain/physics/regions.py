@@ -7,10 +7,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import ParameterError
-
-Floats = NDArray[np.float64]
 
 #: Balls whose weights are kept, the latest ones.
 _KEPT = 1024
@@ -43,9 +42,7 @@ def region_weights(
 
 
 @lru_cache(maxsize=_KEPT)
-def _ball_weights(
-    mesh: TetMesh, centre: tuple[float, ...], radius: float
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _ball_weights(mesh: TetMesh, centre: tuple[float, ...], radius: float) -> tuple[Ints, Floats]:
     """Elements in twice the radius, and their weights: a scan asks for each of its balls many times."""
     away = mesh.centres - np.array(centre)
     square = np.einsum("ei,ei->e", away, away)
@@ -54,12 +51,12 @@ def _ball_weights(
     return near, 0.5 * (1.0 + np.cos(0.5 * np.pi * np.sqrt(square[near]) / radius))
 
 
-def elements_of(mesh: TetMesh, elements: str) -> NDArray[np.int64]:
+def elements_of(mesh: TetMesh, elements: str) -> Ints:
     """Ids of the elements of a set; all of them for an empty name."""
     return np.flatnonzero(mesh.element_sets[elements]) if elements else np.arange(len(mesh.tetrahedra))
 
 
-def elements_with(mesh: TetMesh, faces: NDArray[np.integer]) -> NDArray[np.bool_]:
+def elements_with(mesh: TetMesh, faces: NDArray[np.integer]) -> Bools:
     """Elements (m,) that have one of some triangles (k, 3) as a face."""
     corners = np.sort(mesh.tetrahedra, axis=1)[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]]
     size = len(mesh.points)

@@ -17,6 +17,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import QuadraticMesh, TetMesh
@@ -68,31 +69,31 @@ class Body(Protocol):
         """Gradients of the shape functions of nodes 1 to 3 as rows, (m,) mat33 [1/m]."""
 
     @property
-    def constrained(self) -> NDArray[np.bool_]:
+    def constrained(self) -> Bools:
         """Components (n, 3) of the displacement that are prescribed."""
 
     @property
-    def movable(self) -> NDArray[np.bool_]:
+    def movable(self) -> Bools:
         """Nodes (n,) of which some component is not prescribed."""
 
     @property
-    def volumetric_moduli(self) -> NDArray[np.float64]:
+    def volumetric_moduli(self) -> Floats:
         """`lam` or `K` of each element (m,) [Pa]."""
 
     @property
-    def shear_moduli(self) -> NDArray[np.float64]:
+    def shear_moduli(self) -> Floats:
         """At rest, of each element (m,) [Pa]."""
 
     @property
-    def stiffness_factors(self) -> NDArray[np.float64]:
+    def stiffness_factors(self) -> Floats:
         """Factor (m,) on all moduli of each element, as it is now."""
 
     @property
-    def remaining_parts(self) -> NDArray[np.float64]:
+    def remaining_parts(self) -> Floats:
         """Part (m,) of each element that is left, as it is now."""
 
     @property
-    def growth_stretches(self) -> NDArray[np.float64]:
+    def growth_stretches(self) -> Floats:
         """Stretch (m,) of each element without stress, as it is now."""
 
 
@@ -191,11 +192,11 @@ class Term(abc.ABC):
         for others.
         """
 
-    def skew_stiffness(self, u: NDArray[np.float64]) -> Any:
+    def skew_stiffness(self, u: Floats) -> Any:
         """What of its tangent [N/m] is skew, which no block holds, SciPy sparse (3 n, 3 n); None if nothing is."""
         return None
 
-    def nodal_pressures(self) -> dict[str, NDArray[np.float64]]:
+    def nodal_pressures(self) -> dict[str, Floats]:
         """Pressures of its own at the nodes (n,) [Pa], by name, where the forces were last evaluated."""
         return {}
 
@@ -292,8 +293,8 @@ class TriangleTerm(KernelTerm):
         self,
         body: Body,
         triangles: NDArray[np.integer],
-        points: NDArray[np.float64],
-        data: NDArray[np.float64],
+        points: Floats,
+        data: Floats,
         kernels: tuple[Any, Any, Any],
         ramp: Callable[[float], float],
     ) -> None:

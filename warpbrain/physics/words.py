@@ -12,8 +12,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Floats
 from warpbrain.physics.values import Value
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def along(direction: ArrayLike) -> str:
     return f"from {first} to {last}" if last else ""
 
 
-def _nearest(vector: NDArray[np.float64]) -> list[str]:
+def _nearest(vector: Floats) -> list[str]:
     most, second = np.argsort(-np.abs(vector), kind="stable")[:2].tolist()
     size = abs(vector)
     if not size[most] > 0.0:
@@ -112,7 +113,7 @@ def unsure(value: Value) -> bool:
     return value.sd > abs(value.value)
 
 
-def vector_in(values: Values, name: str) -> NDArray[np.float64]:
+def vector_in(values: Values, name: str) -> Floats:
     """Components (3,) of a parameter that is a vector; zero where nothing is known."""
     found = (values.get(f"{name}_{axis}") for axis in "xyz")
     return np.array([0.0 if one is None else one.value for one in found])

@@ -19,9 +19,7 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 
 if TYPE_CHECKING:
@@ -86,7 +84,7 @@ class Law(abc.ABC):
         return [law.parameters() for law in laws]
 
     @abc.abstractmethod
-    def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
+    def energy(self, stretches: Floats) -> Floats:
         """Incompressible strain energy `w` [Pa] at principal stretches of shape (..., 3)."""
 
     @classmethod

@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.laws.device import InvariantLaw
 from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, require_finite
@@ -123,7 +123,7 @@ class MooneyRivlin(Law):
     def parameters(self) -> tuple[float, ...]:
         return (self.C1, self.C2)
 
-    def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
+    def energy(self, stretches: Floats) -> Floats:
         squares = stretches**2
         I1 = np.sum(squares, axis=-1)
         I2 = squares[..., 0] * squares[..., 1] + squares[..., 1] * squares[..., 2] + squares[..., 2] * squares[..., 0]

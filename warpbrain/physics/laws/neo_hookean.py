@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.laws.device import InvariantLaw
 from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, require_finite
@@ -105,7 +105,7 @@ class NeoHookean(Law):
     def parameters(self) -> tuple[float, ...]:
         return (self.mu,)
 
-    def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
+    def energy(self, stretches: Floats) -> Floats:
         return 0.5 * self.mu * (np.sum(stretches**2, axis=-1) - 3.0)
 
     @classmethod

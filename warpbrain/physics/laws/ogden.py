@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.kernels.powers import power_minus_one, power_quotient
 from warpbrain.physics.laws.device import PrincipalLaw
@@ -224,7 +224,7 @@ class Ogden(Law):
             rows.append(mu + (0.0,) * (terms - own) + alpha + (2.0,) * (terms - own))
         return rows
 
-    def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
+    def energy(self, stretches: Floats) -> Floats:
         logs = np.log(stretches)
         terms = [m / a * np.sum(np.expm1(a * logs), axis=-1) for m, a in zip(self.mu, self.alpha, strict=True)]
         return np.sum(terms, axis=0)

@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.physics.laws.law import Law
-
-Floats = NDArray[np.float64]
 
 #: Points beyond each end of a line that the differences take.
 _BEYOND = 3
@@ -22,7 +20,7 @@ _STEP = 2e-4
 _NEAR_REST = np.exp(_STEP * np.arange(-3, 4)[:, None] * np.ones(3))
 
 
-def total_energy(law: Law, stretches: NDArray[np.float64], poisson: float, formulation: str) -> Floats:
+def total_energy(law: Law, stretches: Floats, poisson: float, formulation: str) -> Floats:
     """Strain energy `Psi` (...) [Pa] of a formulation (`warpbrain.physics.laws.law`) at principal stretches (..., 3).
 
     `InputError` if the Poisson ratio at rest is outside (-1, 0.5) or the formulation is unknown.

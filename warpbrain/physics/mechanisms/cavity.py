@@ -22,6 +22,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh, interface_faces
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
@@ -80,10 +81,10 @@ class Cavity(Mechanism):
             )
         return faces
 
-    def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+    def stiffness_factor(self, mesh: TetMesh, scale: float) -> Floats:
         return self.remaining_part(mesh, scale)
 
-    def remaining_part(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+    def remaining_part(self, mesh: TetMesh, scale: float) -> Floats:
         return np.where(mesh.element_sets[self.elements], 1.0 - scale * (1.0 - self.left), 1.0)
 
     def excludes(self, other: Mechanism, mesh: TetMesh) -> str:

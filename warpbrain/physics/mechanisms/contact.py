@@ -30,6 +30,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.kernels.distance_field import smooth_distance
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
@@ -41,7 +42,7 @@ from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
-from warpbrain.physics.proposal import Floats, NotTestableError, Patch, Proposal, Situation
+from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.physics.term import Body, KernelTerm
 from warpbrain.physics.words import Values, measured
 
@@ -152,7 +153,7 @@ class Contact(Mechanism):
             region=patch.surface.replace("-", " ").replace("_", " "),
         )
 
-    def skull(self, mesh: TetMesh) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    def skull(self, mesh: TetMesh) -> tuple[Floats, NDArray[np.int32]]:
         """Points [m] and outward triangles of the surface it touches."""
         if self.surface is not None:
             return self.surface.points, self.surface.outward
@@ -161,7 +162,7 @@ class Contact(Mechanism):
             raise ParameterError("nodes", f"node set '{self.nodes}' holds no face of the surface")
         return mesh.points, own
 
-    def held(self, mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def held(self, mesh: TetMesh) -> tuple[Ints, Floats]:
         members = np.flatnonzero(mesh.node_sets[self.nodes])
         if self.state == "fixed":
             return np.repeat(members, 3), np.tile(np.eye(3), (len(members), 1))
@@ -236,16 +237,16 @@ class ContactTerm(KernelTerm):
         self._launch(self._kernels[2], u, self._energies, self._gaps)
         return float(np.sum(self._energies.numpy(), dtype=np.float64))
 
-    def gaps(self, u: wp.array) -> NDArray[np.float64]:
+    def gaps(self, u: wp.array) -> Floats:
         """Signed distance (k,) [m] of each node beyond the surface."""
         self.energy(u)
         return self._gaps.numpy().astype(np.float64)
 
-    def pressures(self) -> NDArray[np.float64]:
+    def pressures(self) -> Floats:
         """Pressure (k,) [Pa] that augmentation has found on each node."""
         return self._found.numpy().astype(np.float64)
 
-    def pressing(self) -> NDArray[np.float64]:
+    def pressing(self) -> Floats:
         """Pressure (k,) [Pa] on each node that friction goes with."""
         return self._pressing.numpy().astype(np.float64)
 
@@ -279,7 +280,7 @@ class ContactTerm(KernelTerm):
         if self.mechanism.friction != 0.0:
             self._press(u, self.stiffness * self.gaps(u) + self.pressures())
 
-    def _press(self, u: wp.array, pressure: NDArray[np.float64]) -> None:
+    def _press(self, u: wp.array, pressure: Floats) -> None:
         """Take a pressure (k,) [Pa] and the directions at a displacement [m] as those of friction."""
         self._pressing.assign(np.maximum(pressure, 0.0))
         reached = self.body.mesh.points[self.stencils[:, 0]] + u.numpy()[self.stencils[:, 0]]
@@ -291,7 +292,7 @@ class ContactTerm(KernelTerm):
         self._tractions.zero_()
 
 
-def _edge(points: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
+def _edge(points: Floats, faces: NDArray[np.int32]) -> float:
     """Median length [m] of the edges of triangles."""
     return float(np.median(np.linalg.norm(points[faces] - points[np.roll(faces, 1, axis=1)], axis=2)))
 

@@ -33,8 +33,8 @@ from typing import ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.kernels.minimal_residual import MinimalResidual
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.pore import pore_kernels
@@ -140,7 +140,7 @@ class Drainage(Mechanism):
         # the outermost reach as far as their neighbours do
         width = math.log(edges[-1] / edges[-2])
 
-        def pace(c: NDArray[np.float64]) -> float:
+        def pace(c: Floats) -> float:
             return math.exp(float(c[0]) - start)
 
         every = len(situation.mesh.boundary)
@@ -160,7 +160,7 @@ class Drainage(Mechanism):
         ]
 
     @classmethod
-    def _through(cls, nodes: str, c: NDArray[np.float64]) -> "Drainage":
+    def _through(cls, nodes: str, c: Floats) -> "Drainage":
         return cls(permeability=math.exp(float(c[0])), drained=nodes)
 
     def check(self, mesh: TetMesh) -> None:
@@ -169,10 +169,10 @@ class Drainage(Mechanism):
             name = f"node set '{self.drained}'" if self.drained else "the surface"
             raise ParameterError("drained", f"{name} holds no face of the tissue with pores: its fluid could not leave")
 
-    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+    def acts_on(self, mesh: TetMesh) -> Bools:
         return np.isin(np.arange(len(mesh.tetrahedra)), elements_of(mesh, self.elements))
 
-    def open_nodes(self, mesh: TetMesh) -> NDArray[np.bool_]:
+    def open_nodes(self, mesh: TetMesh) -> Bools:
         """Nodes (n,) at which the pressure of the fluid is given: of the drained faces of elements with pores."""
         faces = mesh.boundary
         if self.drained:
@@ -306,7 +306,7 @@ class DrainageTerm(Term):
             self._contributions, self._entries, self._closed, out,
         )  # fmt: skip
 
-    def _yielding(self) -> NDArray[np.float64]:
+    def _yielding(self) -> Floats:
         """How the solid gives way to the pressure, element by element (k, 10): mass over `lam + 2 mu`.
 
         So much it does to a pressure that varies over a length that is short beside the body.
@@ -326,7 +326,7 @@ class DrainageTerm(Term):
         )  # fmt: skip
         self._solver.solve(self._tolerance)
 
-    def pressures(self) -> NDArray[np.float64]:
+    def pressures(self) -> Floats:
         """Pressure of the fluid at the nodes (n,) [Pa], at the displacement of the last evaluation.
 
         Zero where there are no pores.
@@ -335,7 +335,7 @@ class DrainageTerm(Term):
         found = base + self._beyond.numpy().astype(np.float64)
         return np.where(self._lumped.numpy() > 0.0, found, 0.0)
 
-    def nodal_pressures(self) -> dict[str, NDArray[np.float64]]:
+    def nodal_pressures(self) -> dict[str, Floats]:
         return {"fluid_pressure": self.pressures()}
 
     # -- memory ---------------------------------------------------------------------------------------------------

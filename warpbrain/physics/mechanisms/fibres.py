@@ -12,8 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import LogNormal, Uniform
@@ -175,7 +175,7 @@ class Fibres(Mechanism):
         line = along(vector_in(values, "direction"))
         return [*found, *([f"they run {line}"] if line else [])]
 
-    def stored_energy(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+    def stored_energy(self, F: Floats) -> Floats:
         """See `warpbrain.physics.mechanism.Storing`; one direction of fibres."""
         if self.direction is None:
             raise InputError("fibres: field: a homogeneous state has one direction of them")

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, parameter
@@ -80,7 +80,7 @@ class Inclusion(Mechanism):
         super().check(mesh)
         region_weights(mesh, self.elements, self.centre, self.radius)
 
-    def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+    def stiffness_factor(self, mesh: TetMesh, scale: float) -> Floats:
         """See `warpbrain.physics.mechanism.Weakening`; a stiffness is there from the start, whatever the load."""
         weights = region_weights(mesh, self.elements, self.centre, self.radius)
         return np.exp(self.factor() * np.log(self.ratio) * weights)

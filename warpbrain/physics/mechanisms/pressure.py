@@ -35,6 +35,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.kernels.curved_pressure import curved_pressure_kernels
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
@@ -49,7 +50,6 @@ from warpbrain.physics.term import Body, TriangleTerm
 from warpbrain.physics.words import HARDLY, Values, measured, unsure
 
 Ints = NDArray[np.int32]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +95,7 @@ class Pressure(Mechanism):
             )
         return own
 
-    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+    def acts_on(self, mesh: TetMesh) -> Bools:
         return elements_with(mesh, self.faces(mesh))
 
     @classmethod

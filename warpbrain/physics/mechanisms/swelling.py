@@ -10,9 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.mechanism import Mechanism, parameter
@@ -87,5 +85,5 @@ class Swelling(Mechanism):
         super().check(mesh)
         region_weights(mesh, self.elements, self.centre, self.radius)
 
-    def growth(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+    def growth(self, mesh: TetMesh, scale: float) -> Floats:
         return scale * self.amount * region_weights(mesh, self.elements, self.centre, self.radius)

@@ -23,8 +23,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.kernels.invariants import cofactor
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
@@ -154,7 +154,7 @@ class Viscoelasticity(Mechanism):
         return f"from a tissue that at first is {number(1.0 + smallest.size)} times as stiff as in the end"
 
     @classmethod
-    def _of_coefficients(cls, c: NDArray[np.float64]) -> "Viscoelasticity":
+    def _of_coefficients(cls, c: Floats) -> "Viscoelasticity":
         shares, times = _spectrum(c)
         # the faster branch first
         order = np.argsort(times)
@@ -168,7 +168,7 @@ class Viscoelasticity(Mechanism):
         return ViscoelasticTerm(body, self)
 
 
-def _spectrum(c: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _spectrum(c: Floats) -> tuple[Floats, Floats]:
     """Shares and times [s] of the branches of a proposal, (1,) or (2,), from its coefficients."""
     if len(c) == 2:
         return np.ones(1), np.exp(c[1:])
@@ -176,7 +176,7 @@ def _spectrum(c: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.f
     return np.array([first, 1.0 - first]), np.exp(c[1:3])
 
 
-def _left(c: NDArray[np.float64], time: float) -> float:
+def _left(c: Floats, time: float) -> float:
     """Modulus that has not relaxed at a time [s], as a proposal has it: that of strain that is held."""
     shares, times = _spectrum(c)
     return float(c[0] * (shares @ np.exp(-time / times)))
