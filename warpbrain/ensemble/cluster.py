@@ -15,9 +15,8 @@ from types import TracebackType
 from typing import Any
 
 from warpbrain.ensemble.job import Job
-from warpbrain.ensemble.memory import ENOUGH
 from warpbrain.ensemble.sample import Outcome, failure
-from warpbrain.ensemble.workers import Prepare, compute_part, kind_of, parts_of
+from warpbrain.ensemble.workers import ENOUGH, Prepare, compute_part, kind_of, parts_of
 from warpbrain.errors import InputError
 
 #: Seconds to wait for a scheduler to answer, and for its first worker.

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from warpbrain import __version__
-from warpbrain.ensemble.course import Course, Moving, Resting
+from warpbrain.ensemble.course import Course, Moving, Resting, step_samples
 from warpbrain.ensemble.sample import Outcome, Sample
-from warpbrain.ensemble.stepping import step_samples
 from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism

@@ -25,7 +25,7 @@ import abc
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
@@ -35,15 +35,32 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
 from warpbrain.physics.load import Ramped
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.term import Following
-from warpbrain.physics.values import Smallest
-from warpbrain.physics.words import Values, clauses, label, number
+from warpbrain.physics.words import Smallest, Values, clauses, label, number
+
+
+@dataclass(frozen=True)
+class ClosedSurface:
+    """A closed surface of triangles."""
+
+    file: str  # where it came from, for people
+    points: Floats = field(repr=False, compare=False)  # (n, 3) [m]
+    faces: NDArray[np.int32] = field(repr=False, compare=False)  # (k, 3), oriented in one way, inwards or outwards
+
+    def __str__(self) -> str:
+        return self.file
+
+    @property
+    def outward(self) -> NDArray[np.int32]:
+        """The triangles, all turned if they enclose a negative volume."""
+        a, b, c = (self.points[self.faces[:, i]] - self.points.mean(axis=0) for i in range(3))
+        return self.faces if np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0 else self.faces[:, ::-1]
+
 
 __all__ = [
     "Emptying",

@@ -6,8 +6,7 @@ import math
 from collections.abc import Sequence
 
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.physics.values import Smallest, Value
-from warpbrain.physics.words import measured, number
+from warpbrain.physics.words import Smallest, Value, measured, number
 
 #: An effect that is seen only this improbably far out of what is expected [part] is no effect that is seen.
 _FAR = 1e-4

@@ -9,13 +9,42 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats
-from warpbrain.physics.values import Value
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter of a mechanism after the fit."""
+
+    name: str
+    value: float  # in the unit
+    sd: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Smallest:
+    """The smallest effect of a kind that these data show."""
+
+    size: float  # in the unit: nine of ten raise an alarm
+    unit: str
+    name: str  # of the parameter
+    named: float = float("inf")  # the size of which half would be named; infinite if none would
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Something that could be measured next."""
+
+    what: str
+    expected_nats: float  # by which it would tell the two most probable causes apart, expected log Bayes factor
+
 
 if TYPE_CHECKING:
     from warpbrain.physics.mechanism import Says

@@ -37,10 +37,9 @@ from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
 from warpbrain.mesh.extent import extent
 from warpbrain.mesh.free_surfaces import FreeSurface
-from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
-from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import ClosedSurface, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.physics.term import Body, KernelTerm

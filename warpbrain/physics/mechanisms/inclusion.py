@@ -20,8 +20,7 @@ from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
-from warpbrain.physics.values import Smallest
-from warpbrain.physics.words import Values, measured, number, radius_in_words
+from warpbrain.physics.words import Smallest, Values, measured, number, radius_in_words
 
 #: Where it is looked for: standard deviation of the logarithm of the ratio, and radii of balls [m].
 _USUAL, _RADII = 1.2, (0.012, 0.018, 0.027)

@@ -34,8 +34,7 @@ from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body, KernelTerm
-from warpbrain.physics.values import Smallest, Value
-from warpbrain.physics.words import HARDLY, Values, measured, number, unsure
+from warpbrain.physics.words import HARDLY, Smallest, Value, Values, measured, number, unsure
 
 #: Relaxation times [s] that are looked for, alone and in pairs.
 _LOOKED_FOR = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
