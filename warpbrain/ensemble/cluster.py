@@ -103,7 +103,9 @@ class Cluster:
                 if len(numbers) > 1:
                     ending.update([submit(part.part({number})) for number in numbers])
                 else:
-                    yield [failure(numbers[0], _why(error))]
+                    count, last = error.allowed_failures + 1, error.last_worker.address
+                    reason = f"{count} workers died while they computed it, the last one {last}"
+                    yield [failure(numbers[0], f"{reason}: out of memory? Their logs say more")]
             # it is written: the scheduler may forget it
             future.release()
 
@@ -120,12 +122,6 @@ def _connect(stack: ExitStack, address: str, workers: int | None) -> Any:
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs="CRITICAL"
         )
     return stack.enter_context(distributed.Client(stack.enter_context(cluster)))
-
-
-def _why(error: Any) -> str:
-    """Why a sample has no answer that workers died of."""
-    count, last = error.allowed_failures + 1, error.last_worker.address
-    return f"{count} workers died while they computed it, the last one {last}: out of memory? Their logs say more"
 
 
 def _kind(device: str | None, prepare: Prepare) -> str:

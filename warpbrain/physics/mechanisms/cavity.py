@@ -66,7 +66,7 @@ class Cavity(Mechanism):
         situation.require_new(cls.kind)
         if "resection" not in situation.mesh.element_sets or not situation.mesh.element_sets["resection"].any():
             raise NotTestableError("needs an element set 'resection' of tissue that is still there")
-        return [Proposal.of_one(lambda _share: cls(), 1.0, 0.3, "switch", region="resection")]
+        return [Proposal.switch(cls(), 0.3, region="resection")]
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

@@ -36,7 +36,6 @@ from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
 from warpbrain.mesh.extent import extent
-from warpbrain.mesh.free_surfaces import FreeSurface
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import ClosedSurface, Mechanism, ParameterError, parameter
@@ -113,7 +112,11 @@ class Contact(Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """What is held slides or lifts off instead; what is free slides along a wall where it was, or meets it."""
         released = [cls._let_go(state, patch, situation.mesh) for patch in situation.held for state in STATES[1:]]
-        walls = [cls._kept(state, surface) for surface in situation.free for state in STATES[1:]]
+        walls = [
+            Proposal.switch(cls(nodes=surface.name, state=state), 0.5, region=surface.words)
+            for surface in situation.free
+            for state in STATES[1:]
+        ]
         if not released and not walls:
             raise NotTestableError("has no surface")
         return [*released, *walls]
@@ -129,21 +132,14 @@ class Contact(Mechanism):
         return self.state == "lifting"
 
     @classmethod
-    def _kept(cls, state: str, surface: FreeSurface) -> Proposal:
-        return Proposal.of_one(
-            lambda _share: cls(nodes=surface.name, state=state), 1.0, 0.5, "switch", region=surface.words
-        )
-
-    @classmethod
     def _let_go(cls, state: str, patch: Patch, mesh: TetMesh) -> Proposal:
         def elsewhere(centre: Floats, radius: float) -> Proposal:
             return cls._let_go(state, Patch.disc(mesh, patch.surface, patch.held, centre, radius) or patch, mesh)
 
-        return Proposal.of_one(
-            lambda _share: cls(nodes=patch.name, state=state),
-            1.0,
+        return Proposal.switch(
+            cls(nodes=patch.name, state=state),
             0.5,
-            "release",
+            follows="release",
             patch=patch,
             elsewhere=None if patch.name == patch.surface else elsewhere,
             on_surface=True,

@@ -28,7 +28,6 @@ follow the pressure there, which overshoots (Vermeer and Verruijt 1981).
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -140,28 +139,21 @@ class Drainage(Mechanism):
         # the outermost reach as far as their neighbours do
         width = math.log(edges[-1] / edges[-2])
 
-        def pace(c: Floats) -> float:
-            return math.exp(float(c[0]) - start)
-
         every = len(situation.mesh.boundary)
         parts = {surface.name: surface.words for surface in situation.free if len(surface.faces) < every}
         return [
             Proposal(
-                partial(cls._through, nodes),
+                lambda c, nodes=nodes: cls(permeability=math.exp(float(c[0])), drained=nodes),
                 np.array([math.log(expected.quantile((number + 0.5) / _LOOKED_FOR))]),
                 np.full(1, width),
                 "course",
                 np.array([start]),
-                pace=pace,
+                pace=lambda c: math.exp(float(c[0]) - start),
                 region=f"all tissue, drained through the {words}" if nodes else "all tissue",
             )
             for nodes, words in {"": "", **parts}.items()
             for number in range(_LOOKED_FOR)
         ]
-
-    @classmethod
-    def _through(cls, nodes: str, c: Floats) -> "Drainage":
-        return cls(permeability=math.exp(float(c[0])), drained=nodes)
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

@@ -73,10 +73,7 @@ class Falx(Mechanism):
         names = [name for name in situation.mesh.node_sets if any(word in name for word in ("falx", "tentorium"))]
         if not names:
             raise NotTestableError("needs a node set 'falx' or 'tentorium' in the mesh")
-        return [
-            Proposal.of_one(lambda _share, nodes=nodes: cls(nodes=nodes), 1.0, 0.3, "switch", region=nodes)
-            for nodes in names
-        ]
+        return [Proposal.switch(cls(nodes=nodes), 0.3, region=nodes) for nodes in names]
 
     def faces(self, mesh: TetMesh) -> NDArray[np.int32]:
         """Triangles (k, 3) of the membrane."""

@@ -104,9 +104,13 @@ class Pressure(Mechanism):
         if not situation.free:
             raise NotTestableError("needs a part of the surface that nothing holds")
         return [
-            Proposal.of_one(partial(_pressing, surface.name), 0.0, 400.0, region=surface.words, varying=(0,))
+            Proposal.of_one(partial(cls._of_value, surface.name), 0.0, 400.0, region=surface.words, varying=(0,))
             for surface in situation.free
         ]
+
+    @classmethod
+    def _of_value(cls, nodes: str, value: float) -> "Pressure":
+        return cls(nodes=nodes, value=value)
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
@@ -124,10 +128,6 @@ class Pressure(Mechanism):
 
     def bind(self, body: Body) -> "PressureTerm":
         return PressureTerm(body, self.faces(body.mesh), self.value, self.factor)
-
-
-def _pressing(nodes: str, value: float) -> Pressure:
-    return Pressure(nodes=nodes, value=value)
 
 
 class PressureTerm(TriangleTerm):
