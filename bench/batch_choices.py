@@ -17,7 +17,7 @@ import warp.optim.linear as warp_linear
 
 from warpbrain.bench.batches import phantom_job
 from warpbrain.ensemble.batch import Batch
-from warpbrain.ensemble.stepping import step_batch
+from warpbrain.ensemble.course import step_batch
 from warpbrain.kernels.linear import linear_kernels
 
 DEVICE = sys.argv[1] if len(sys.argv) > 1 else "cpu"

@@ -6,9 +6,8 @@ import numpy as np
 from bodies import model_of
 from shapes import box, distorted
 
-from warpbrain.ensemble.course import Course
+from warpbrain.ensemble.course import Course, step_samples
 from warpbrain.ensemble.sample import Outcome, Sample
-from warpbrain.ensemble.stepping import step_samples
 from warpbrain.physics.laws import Law, NeoHookean
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.model import Material, Model, Motion

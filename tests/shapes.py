@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.closed_surface import ClosedSurface
+from warpbrain.physics.mechanism import ClosedSurface
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

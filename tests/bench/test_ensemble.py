@@ -10,7 +10,7 @@ from command import Ran
 from shapes import cube
 
 from warpbrain.bench.batches import STEPS, count_bytes
-from warpbrain.ensemble.memory import bytes_per_slot
+from warpbrain.ensemble.workers import bytes_per_slot
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System

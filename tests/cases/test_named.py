@@ -15,11 +15,11 @@ from warpbrain.cases.writing import write_case
 from warpbrain.errors import InputError
 from warpbrain.mesh import face_vectors, wall_nodes
 from warpbrain.mesh.vtu import read_vtu
-from warpbrain.physics.directions import element_directions
 from warpbrain.physics.mechanisms.contact import Contact
 from warpbrain.physics.mechanisms.fibres import Fibres
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.pressure import Pressure
+from warpbrain.physics.regions import element_directions
 from warpbrain.simulation.finer import FinerCase
 from warpbrain.simulation.of_case import model_of
 

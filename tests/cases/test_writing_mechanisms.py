@@ -13,8 +13,7 @@ from warpbrain.cases.writing import write_case
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.closed_surface import ClosedSurface
-from warpbrain.physics.mechanism import Facts, Mechanism, Removing
+from warpbrain.physics.mechanism import ClosedSurface, Facts, Mechanism, Removing
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.resection import Resection

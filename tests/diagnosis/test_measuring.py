@@ -6,7 +6,7 @@ import pytest
 from warpbrain.diagnosis.measuring import next_measurements
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.physics.mechanisms.gravity import Gravity
-from warpbrain.physics.values import Measurement
+from warpbrain.physics.words import Measurement
 
 
 def _told(diagnosis: Diagnosis, first: str, second: str) -> tuple[Measurement, ...]:

@@ -13,7 +13,7 @@ from warpbrain.diagnosis.result import Fit, Ranked
 from warpbrain.diagnosis.sentences import effect_sentence, sentence_of
 from warpbrain.inference.decide import VERDICTS, Decision
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.physics.values import Smallest, Value
+from warpbrain.physics.words import Smallest, Value
 from warpbrain.worlds.body.not_physics import SENTENCES
 
 #: What each verdict says, whatever its numbers.

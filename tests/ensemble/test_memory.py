@@ -8,7 +8,7 @@ from material_point import LAWS
 
 from warpbrain.ensemble import memory
 from warpbrain.ensemble.batch import Batch
-from warpbrain.ensemble.memory import ENOUGH, batch_size, bytes_per_slot, free_bytes
+from warpbrain.ensemble.workers import ENOUGH, batch_size, bytes_per_slot, free_bytes
 from warpbrain.errors import InputError
 from warpbrain.simulation.system import System
 

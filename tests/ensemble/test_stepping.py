@@ -7,8 +7,7 @@ import pytest
 from many_samples import MODULI, computed, samples_of, shaken_block
 from material_point import LAWS
 
-from warpbrain.ensemble.moving import Moving
-from warpbrain.ensemble.resting import Resting
+from warpbrain.ensemble.course import Moving, Resting
 from warpbrain.ensemble.sample import Sample
 from warpbrain.errors import InputError, SolveError
 from warpbrain.kernels.precision import PRECISIONS

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from warpbrain.errors import InputError
-from warpbrain.physics.continuous import continuous, differ_in_numbers_only, numbers_of, scales_of, with_numbers
+from warpbrain.physics.continuous import (
+    alternatives,
+    continuous,
+    differ_in_numbers_only,
+    numbers_of,
+    scales_of,
+    with_numbers,
+)
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.cavity import Cavity
 from warpbrain.physics.mechanisms.compressibility import Compressibility
@@ -17,7 +24,6 @@ from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.traction import Traction
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
-from warpbrain.physics.switching import alternatives
 
 BALL = Swelling(amount=0.1, centre=(0.01, 0.02, 0.03), radius=0.005)
 DOWN = [f"direction {axis}" for axis in "xyz"]

@@ -7,8 +7,7 @@ import pytest
 
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import size_in_words, smallest_in_words
-from warpbrain.physics.values import Smallest, Value
-from warpbrain.physics.words import along, length, measured, number, place, towards
+from warpbrain.physics.words import Smallest, Value, along, length, measured, number, place, towards
 
 
 @pytest.mark.parametrize(

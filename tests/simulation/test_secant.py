@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 from shapes import cube
 
+from warpbrain.physics.continuous import alternatives
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanisms.contact import Contact
 from warpbrain.physics.mechanisms.falx import Falx
 from warpbrain.physics.mechanisms.resection import Resection
-from warpbrain.physics.switching import alternatives
 from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.model import Material, Model

@@ -11,10 +11,9 @@ import warp as wp
 from warpbrain.cases.shipped import find_case
 from warpbrain.ensemble.batch import Batch
 from warpbrain.ensemble.choosing import drawn_samples, swept_samples
+from warpbrain.ensemble.course import step_batch
 from warpbrain.ensemble.job import Job
-from warpbrain.ensemble.memory import bytes_per_slot
-from warpbrain.ensemble.stepping import step_batch
-from warpbrain.ensemble.workers import Here, Prepare, Processes
+from warpbrain.ensemble.workers import Here, Prepare, Processes, bytes_per_slot
 from warpbrain.gp.trained import trained
 from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.kernels.tetrahedron import PAIRS

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.physics.closed_surface import ClosedSurface
+from warpbrain.physics.mechanism import ClosedSurface
 
 Floats = NDArray[np.float64]
 Ramp = Sequence[tuple[float, float]]

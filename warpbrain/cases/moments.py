@@ -14,9 +14,8 @@ import numpy as np
 
 from warpbrain.cases.boundary import Boundary, Displaced
 from warpbrain.cases.case import Case
-from warpbrain.physics.load import Load
+from warpbrain.physics.load import Load, Ramped
 from warpbrain.physics.mechanism import Mechanism
-from warpbrain.physics.ramp import Ramped
 from warpbrain.recordings.times import compared_rows, times_of
 
 

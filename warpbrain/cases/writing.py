@@ -21,8 +21,7 @@ from warpbrain.errors import InputError, require_kind
 from warpbrain.frame import Frame
 from warpbrain.mesh import write_mesh
 from warpbrain.mesh.vtu import write_vtu
-from warpbrain.physics.closed_surface import ClosedSurface
-from warpbrain.physics.mechanism import Facts, Mechanism, Removing
+from warpbrain.physics.mechanism import ClosedSurface, Facts, Mechanism, Removing
 from warpbrain.recordings.recording import (
     ForceRecording,
     PointsRecording,

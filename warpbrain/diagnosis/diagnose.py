@@ -34,7 +34,7 @@ from warpbrain.inference.decide import (
     Decision,
     decide,
 )
-from warpbrain.physics.values import Measurement
+from warpbrain.physics.words import Measurement
 from warpbrain.seconds import Seconds
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.body.hypotheses import HypothesisSearch

@@ -15,7 +15,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.physics.values import Measurement
+from warpbrain.physics.words import Measurement
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.sensors import spread_points

@@ -17,7 +17,7 @@ from warpbrain.inference import Kind
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.decide import Decision
 from warpbrain.inference.predict import Prediction
-from warpbrain.physics.values import Measurement, Smallest, Value
+from warpbrain.physics.words import Measurement, Smallest, Value
 from warpbrain.shown import Shown
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.hypotheses import HypothesisSearch

@@ -16,7 +16,7 @@ from warpbrain.diagnosis.result import Confusion
 from warpbrain.inference import Cause, GaussianModel, Kind
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import Calibration, calibration
-from warpbrain.physics.values import Smallest
+from warpbrain.physics.words import Smallest
 from warpbrain.worlds.body.causes import BodyCauses
 from warpbrain.worlds.body.parameters import smallest_of
 

@@ -18,73 +18,120 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.ensemble.batch_materials import BatchMaterials
+from warpbrain.arrays import Bools, Floats
 from warpbrain.ensemble.sample import Sample
+from warpbrain.errors import InputError
 from warpbrain.kernels.batched.assembly import batched_assembly_kernels
+from warpbrain.kernels.batched.elements import BatchedElementKernels, batched_element_kernels
 from warpbrain.kernels.batched.layout import stages
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
 from warpbrain.kernels.batched.motion import batched_motion_kernels
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
 from warpbrain.kernels.tetrahedron import PAIRS
+from warpbrain.physics.laws import Law
 from warpbrain.simulation.dynamics import finest_tolerance
+from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
 
-Floats = NDArray[np.float64]
+
+def code_of(material: Material) -> tuple[type[Law], str]:
+    """What decides which kernels compute a material."""
+    return type(material.law), material.formulation
+
+
+@dataclass(frozen=True)
+class BatchGroup:
+    """Elements that share a law and formulation."""
+
+    kernels: BatchedElementKernels
+    elements: wp.array  # elements, and which tissue of the group each is of
+    tissue: wp.array
+    parameters: wp.array  # one row for a tissue and a slot, slots fastest
+    rows: Floats  # the same on the host, shape (tissues, slots, parameters)
+    known: Mapping[int, Floats]  # rows of each sample by its number, shape (tissues, parameters)
+
+
+class BatchMaterials:
+    """The laws of the samples that are in the slots, of all that may ever be placed, each with materials.
+
+    `InputError` if they are not all of the same laws.
+    """
+
+    def __init__(self, system: System, samples: Sequence[Sample], slots: int) -> None:
+        self._system = system
+        self._slots = slots
+        by_number = {sample.number: sample.materials for sample in samples if sample.materials is not None}
+        first = next(iter(by_number.values()))
+        for number, materials in by_number.items():
+            for label, material in materials.items():
+                if label not in first or code_of(material) != code_of(first[label]):
+                    raise InputError(
+                        f"sample {number}: tissue {label}: {material.law.name} ({material.formulation}): all samples "
+                        "of an ensemble have the same laws, with parameters of their own"
+                    )
+        labels: dict[tuple[type[Law], str], list[int]] = {}
+        for label in sorted(first):
+            labels.setdefault(code_of(first[label]), []).append(label)
+        self.groups = [self._group(alike, by_number) for alike in labels.values()]
+
+    def _group(self, labels: list[int], samples: Mapping[int, Mapping[int, Material]]) -> BatchGroup:
+        system, p = self._system, self._system.precision
+        everyone = [materials[label] for materials in samples.values() for label in labels]
+        law_type, formulation = code_of(everyone[0])
+        # all at once: laws with fewer terms than another get terms of no weight
+        laws = law_type.parameter_rows([material.law for material in everyone])
+        table = np.array([(m.volumetric_modulus, *row) for m, row in zip(everyone, laws, strict=True)])
+        table = table.reshape(len(samples), len(labels), -1)
+        # slots that never hold a sample hold the parameters of one, not zeros that a law may divide by
+        rows = np.repeat(table[0][:, None], self._slots, axis=1)
+        tissue = system.model.mesh.tissue
+        members = np.flatnonzero(np.isin(tissue, labels))
+
+        def array(values: Any, dtype: Any) -> wp.array:
+            return wp.array(values, dtype=dtype, device=system.device)
+
+        return BatchGroup(
+            batched_element_kernels(law_type.device_law(formulation), p),
+            array(members, int),
+            array(np.searchsorted(labels, tissue[members]), int),
+            array(rows.reshape(-1, rows.shape[2]), p.scalar),
+            rows,
+            dict(zip(samples, table, strict=True)),
+        )
+
+    def place(self, numbers: Mapping[int, int]) -> None:
+        """Put samples, by their numbers, into slots."""
+        for group in self.groups:
+            for slot, number in numbers.items():
+                group.rows[:, slot] = group.known[number]
+            group.parameters.assign(group.rows.reshape(-1, group.rows.shape[2]))
+
+
 Ints = NDArray[np.int32]
+
+#: Iterations of a linear solve.
+_MAX_CG = 2000
 
 
 @dataclass(frozen=True)
 class States:
-    """What is known of the state of each slot after a pass; arrays over all slots.
+    """What is known of the state of each slot after a pass; arrays over all slots."""
 
-    Attributes
-    ----------
-    ready : bool array
-        The state is new: the others are still being solved for, or empty.
-    min_J : array
-    unbalanced, internal : array
-        Norms of what is out of balance on the free components and of the internal forces [N].
-    cg_iterations : int array
-    cg_residual, cg_goal : array
-        Of the linear solve that led to the state.
-    """
-
-    ready: NDArray[np.bool_]
+    ready: Bools  # the state is new: the others are still being solved for, or empty
     min_J: Floats
-    unbalanced: Floats
-    internal: Floats
+    unbalanced: Floats  # norm of what is out of balance on the free components [N]
+    internal: Floats  # norm of the internal forces [N]
     cg_iterations: Ints
-    cg_residual: Floats
+    cg_residual: Floats  # of the linear solve that led to the state
     cg_goal: Floats
 
 
 class Batch:
-    """Slots for samples on a device.
+    """Slots on a device for samples, which share the mesh, pattern and masses of a system, and not its fields.
 
-    Parameters
-    ----------
-    system : System
-        Mesh, pattern and masses, which all samples share; its own fields are not used.
-    samples : sequence of Sample
-        All that may ever be placed.
-    slots : int
-    tolerance : float
-        Relative tolerance of each linear solve; never finer than 20 rounding errors of the precision.
-    max_cg : int
-        Iterations of a linear solve.
-    linger : float
-        A pass ends when this part of the solves that it began with, or less, has not ended.
-
-    Attributes
-    ----------
-    time_step : array
-        `h` [s] of each slot in the step that it begins next.
-    load_factors : (loads, slots) array
-        Factors of the model's loads at the end of that step.
-    amounts : (shapes, slots) array
-        How much of each of `shapes` is to be reached at the end of that step.
-    shapes : (shapes, n, 3) array
-        Prescribed displacements [m] are sums of these.
+    Linear solves have a relative tolerance, never finer than 20 rounding errors of the precision. A pass ends when the
+    part `linger` of those that it began with, or less, has not ended. Prescribed displacements are sums of `shapes`
+    (shapes, n, 3) [m].
     """
 
     def __init__(
@@ -95,7 +142,6 @@ class Batch:
         *,
         tolerance: float,
         shapes: Floats | None = None,
-        max_cg: int = 2000,
         linger: float = 0.0,
     ) -> None:
         self.system, self.slots = system, slots
@@ -105,8 +151,7 @@ class Batch:
         self._kernels = batched_assembly_kernels(system.precision)
         self._motion = batched_motion_kernels(system.precision)
         self._sums_kernels = batched_solve_kernels(system.precision)
-        n = system.size
-        self.shapes = np.zeros((0, n, 3)) if shapes is None else shapes
+        self.shapes = np.zeros((0, system.size, 3)) if shapes is None else shapes
         self._place_state()
         self._place_lists()
         self._place_coefficients()
@@ -122,7 +167,7 @@ class Batch:
             self._dv,
             system.precision,
             tolerance=finest_tolerance(tolerance, system.precision),
-            max_iterations=max_cg,
+            max_iterations=_MAX_CG,
         )
         self._graph: Any = None
 
@@ -157,6 +202,7 @@ class Batch:
 
     def _place_coefficients(self) -> None:
         model, p, b = self.system.model, self._precision, self.slots
+        # of the step that each slot begins next: `h` [s]; factors of loads and amounts of shapes at its end
         self.time_step = np.ones(b)
         self.load_factors = np.zeros((len(model.loads), b))
         self.amounts = np.zeros((len(self.shapes), b))
@@ -218,15 +264,7 @@ class Batch:
     # -- a pass ---------------------------------------------------------------------------------------------------
 
     def advance(self, start: NDArray[np.intp], marked: NDArray[np.intp]) -> States:
-        """One pass.
-
-        Parameters
-        ----------
-        start : array of int
-            Slots that begin a step, of the lengths `time_step`, from a state that has been evaluated.
-        marked : array of int
-            Slots whose state is to be evaluated.
-        """
+        """One pass: slots `start` begin a step from an evaluated state, the states of `marked` are to be evaluated."""
         self._unsolved[start] = True
         stepping = np.flatnonzero(self._unsolved)
         self._write_list(self._start, self._start_count, start)

@@ -15,9 +15,8 @@ from types import TracebackType
 from typing import Any
 
 from warpbrain.ensemble.job import Job
-from warpbrain.ensemble.memory import ENOUGH
 from warpbrain.ensemble.sample import Outcome, failure
-from warpbrain.ensemble.workers import Prepare, compute_part, kind_of, parts_of
+from warpbrain.ensemble.workers import ENOUGH, Prepare, compute_part, kind_of, parts_of
 from warpbrain.errors import InputError
 
 #: Seconds to wait for a scheduler to answer, and for its first worker.
@@ -27,13 +26,7 @@ _DEATHS = 2
 
 
 def local_workers(address: str) -> int | None:
-    """Workers that ``local[:N]`` asks for, 0 if it does not say how many; None if it is the address of a scheduler.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
+    """Workers that ``local[:N]`` asks for, 0 if it does not say how many; None if it is the address of a scheduler."""
     if address == "local":
         return 0
     if address.startswith("local:"):
@@ -49,23 +42,9 @@ def local_workers(address: str) -> int | None:
 class Cluster:
     """A Dask cluster, or one of processes of this machine that lives as long as this object's context.
 
-    Parameters
-    ----------
-    address : str
-        Of a scheduler; ``local`` or ``local:N`` starts processes here.
-    workers : int
-        How many ``local`` starts.
-    device : str or None
-        Warp device of each worker.
-    batch : int or None
-        Samples at a time on a worker; None for what it has memory for and pays.
-    prepare : callable
-        Called on a worker before each part.
-
-    Raises
-    ------
-    InputError
-        If Dask is not installed, or no scheduler or worker answers.
+    The address is of a scheduler; ``local:N`` starts processes here, ``local`` so many `workers`. Each has a Warp
+    device and takes a batch of samples at a time, None for what it has memory for and pays; it is prepared before each
+    part. `InputError` if Dask is not installed, or no scheduler or worker answers.
     """
 
     def __init__(self, address: str, workers: int, device: str | None, batch: int | None, prepare: Prepare) -> None:
@@ -103,13 +82,7 @@ class Cluster:
         self._stack.close()
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
-        """Outcomes of all samples of a job, as they become known.
-
-        Raises
-        ------
-        InputError
-            If a worker has other versions than this machine, or no such device.
-        """
+        """See `Workers`; `InputError` if a worker has other versions than this machine, or no such device."""
         import distributed
 
         pending: dict[str, Job] = {}
@@ -130,7 +103,9 @@ class Cluster:
                 if len(numbers) > 1:
                     ending.update([submit(part.part({number})) for number in numbers])
                 else:
-                    yield [failure(numbers[0], _why(error))]
+                    count, last = error.allowed_failures + 1, error.last_worker.address
+                    reason = f"{count} workers died while they computed it, the last one {last}"
+                    yield [failure(numbers[0], f"{reason}: out of memory? Their logs say more")]
             # it is written: the scheduler may forget it
             future.release()
 
@@ -147,12 +122,6 @@ def _connect(stack: ExitStack, address: str, workers: int | None) -> Any:
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs="CRITICAL"
         )
     return stack.enter_context(distributed.Client(stack.enter_context(cluster)))
-
-
-def _why(error: Any) -> str:
-    """Why a sample has no answer that workers died of."""
-    count, last = error.allowed_failures + 1, error.last_worker.address
-    return f"{count} workers died while they computed it, the last one {last}: out of memory? Their logs say more"
 
 
 def _kind(device: str | None, prepare: Prepare) -> str:

@@ -11,11 +11,8 @@ from typing import Any
 import numpy as np
 
 from warpbrain import __version__
-from warpbrain.ensemble.course import Course
-from warpbrain.ensemble.moving import Moving
-from warpbrain.ensemble.resting import Resting
+from warpbrain.ensemble.course import Course, Moving, Resting, step_samples
 from warpbrain.ensemble.sample import Outcome, Sample
-from warpbrain.ensemble.stepping import step_samples
 from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism
@@ -31,31 +28,15 @@ def _versions() -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Job:
-    """Samples of a model and the course that they take.
+    """Samples of a model and the course that they take."""
 
-    Attributes
-    ----------
-    model : Model
-        Its own materials are not used.
-    samples : tuple of Sample
-    steps : int or None
-        Time steps; None: to rest.
-    time_step : float
-        Of a motion [s].
-    tolerance : float
-        Of rest; see `warpbrain.simulation.relaxation.RelaxationOptions`.
-    precision : str
-        ``"double"`` or ``"single"``.
-    versions : dict of str
-        Of this machine's packages; a worker must have the same.
-    """
-
-    model: Model
+    model: Model  # its own materials are not used
     samples: tuple[Sample, ...]
-    steps: int | None = None
-    time_step: float = 0.001
-    tolerance: float = 1e-8
-    precision: str = "double"
+    steps: int | None = None  # time steps; None: to rest
+    time_step: float = 0.001  # of a motion [s]
+    tolerance: float = 1e-8  # of rest; see `warpbrain.simulation.relaxation.RelaxationOptions`
+    precision: str = "double"  # ``"double"`` or ``"single"``
+    #: Of this machine's packages; a worker must have the same
     versions: dict[str, str] = field(default_factory=_versions)
 
     def __post_init__(self) -> None:
@@ -80,13 +61,7 @@ class Job:
         return Resting(self.model, RelaxationOptions(tolerance=self.tolerance), find_precision(self.precision))
 
     def system(self, device: str | None) -> System:
-        """The model on a device.
-
-        Raises
-        ------
-        InputError
-            If this machine does not have the versions that the job was made with: its bits would be others.
-        """
+        """The model on a device; `InputError` on a machine of other versions than the job's: bits would be others."""
         if self.versions != _versions():
             raise InputError(f"a worker has {_versions()}, the job was made with {self.versions}")
         return System(self.model, device, self.precision)

@@ -6,17 +6,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.ensemble.sample import Outcome, Sample
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.comparison import Comparison
 from warpbrain.shown import Shown
+from warpbrain.simulation.mesh_error import Found
 from warpbrain.simulation.observation import observe
 from warpbrain.simulation.result import Statistics, displacement_statistics
-
-Floats = NDArray[np.float64]
 
 #: Percentiles of the fields.
 PERCENTILES = (5, 50, 95)
@@ -25,23 +24,12 @@ _NOTHING = np.zeros((0, 3))
 
 @dataclass(frozen=True)
 class Row:
-    """A sample and how it ended.
-
-    Attributes
-    ----------
-    sample : Sample
-    outcome : Outcome
-        Without its fields, which `Fields` sums up.
-    displacement : mapping of str to Statistics
-        By node set; empty if it failed.
-    comparisons : tuple of Comparison
-        With the case's recordings; empty if it failed.
-    """
+    """A sample and how it ended."""
 
     sample: Sample
-    outcome: Outcome
-    displacement: Mapping[str, Statistics]
-    comparisons: tuple[Comparison, ...]
+    outcome: Outcome  # without its fields, which `Fields` sums up
+    displacement: Mapping[str, Statistics]  # by node set; empty if it failed
+    comparisons: tuple[Comparison, ...]  # with the case's recordings; empty if it failed
 
     def error(self, recording: str) -> float:
         """Root mean square error at a recording, in its unit."""
@@ -50,38 +38,21 @@ class Row:
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean, standard deviation and percentiles of a quantity over the samples.
-
-    Attributes
-    ----------
-    mean, sd : array
-        The standard deviation is that of the samples themselves, with their number as its divisor.
-    percentiles : mapping of int to array
-    """
+    """Mean, standard deviation and percentiles of a quantity over the samples."""
 
     mean: Floats
-    sd: Floats
+    sd: Floats  # of the samples themselves, with their number as its divisor
     percentiles: Mapping[int, Floats]
 
 
 @dataclass(frozen=True)
 class Fields:
-    """The displacement over the samples that have an answer.
-
-    Attributes
-    ----------
-    mesh : TetMesh
-    count : int
-    components : Spread
-        Of each component [m], arrays (n, 3).
-    size : Spread
-        Of its size [m], arrays (n,).
-    """
+    """The displacement over the samples that have an answer."""
 
     mesh: TetMesh
     count: int
-    components: Spread
-    size: Spread
+    components: Spread  # of each component [m], arrays (n, 3)
+    size: Spread  # of its size [m], arrays (n,)
 
 
 @dataclass(frozen=True)
@@ -123,15 +94,6 @@ class EnsembleResult(Shown):
         return min(self.done, key=lambda row: row.error(recording))
 
 
-@dataclass(frozen=True)
-class _Reached:
-    """A state for `observe`."""
-
-    mesh: TetMesh
-    u: Floats
-    reactions: Floats
-
-
 def results_of(
     case: Case,
     mesh: TetMesh,
@@ -140,20 +102,9 @@ def results_of(
     to_rest: bool,
     on_sample: Callable[[int], None] | None = None,
 ) -> EnsembleResult:
-    """Sum up the outcomes of samples.
+    """Sum up the outcomes of samples, one for each in any order, on the mesh of the case's model.
 
-    Parameters
-    ----------
-    case : Case
-    mesh : TetMesh
-        Of the case's model.
-    samples : sequence of Sample
-    outcomes : iterable of Outcome
-        One for each sample, in any order.
-    to_rest : bool
-        They are states at rest, which are compared with the end of each recording.
-    on_sample : callable, optional
-        Called with the count of samples so far.
+    States at rest (`to_rest`) are compared with the end of each recording. `on_sample` is called with the count so far.
     """
     by_number = {sample.number: sample for sample in samples}
     rows: dict[int, Row] = {}
@@ -165,7 +116,7 @@ def results_of(
         if not outcome.failed:
             states[outcome.number] = outcome.u
             displacement = displacement_statistics(mesh, outcome.u)
-            observed = observe(case, _Reached(mesh, outcome.u, outcome.reactions), None if to_rest else outcome.time)
+            observed = observe(case, Found(mesh, outcome.u, outcome.reactions), None if to_rest else outcome.time)
             comparisons = observed.comparisons
             not_compared.update(dict.fromkeys(observed.skipped))
         ended = replace(outcome, u=_NOTHING, reactions=_NOTHING)

@@ -28,13 +28,7 @@ def chosen_samples(
     process: Process | None = None,
     on_sample: Callable[[int], None] | None = None,
 ) -> list[Sample]:
-    """So many draws of the tissues' joint prior, or those of the paper's sweep (``"grid"``).
-
-    Raises
-    ------
-    InputError
-        If it is neither, or a tissue has no prior.
-    """
+    """So many draws of the tissues' joint prior, or the paper's sweep (``"grid"``); `InputError` if there is none."""
     if samples == "grid":
         return swept_samples(case, process or find_model("coregionalised", "as_published"))
     if not isinstance(samples, int) or samples < 1:
@@ -62,14 +56,12 @@ def compute_missing(
     job: Job, store: Store, workers: Workers, on_done: Callable[[int], None] = lambda _count: None
 ) -> int:
     """Compute the samples that a store lacks; `on_done` is told how many are done. Returns how many they were."""
-    there = store.numbers()
-    missing = {sample.number for sample in job.samples} - there
+    missing = {sample.number for sample in job.samples} - store.numbers()
     done = 0
-    if missing:
-        for ended in workers.outcomes(job.part(missing)):
-            store.write(ended)
-            done += len(ended)
-            on_done(done)
+    for ended in workers.outcomes(job.part(missing)) if missing else ():
+        store.write(ended)
+        done += len(ended)
+        on_done(done)
     return done
 
 
@@ -137,14 +129,11 @@ def ensemble(
     numbered = chosen_samples(case, samples, seed, process) if isinstance(samples, int | str) else list(samples)
     model = model_of(case)
     job = Job(model, tuple(numbered), steps=steps, tolerance=tolerance, precision=precision)
-    with chosen_workers(device, batch, processes, dask, _nothing) as workers:
+    # there is nothing to prepare workers by
+    with chosen_workers(device, batch, processes, dask, tuple) as workers:
         if folder is None:
             outcomes = [outcome for ended in workers.outcomes(job) for outcome in ended]
             return results_of(case, model.mesh, numbered, outcomes, steps is None)
         store = Store(Path(folder), job, workers.kind, {"case": case.name, "samples": len(numbered)})
         compute_missing(job, store, workers)
         return results_of(case, model.mesh, numbered, store.outcomes(), steps is None)
-
-
-def _nothing() -> None:
-    """What workers are prepared by."""

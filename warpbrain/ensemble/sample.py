@@ -6,31 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.simulation.model import Material
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One set of parameters.
-
-    Attributes
-    ----------
-    number : int
-    materials : mapping of int to Material, or None
-        By tissue label; None if none could be found.
-    reason : str
-        Why there are none.
-    deviations : mapping of int to float
-        Of a sweep: how many standard deviations each tissue's curve is from the mean, by label.
-    """
+    """One set of parameters."""
 
     number: int
-    materials: Mapping[int, Material] | None
-    reason: str = ""
+    materials: Mapping[int, Material] | None  # by tissue label; None if none could be found
+    reason: str = ""  # why there are none
+    #: Of a sweep: how many standard deviations each tissue's curve is from the mean, by label
     deviations: Mapping[int, float] = field(default_factory=dict)
 
     @property
@@ -43,36 +31,17 @@ class Sample:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a sample ended.
-
-    Attributes
-    ----------
-    number : int
-    reason : str
-        Why it failed; empty if it did not.
-    steps : int
-        Time steps that were taken.
-    cg_iterations : int
-        Of all its linear solves, those of refused steps too.
-    time : float
-        Of the last state [s].
-    residual : float
-        Out-of-balance force of that state relative to all nodal forces, with every load at its end.
-    min_J : float
-        Smallest volume ratio of an element in that state.
-    u, reactions : (n, 3) array
-        Displacement [m], and what holds the constrained components [N]; of no nodes if the sample failed.
-    """
+    """How a sample ended."""
 
     number: int
-    reason: str
-    steps: int
-    cg_iterations: int
-    time: float
-    residual: float
-    min_J: float
-    u: Floats
-    reactions: Floats
+    reason: str  # why it failed; empty if it did not
+    steps: int  # time steps that were taken
+    cg_iterations: int  # of all its linear solves, those of refused steps too
+    time: float  # of the last state [s]
+    residual: float  # out-of-balance force of that state relative to all nodal forces, with every load at its end
+    min_J: float  # smallest volume ratio of an element in that state
+    u: Floats  # (n, 3), displacement [m]; of no nodes if the sample failed
+    reactions: Floats  # (n, 3), what holds the constrained components [N]
 
     @property
     def failed(self) -> bool:

@@ -7,6 +7,7 @@ checksum of all that it says. A part that is damaged is taken away, so that its 
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.atomic import output_folder, remove_leftovers, whole_file
-from warpbrain.ensemble.checksums import ArraysError, checksum_of, read_arrays, write_arrays
 from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.sample import Outcome
 from warpbrain.errors import InputError
@@ -34,28 +34,11 @@ def discard(folder: Path) -> None:
 
 
 class Store:
-    """The outcomes of one ensemble.
+    """The outcomes of one ensemble in a folder, which is made if it is not there.
 
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there.
-    job : Job
-        All of the ensemble, whose fingerprint tells it from others.
-    kind : str
-        Of the devices, see `warpbrain.ensemble.job.Job.fingerprint`.
-    about : mapping
-        What a reader of `ensemble.json` should know of it; plain values.
-
-    Attributes
-    ----------
-    damaged : list of str
-        Names of the files that were damaged, and of which nothing is used.
-
-    Raises
-    ------
-    InputError
-        If the folder holds another ensemble, or cannot be written to.
+    The fingerprint of the whole job on a kind of devices tells it from others; `about` are plain values that a reader
+    of `ensemble.json` should know. Of files that were `damaged` nothing is used. `InputError` if the folder holds
+    another ensemble, or cannot be written to.
     """
 
     def __init__(self, folder: Path, job: Job, kind: str, about: Mapping[str, Any]) -> None:
@@ -139,7 +122,11 @@ class Store:
     def outcomes(self) -> Iterator[Outcome]:
         """All outcomes, in the order in which they were written."""
         for file in self._files():
-            arrays = _read(file)
+            try:
+                arrays = read_arrays(file)
+            except ArraysError as error:
+                # since the folder was opened
+                raise InputError(f"{file}: {error}; the same command computes its samples again") from None
             good = iter(range(len(arrays["u"])))
             for row, reason in enumerate(arrays["reason"].tolist()):
                 u = reactions = np.zeros((0, 3))
@@ -156,9 +143,45 @@ class Store:
 _NUMBERS = ("number", "steps", "cg_iterations", "time", "residual", "min_J")
 
 
-def _read(file: Path) -> dict[str, NDArray[Any]]:
+#: Name of the checksum among the arrays of a file: what a disk or a transfer damaged is never read as numbers. A ZIP
+#: archive has a CRC-32 of each member, and none of its directory, of names, or of what was swapped for another file.
+_NAME = "sha256"
+
+
+class ArraysError(Exception):
+    """A file is not what was written; says why."""
+
+
+def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write arrays as `.npz` with their checksum."""
+    with path.open("wb") as stream:
+        members: dict[str, Any] = {**arrays, _NAME: np.array(_digest(arrays))}
+        np.savez(stream, **members)
+
+
+def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Read what `write_arrays` wrote; `ArraysError` if anything of it has changed, or it is no such file."""
     try:
-        return read_arrays(file)
-    except ArraysError as error:
-        # since the folder was opened
-        raise InputError(f"{file}: {error}; the same command computes its samples again") from None
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = dict(stored)
+        checksum = str(arrays.pop(_NAME))
+    # what NumPy and zipfile raise for bytes that are nonsense is their secret
+    except Exception as error:
+        raise ArraysError(f"cannot be read: {' '.join(str(error).split())[:200]}") from None
+    if checksum != _digest(arrays):
+        raise ArraysError("its checksum is another one")
+    return arrays
+
+
+def checksum_of(said: Any) -> str:
+    """SHA-256 of plain values, whatever the order of their keys."""
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+
+
+def _digest(arrays: Mapping[str, NDArray[Any]]) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        array = np.asarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape};".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()

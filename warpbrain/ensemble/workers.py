@@ -14,13 +14,60 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from multiprocessing.synchronize import Event
+from pathlib import Path
 from typing import Protocol
 
 from warpbrain.ensemble.job import Job
-from warpbrain.ensemble.memory import ENOUGH, batch_size
 from warpbrain.ensemble.sample import Outcome
-from warpbrain.errors import SolveError
-from warpbrain.simulation.system import find_device
+from warpbrain.errors import InputError, SolveError
+from warpbrain.kernels.batched.persistent import kept_bytes
+from warpbrain.kernels.persistent import blocks_stay
+from warpbrain.kernels.tetrahedron import PAIRS
+from warpbrain.simulation.system import System, find_device
+
+#: Samples beyond which a batch is no faster a sample, by kind of device; docs/ensembles.md has the times. On a CPU a
+#: few at a time are as fast as one, and more only take room in its cache.
+ENOUGH = {"cpu": 1, "cuda": 256}
+#: Part of the free memory that a batch may take.
+SHARE = 0.8
+
+
+def bytes_per_slot(system: System) -> int:
+    """Memory that a sample takes in a batch: element results, matrix, vectors and sums."""
+    n, m = system.size, system.elements
+    elements = m * (len(PAIRS) * 9 + 4 * 3 + 1)
+    matrix = len(system.pairs) * 9
+    # u, v, dv, both at the start of the step, prescribed velocity, internal forces, b
+    vectors = 8 * 3 * n
+    if blocks_stay(system.device):
+        return system.precision.numpy.itemsize * (elements + matrix + vectors + n) + kept_bytes(n)
+    # z, p, q; the preconditioner
+    vectors += 3 * 3 * n + 6 * n
+    sums = 2 * n
+    return system.precision.numpy.itemsize * (elements + matrix + vectors + sums)
+
+
+def free_bytes(system: System) -> int:
+    """Free memory of the device of a system."""
+    if system.device.is_cuda:
+        return int(system.device.free_memory)
+    for line in Path("/proc/meminfo").read_text().splitlines() if Path("/proc/meminfo").exists() else ():
+        if line.startswith("MemAvailable:"):
+            return 1024 * int(line.split()[1])
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
+
+
+def batch_size(system: System, asked: int | None = None) -> int:
+    """Samples of a batch: as many as are asked for, or as many as the memory holds and pay; `InputError` if not one."""
+    each = bytes_per_slot(system)
+    room = int(SHARE * free_bytes(system)) // each
+    if room < (asked or 1):
+        raise InputError(
+            f"--batch {asked or 'auto'}: a sample takes {each / 1e6:.0f} MB, and {system.device.alias} has room for "
+            f"{room}"
+        )
+    return asked or min(room, ENOUGH["cuda" if system.device.is_cuda else "cpu"])
+
 
 #: Parts that each worker gets: the more, the less the others wait for the last.
 PARTS_EACH = 8
@@ -30,32 +77,17 @@ Prepare = Callable[[], object]
 
 
 class Workers(Protocol):
-    """Computes jobs.
+    """Computes jobs."""
 
-    Attributes
-    ----------
-    kind : str
-        Of its devices, ``"cpu"`` or ``"cuda"``: bits differ between the two.
-    name : str
-        For people.
-    """
-
-    kind: str
-    name: str
+    kind: str  # of its devices, ``"cpu"`` or ``"cuda"``: bits differ between the two
+    name: str  # for people
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
         """Outcomes of all samples of a job, as they become known."""
 
 
 class Here:
-    """This process and one device.
-
-    Parameters
-    ----------
-    device : str or None
-    batch : int or None
-        Samples at a time; None for as many as the memory holds and pay.
-    """
+    """This process and one device; samples at a time as many as the memory holds and pay, unless `batch` is said."""
 
     def __init__(self, device: str | None, batch: int | None) -> None:
         self._device, self._batch = find_device(device), batch
@@ -63,21 +95,13 @@ class Here:
         self.name = f"{self._device.name} ({self._device.alias})"
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
-        """Outcomes of all samples of a job, as they become known."""
+        """See `Workers`."""
         system = job.system(self._device.alias)
         yield from job.outcomes(system, batch_size(system, self._batch))
 
 
 class Processes:
-    """Processes of this machine, each on the CPU.
-
-    Parameters
-    ----------
-    count : int
-    batch : int or None
-    prepare : callable
-        Called in a process before each part.
-    """
+    """Processes of this machine, each on the CPU, and prepared before each part."""
 
     def __init__(self, count: int, batch: int | None, prepare: Prepare) -> None:
         self._count, self._batch, self._prepare = count, batch, prepare
@@ -85,13 +109,7 @@ class Processes:
         self.name = f"{count} processes on {find_device('cpu').name}"
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
-        """Outcomes of all samples of a job, as they become known.
-
-        Raises
-        ------
-        SolveError
-            If a process is ended from outside.
-        """
+        """See `Workers`; `SolveError` if a process is ended from outside."""
         context = get_context("spawn")
         stop = context.Event()
         pool = ProcessPoolExecutor(self._count, context, _live_with, (os.getpid(), stop))

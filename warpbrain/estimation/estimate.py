@@ -91,13 +91,7 @@ def estimate(
 
 
 class Estimation:
-    """The stages of an estimation; parameters as of `estimate`.
-
-    Attributes
-    ----------
-    seconds : dict
-        Wall time by stage so far.
-    """
+    """The stages of an estimation; parameters as of `estimate`."""
 
     def __init__(
         self,
@@ -138,7 +132,9 @@ class Estimation:
         modes[0].require_explained()
         with self._counted("check of the posterior"):
             target, proposal = Target(self.prior, modes), Proposal.of(modes)
-            importance = self._check(target, proposal)
+            count, rng = self.options.samples, np.random.default_rng([self.options.seed, 0])
+            self.listener.stage(f"check of the posterior: {count} equilibria")
+            importance = importance_sampling(target, proposal, count, rng, lambda n: self.listener.progress(n / count))
         doubts, chain = importance.doubts(modes[0].laplace), None
         if doubts:
             with self._counted("chain"):
@@ -213,12 +209,6 @@ class Estimation:
             )
         self._solves["on elements of half the size"] = sum(mesh.solves for mesh in finer)
         return modes
-
-    def _check(self, target: Target, proposal: Proposal) -> Importance:
-        count = self.options.samples
-        self.listener.stage(f"check of the posterior: {count} equilibria")
-        rng = np.random.default_rng([self.options.seed, 0])
-        return importance_sampling(target, proposal, count, rng, lambda n: self.listener.progress(n / count))
 
     def _sample(self, target: Target, proposal: Proposal, importance: Importance) -> Chain:
         solves = self.options.chain

@@ -182,15 +182,9 @@ def probabilities(modes: Sequence[Estimate]) -> Floats:
 
 
 class GaussNewton:
-    """Looks for the most probable parameters of a problem.
+    """Looks for the most probable parameters of a problem; `on_step` is called with each step.
 
-    Parameters
-    ----------
-    problem : Problem
-    tolerance : float
-        Converged when the next step is shorter than this in standard deviations of the posterior.
-    on_step : callable, optional
-        Called with each `GaussNewtonStep`.
+    Converged when the next step is shorter than `tolerance` in standard deviations of the posterior.
     """
 
     def __init__(

@@ -43,19 +43,9 @@ class State:
 
 
 class Forward:
-    """A case as a function of the parameters of its tissues.
+    """A case as a function of the parameters of its tissues: laws of these take the place of its own.
 
-    Parameters
-    ----------
-    case : Case
-        Laws of the parameters take the place of its own, which need not be known.
-    theta : (p,) array
-        Parameters to begin with; any that are stable.
-    device : str, optional
-    elements : str
-        See `Model`.
-    moments : Moments, optional
-        Its states; the end alone unless given.
+    It begins with parameters `theta` (p,), any that are stable. `moments` are its states, the end alone unless given.
     """
 
     def __init__(

@@ -31,22 +31,13 @@ _CHANGE = "a change of the {}", "a change of the shear moduli of {} by one facto
 
 @dataclass(frozen=True)
 class Identifiability:
-    """A verdict.
+    """A verdict."""
 
-    Attributes
-    ----------
-    informed, weakly_informed : tuple of str
-        Combinations of parameters that the data tell, and that they tell a little.
-    hidden : tuple of str
-        Changes of the parameters that the data do not see.
-    scale_is_hidden : bool
-        All shear moduli together can be changed by a factor, and the data do not see it: the loads are displacements
-        only, and no force was recorded.
-    """
-
-    informed: tuple[str, ...]
-    weakly_informed: tuple[str, ...]
-    hidden: tuple[str, ...]
+    informed: tuple[str, ...]  # combinations of parameters that the data tell
+    weakly_informed: tuple[str, ...]  # and that they tell a little
+    hidden: tuple[str, ...]  # changes of the parameters that the data do not see
+    #: All shear moduli together can be changed by a factor, and the data do not see it: the loads are displacements
+    #: only, and no force was recorded
     scale_is_hidden: bool
 
     @property
@@ -116,7 +107,7 @@ def in_words(parameters: Sequence[Parameter], row: Floats, words: tuple[str, str
     weights = row / row[np.abs(row).argmax()]
     parts = [(parameters[k], float(weights[k])) for k in np.flatnonzero(weights).tolist()]
     if len(parts) == 1:
-        return single.format(_noun(parts[0][0]))
+        return single.format(f"{parts[0][0].coordinate.noun} of {parts[0][0].tissue}")
     if all(parameter.is_modulus for parameter, _ in parts):
         tissues = enumerated([parameter.tissue for parameter, _ in parts])
         if max(weight for _, weight in parts) - min(weight for _, weight in parts) < _ALIKE:
@@ -124,10 +115,3 @@ def in_words(parameters: Sequence[Parameter], row: Floats, words: tuple[str, str
         if len(parts) == 2 and abs(parts[0][1] + parts[1][1]) < _ALIKE:
             return single.format(f"ratio of the shear moduli of {tissues}")
     return other.format(" ".join(f"{weight:+.2g} [{parameter.name}]" for parameter, weight in parts))
-
-
-def _noun(parameter: Parameter) -> str:
-    what = {"ln(mu0 / Pa)": "shear modulus", "alpha": "exponent"}.get(
-        parameter.coordinate.name, f"ratio {parameter.coordinate.name}"
-    )
-    return f"{what} of {parameter.tissue}"

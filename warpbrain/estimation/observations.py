@@ -150,11 +150,8 @@ class Observations:
     def to_fit(cls, case: Case, moments: Moments | None = None) -> Observations:
         """The recordings that a case is fitted to; at states of all times of recordings unless `moments` are given.
 
-        Raises
-        ------
-        InputError
-            If there are none, none of them says anything of tissue, a noise is not positive, or one that is to be
-            estimated has too few residuals for that.
+        `InputError` if there are none, none of them says anything of tissue, a noise is not positive, or one that is to
+        be estimated has too few residuals for that.
         """
         if not any(recording.role == "fit" for recording in case.recordings):
             checks = f"; its {len(case.recordings)} have role = 'check'" if case.recordings else ""
@@ -200,16 +197,10 @@ class Observations:
         return positions.mean(axis=0) if len(positions) else np.zeros(3)
 
     def at(self, u: Floats, reactions: Floats, centre: Floats | None = None, motion: Floats | None = None) -> Sensors:
-        """All rows at a state.
+        """All rows at displacement [m] and reactions [N] (s N, 3) of s states, one after the other.
 
-        Parameters
-        ----------
-        u, reactions : (s N, 3) array
-            Displacement [m], and forces of the constrained components [N], in s states, one after the other.
-        centre : (3,) array, optional
-            Of a rigid motion [m]; that of these recordings by default.
-        motion : (6,) array, optional
-            By which what was recorded was moved, see `registration`; by nothing by default.
+        What was recorded was moved by a rigid motion (6,), see `registration`, about a centre (3,) [m]: by nothing, and
+        about that of these recordings, unless given.
         """
         from scipy.sparse import vstack
 

@@ -11,21 +11,18 @@ from numpy.typing import ArrayLike
 from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
-from warpbrain.gp.coordinates import Coordinate, coordinates, laws_from, to_coordinates
+from warpbrain.gp.coordinates import coordinates, laws_from, to_coordinates
 from warpbrain.physics.laws import Law, NeoHookean
+from warpbrain.physics.laws.law import MODULUS, Coordinate
 from warpbrain.physics.laws.stability import require_stable
 from warpbrain.physics.mechanism import Substituting
 from warpbrain.physics.words import enumerated
 from warpbrain.simulation.model import Material
 
-#: How far one step of an estimation may go, by what a coordinate is: a factor of e in a modulus, so that the next
-#: equilibrium is within reach of the last.
-_REACH = {"ln(mu0 / Pa)": 1.0, "C2 / (C1 + C2)": 0.5, "alpha": 4.0}
-
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of `theta`: a coordinate of a tissue's law (`warpbrain.gp.coordinates`)."""
+    """One number of `theta`: a coordinate of a tissue's law (`warpbrain.physics.laws.law`)."""
 
     tissue: str
     coordinate: Coordinate
@@ -38,7 +35,7 @@ class Parameter:
     @property
     def is_modulus(self) -> bool:
         """The logarithm of a shear modulus."""
-        return self.coordinate.name.startswith("ln(mu0")
+        return self.coordinate == MODULUS
 
 
 @dataclass(frozen=True)
@@ -111,7 +108,7 @@ class Parameters:
     @property
     def reach(self) -> Floats:
         """How far one step of an estimation may go, shape (p,)."""
-        return np.array([_REACH[parameter.coordinate.name] for parameter in self])
+        return np.array([parameter.coordinate.reach for parameter in self])
 
     @property
     def is_modulus(self) -> Bools:

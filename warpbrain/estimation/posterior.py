@@ -24,24 +24,13 @@ from warpbrain.shown import Shown
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
-    """What is known of one parameter.
-
-    Attributes
-    ----------
-    parameter : Parameter
-    estimate : float
-        The most probable value.
-    mean, deviation, prior_mean, prior_deviation : float
-        Of posterior and prior.
-    interval, prior_interval : (float, float)
-        95 % of the posterior and of the prior lie between, as much below as above.
-    """
+    """What is known of one parameter."""
 
     parameter: Parameter
-    estimate: float
+    estimate: float  # the most probable value
     mean: float
     deviation: float
-    interval: tuple[float, float]
+    interval: tuple[float, float]  # 95 % of the posterior and of the prior lie between, as much below as above
     prior_mean: float
     prior_deviation: float
     prior_interval: tuple[float, float]

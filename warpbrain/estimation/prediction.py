@@ -25,40 +25,23 @@ INTERVALS = (0.5, 0.95)
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """A recording beside what the estimate makes of it.
-
-    Attributes
-    ----------
-    name, kind, role, unit : str
-    rows : (n,) int array
-        Rows of the recording that have a weight.
-    before, after : (n, d) array
-        Their residuals with nothing moved (or no force), and those of the estimate with its nuisances.
-    sigma : (n,) array or None
-        Noise of one component of each row, given or estimated, its scale in it; None if it is not known.
-    deviation : (n, d) array
-        Standard deviation of the prediction itself, from the posterior to first order.
-    gross : (n,) bool array
-        Rows that are gross errors; none where the noise is not known.
-    coverage : tuple of float or None
-        Part of the components that lie in their predictive intervals of `INTERVALS`, without gross errors.
-    run, fitted : Comparison
-        All recorded rows beside the most probable state as `warpbrain run` has it, and beside the estimate: with the
-        error of the mesh, and with what was recorded moved back by the error of registration.
-    """
+    """A recording beside what the estimate makes of it."""
 
     name: str
     kind: str
     role: str
     unit: str
-    rows: Ints
-    before: Floats
-    after: Floats
+    rows: Ints  # (n,), rows of the recording that have a weight
+    before: Floats  # (n, d), their residuals with nothing moved (or no force)
+    after: Floats  # (n, d), those of the estimate with its nuisances
+    #: (n,), noise of one component of each row, given or estimated, its scale in it; None if it is not known
     sigma: Floats | None
-    deviation: Floats
-    gross: Bools
+    deviation: Floats  # (n, d), standard deviation of the prediction itself, from the posterior to first order
+    gross: Bools  # (n,), rows that are gross errors; none where the noise is not known
+    #: Part of the components that lie in their predictive intervals of `INTERVALS`, without gross errors
     coverage: tuple[float, ...] | None
-    run: Comparison
+    run: Comparison  # all recorded rows beside the most probable state as `warpbrain run` has it
+    #: Beside the estimate: with the error of the mesh, and with what was recorded moved back by that of registration
     fitted: Comparison
 
     @property
@@ -74,21 +57,13 @@ class Prediction:
 
 @dataclass(frozen=True)
 class OverallErrors:
-    """All points and surfaces of one role: root mean square of the 3-D distance over every row [m].
-
-    Attributes
-    ----------
-    role : str
-    count : int
-    before, after, of_run : float
-        With nothing moved, beside the estimate, and beside its most probable state as `warpbrain run` has it.
-    """
+    """All points and surfaces of one role: root mean square of the 3-D distance over every row [m]."""
 
     role: str
     count: int
-    before: float
-    after: float
-    of_run: float
+    before: float  # with nothing moved
+    after: float  # beside the estimate
+    of_run: float  # beside its most probable state as `warpbrain run` has it
 
     @classmethod
     def of(cls, each: Sequence[Prediction]) -> tuple[OverallErrors, ...]:

@@ -26,6 +26,7 @@ from warpbrain.gp.literature.study import Study
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
 from warpbrain.inference.beliefs import belief
+from warpbrain.physics.laws.law import MODULUS
 
 #: Draws on which the prior rests.
 DRAWS = 500
@@ -33,12 +34,6 @@ DRAWS = 500
 _LEAST_SHARE = 0.02
 #: Smallest standard deviation of a coordinate that has two ends, relative to its range.
 _NARROWEST = 0.05
-#: Beliefs of standard deviations where no study is named, by what a coordinate is of.
-_DEVIATIONS = {
-    "ln(mu0 / Pa)": "tissue.declared_modulus",
-    "C2 / (C1 + C2)": "tissue.declared_share",
-    "alpha": "tissue.declared_exponent",
-}
 
 
 def declared(case: Case, parameters: Parameters) -> Floats:
@@ -52,9 +47,9 @@ def declared_deviations(case: Case, parameters: Parameters) -> Floats:
     for labels, law in zip(parameters.labels, parameters.laws_of, strict=True):
         accuracy = case.tissues[labels[0]].accuracy
         for coordinate in coordinates(law):
-            believed = belief(_DEVIATIONS[coordinate.name])
             # of a relative error that is small the logarithm's
-            found.append(accuracy if accuracy is not None and coordinate.name == "ln(mu0 / Pa)" else believed)
+            known = accuracy if coordinate == MODULUS else None
+            found.append(belief(coordinate.belief) if known is None else known)
     return np.array(found)
 
 
@@ -95,20 +90,8 @@ def _declared_prior(case: Case, parameters: Parameters, count: int, seed: int) -
 def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed: int = 0) -> Prior:
     """What the generative model says of a case's tissues; about what the case declares where none is of a group of it.
 
-    Parameters
-    ----------
-    case : Case
-    model : Process, optional
-        The one that is the default unless given.
-    count, seed : int
-        Draws on which it rests.
-
-    Raises
-    ------
-    InputError
-        With file, tissue and key, if a tissue has no group, or one that the model has seen no study of.
-    SolveError
-        If no stable law is found.
+    It rests on so many draws. `InputError` if a tissue has no group, or one that the model has seen no study of;
+    `SolveError` if no stable law is found.
     """
     parameters = Parameters.of(case)
     if not any(parameters.groups) and all(case.tissues[labels[0]].law is not None for labels in parameters.labels):
@@ -135,10 +118,7 @@ class PriorMode:
 def prior_modes(prior: Prior, parameters: Parameters) -> tuple[PriorMode, ...]:
     """Modes of a prior, the most probable first; what lies in rarer clusters counts with the others.
 
-    Raises
-    ------
-    InputError
-        If the prior is not of these parameters.
+    `InputError` if the prior is not of these parameters.
     """
     if prior.theta.shape[1] != len(parameters):
         names = ", ".join(parameters.names)

@@ -23,19 +23,9 @@ def change_over_element(points: Floats, displacement: Floats, edges: Floats) -> 
     """Change of recorded displacement over an edge of the element in which each point is.
 
     Gradients over each point and its neighbours are by least absolute deviations: a gross error is no gradient of its
-    neighbours, and what changes faster than tissue can is not tissue.
-
-    Parameters
-    ----------
-    points, displacement : (n, 3) array
-        Recorded at one time [m].
-    edges : (n,) array
-        Mean length of the edges of the element [m].
-
-    Returns
-    -------
-    (n, 3, 3) array
-        Of each component of the displacement, along each axis [m]; zero of points that are too few to tell.
+    neighbours, and what changes faster than tissue can is not tissue. Points and displacement (n, 3) were recorded at
+    one time [m]; `edges` (n,) are mean lengths of those of the element [m]. Returns (n, 3, 3), of each component along
+    each axis [m]; zero of points that are too few to tell.
     """
     from scipy.spatial import cKDTree
 

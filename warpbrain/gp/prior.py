@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.gp.coordinates import Coordinate, coordinates, laws_from, to_coordinates
+from warpbrain.gp.coordinates import coordinates, laws_from, to_coordinates
 from warpbrain.gp.density import FoldedDensity
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import DrawnLaws, draw_many
 
 if TYPE_CHECKING:
     from warpbrain.physics.laws import Law
+    from warpbrain.physics.laws.law import Coordinate
 
 Floats = NDArray[np.float64]
 

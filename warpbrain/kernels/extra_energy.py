@@ -7,7 +7,7 @@ A term brings device functions of the elastic deformation gradient and of a row 
     stress(F_e, data, e) -> P [Pa]
 
 With the growth stretch `s` of an element, `F_e = F/s`, the energy of its reference volume is `s^3 Psi(F/s)`, so
-`P = s^2 P_e` and `dP/dF = s dP_e/dF_e` (as in `warpbrain.physics.laws.grown`).
+`P = s^2 P_e` and `dP/dF = s dP_e/dF_e` (as in `warpbrain.physics.laws.device`).
 """
 
 from functools import cache

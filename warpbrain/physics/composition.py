@@ -19,14 +19,7 @@ class CompositionError(InputError):
 
 
 def require_composable(acting: Sequence[Mechanism], mesh: TetMesh) -> None:
-    """Raise `CompositionError` if two mechanisms exclude each other.
-
-    Parameters
-    ----------
-    acting : sequence of Mechanism
-    mesh : TetMesh
-        The body on which they act: without what has been removed.
-    """
+    """Raise `CompositionError` if two mechanisms exclude each other on a mesh, without what has been removed."""
     for one, other in itertools.combinations(acting, 2):
         for first, second in ((one, other), (other, one)):
             if reason := first.excludes(second, mesh):
@@ -34,14 +27,7 @@ def require_composable(acting: Sequence[Mechanism], mesh: TetMesh) -> None:
 
 
 def require_left(acting: Sequence[Mechanism], mesh: TetMesh) -> TetMesh:
-    """The body that mechanisms leave; `CompositionError` if they take away what others of them act on.
-
-    Parameters
-    ----------
-    acting : sequence of Mechanism
-    mesh : TetMesh
-        The whole anatomy, of which each mechanism makes sense.
-    """
+    """What mechanisms leave of a whole anatomy; `CompositionError` if they take away what others of them act on."""
     left = mesh
     for removing in acting:
         if not isinstance(removing, Removing):
@@ -61,23 +47,12 @@ def require_left(acting: Sequence[Mechanism], mesh: TetMesh) -> TetMesh:
 
 @dataclass(frozen=True)
 class Pair:
-    """What two kinds of mechanisms, or one twice, are together.
-
-    Attributes
-    ----------
-    kinds : (str, str)
-    potential : str
-        The total potential with both, as a formula; empty if a case cannot have both.
-    remark : str
-        What the formula leaves open; empty if nothing.
-    refused : str
-        Where, or why, a case cannot have both; empty if it always can.
-    """
+    """What two kinds of mechanisms, or one twice, are together."""
 
     kinds: tuple[str, str]
-    potential: str
-    remark: str
-    refused: str
+    potential: str  # the total potential with both, as a formula; empty if a case cannot have both
+    remark: str  # what the formula leaves open; empty if nothing
+    refused: str  # where, or why, a case cannot have both; empty if it always can
 
 
 def pairs() -> list[Pair]:

@@ -2,7 +2,7 @@
 
 A `parameter` of a mechanism is one such number if its kind is a number, and several if it is a position, a vector or
 numbers. A number that is none (no ball, so no radius) is left out, and so is a setting of the method (`Says.method`).
-What switches from one thing to another has no derivative: see `warpbrain.physics.switching`.
+What switches from one thing to another has no derivative: see `alternatives`.
 """
 
 from __future__ import annotations
@@ -13,12 +13,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.mechanism import Mechanism, Says
-
-Floats = NDArray[np.float64]
 
 #: Kinds of parameters that are numbers, and those of which the components are.
 _ONE, _SEVERAL = ("number",), ("position", "vector", "numbers")
@@ -31,22 +30,11 @@ _AXES = "xyz"
 
 @dataclass(frozen=True)
 class Continuous:
-    """A number of a mechanism.
+    """A number of a mechanism."""
 
-    Attributes
-    ----------
-    kind : str
-        Of the mechanism.
-    key : str
-        Name of the parameter.
-    component : int or None
-        Of a position, a vector or numbers.
-    says : Says
-    """
-
-    kind: str
-    key: str
-    component: int | None
+    kind: str  # of the mechanism
+    key: str  # name of the parameter
+    component: int | None  # of a position, a vector or numbers
     says: Says
 
     @property
@@ -122,18 +110,9 @@ def scales_of(mechanisms: Sequence[Mechanism]) -> Floats:
 
 
 def with_numbers(mechanisms: Sequence[Mechanism], numbers: ArrayLike) -> tuple[Mechanism, ...]:
-    """The same mechanisms with other numbers.
+    """The same mechanisms with other numbers (p,), in the order of `numbers_of` [SI].
 
-    Parameters
-    ----------
-    mechanisms : sequence of Mechanism
-    numbers : (p,) array
-        In the order of `numbers_of` [SI].
-
-    Raises
-    ------
-    InputError
-        If there are more or fewer numbers than the mechanisms have, or a mechanism refuses them.
+    `InputError` if there are more or fewer than the mechanisms have, or a mechanism refuses them.
     """
     given = np.asarray(numbers, dtype=np.float64)
     places = [continuous(mechanism) for mechanism in mechanisms]
@@ -163,3 +142,18 @@ def differ_in_numbers_only(one: Mechanism, other: Mechanism) -> bool:
         return False
     [as_one], [alike] = (with_numbers([mechanism], numbers_of([one])) for mechanism in (one, other))
     return replace(alike, ramp=one.ramp, **settings) == as_one
+
+
+def alternatives(mechanism: Mechanism) -> tuple[Mechanism | None, ...]:
+    """The same mechanism with each other choice of a parameter that has choices, and None if it can be absent.
+
+    Between these is nothing: they have no derivative, but differences. A contact that is stuck can slide or lift off; a
+    falx or a resection is there or not.
+    """
+    others: list[Mechanism | None] = []
+    for name, says in mechanism.parameters().items():
+        for choice in says.choices:
+            if choice != getattr(mechanism, name):
+                values: dict[str, Any] = {name: choice}
+                others.append(replace(mechanism, **values))
+    return (*others, None) if mechanism.switches else tuple(others)

@@ -8,11 +8,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.kernels.distance_field import distance_kernels
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh.feature_normals import feature_normals
-
-Floats = NDArray[np.float64]
 
 #: Nodes of the largest grid; a finer one is made coarser.
 LARGEST_GRID = 2_000_000
@@ -23,30 +22,10 @@ _MARGIN = 4
 class DistanceField:
     """The smoothed signed distance from a surface, on a device; see `warpbrain.kernels.distance_field`.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        [m]
-    faces : (k, 3) int array
-        Triangles, oriented outwards; beyond an open rim the surface goes on as the plane of its last triangle.
-    spacing : float
-        Of the grid [m]: what is smaller is smoothed.
-    region : (r, 3) array
-        Points [m] that the grid must hold, beside those of the surface.
-    in_place : bool
-        Whether the surface is to stay where it is. Smoothing alone, which is smoother, shifts it by `h^2/6` times the
-        sum of its curvatures.
-    device : Any
-    precision : Precision
-
-    Attributes
-    ----------
-    coefficients : wp.array3d
-        [m]
-    origin : wp.vec3
-        The grid's first node [m].
-    spacing : float
-        [m]; larger than asked for where the grid would have more than `LARGEST_GRID` nodes.
+    The surface is of points (n, 3) [m] and outward triangles (k, 3); beyond an open rim it goes on as the plane of its
+    last triangle. The grid holds it and a region, points (r, 3) [m]. What is smaller than its spacing [m] is smoothed;
+    that is larger than asked for where the grid would have more than `LARGEST_GRID` nodes. Smoothing alone shifts the
+    surface by `h^2/6` times the sum of its curvatures: `in_place` takes that back, and is less smooth.
     """
 
     def __init__(

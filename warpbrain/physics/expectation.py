@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import abc
-import math
 from dataclasses import dataclass
 
 
 class Expectation(abc.ABC):
     """A distribution of one number, in the unit of its parameter."""
-
-    @abc.abstractmethod
-    def log_density(self, value: float) -> float:
-        """Logarithm of the density; minus infinity where the number cannot be."""
 
     @abc.abstractmethod
     def quantile(self, part: float) -> float:
@@ -28,9 +23,6 @@ class Normal(Expectation):
 
     mean: float
     sd: float
-
-    def log_density(self, value: float) -> float:
-        return -0.5 * ((value - self.mean) / self.sd) ** 2 - math.log(self.sd * math.sqrt(2.0 * math.pi))
 
     def quantile(self, part: float) -> float:
         from scipy.special import ndtri
@@ -48,12 +40,6 @@ class LogNormal(Expectation):
     median: float
     factor: float
 
-    def log_density(self, value: float) -> float:
-        if value <= 0.0:
-            return -math.inf
-        away = math.log(value / self.median) / math.log(self.factor)
-        return -0.5 * away**2 - math.log(value * math.log(self.factor) * math.sqrt(2.0 * math.pi))
-
     def quantile(self, part: float) -> float:
         from scipy.special import ndtri
 
@@ -70,9 +56,6 @@ class Uniform(Expectation):
     low: float
     high: float
 
-    def log_density(self, value: float) -> float:
-        return -math.log(self.high - self.low) if self.low <= value <= self.high else -math.inf
-
     def quantile(self, part: float) -> float:
         return self.low + part * (self.high - self.low)
 
@@ -86,11 +69,6 @@ class LogUniform(Expectation):
 
     low: float
     high: float
-
-    def log_density(self, value: float) -> float:
-        if not self.low <= value <= self.high:
-            return -math.inf
-        return -math.log(value * math.log(self.high / self.low))
 
     def quantile(self, part: float) -> float:
         return self.low * (self.high / self.low) ** part

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import QuadraticMesh, TetMesh
 from warpbrain.physics.load import Load
@@ -40,7 +40,7 @@ class NodalForce(Load):
         if len(self.total) != 3 or not np.all(np.isfinite(self.total)):
             raise InputError(f"force on '{self.nodes}': total = {self.total}: expected three finite numbers [N]")
 
-    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
+    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         members = mesh.node_sets.get(self.nodes)
         if members is None:
             raise InputError(

@@ -1,21 +1,54 @@
-"""What a load is: the base class of what acts on a body by forces on its nodes that do not follow it."""
+"""What acts with a factor over time, and a load: forces on the nodes of a body that do not follow it."""
 
 from __future__ import annotations
 
 import abc
-from collections.abc import Callable
-from dataclasses import dataclass
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
+from warpbrain.errors import InputError
 from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
-from warpbrain.physics.ramp import Ramped
 
-Floats = NDArray[np.float64]
 #: The derivative, along a path of loads, of what a function finds for each load on it.
 Along = Callable[[Callable[[Any], Floats]], Floats]
+#: Rounding of factors that users write.
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ramped:
+    """Something that acts with a factor over time."""
+
+    #: Factor over time [s], linear between the points and constant outside them; 1 if empty
+    ramp: Sequence[tuple[float, float]] = field(default=())
+
+    def __post_init__(self) -> None:
+        times = [t for t, _ in self.ramp]
+        if not np.all(np.isfinite(np.asarray(self.ramp, dtype=float))):
+            raise InputError(f"ramp = {list(self.ramp)}: times and factors must be finite")
+        if any(b <= a for a, b in itertools.pairwise(times)):
+            raise InputError(f"ramp = {list(self.ramp)}: times must increase")
+
+    def factor(self, time: float = math.inf) -> float:
+        """The ramp's factor at a time [s]; by default long after everything."""
+        if not self.ramp:
+            return 1.0
+        times, factors = zip(*self.ramp, strict=True)
+        return float(np.interp(time, times, factors))
+
+
+def take_turns(ramped: Sequence[Ramped]) -> bool:
+    """Whether they are together no more than one of them in full: their factors add up to 1, or the largest of all."""
+    # a sum of absolute values of linear functions is largest at an end of a piece
+    times = sorted({time for one in ramped for time, _ in one.ramp})
+    sizes = np.array([[abs(one.factor(time)) for one in ramped] for time in (*times, math.inf)])
+    return bool(sizes.sum(axis=1).max() <= max(1.0, float(sizes.max())) * (1.0 + _ROUNDING))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,11 +69,7 @@ class Load(Ramped, abc.ABC):
     def unit_forces_rate(self, mesh: TetMesh | QuadraticMesh, along: Along) -> Floats:
         """Derivative of `unit_forces` along a path of loads that begins here, by differences unless overridden.
 
-        Parameters
-        ----------
-        mesh : TetMesh or QuadraticMesh
-        along : callable
-            Differentiates any smooth function of a load along the path, such as a parameter.
+        `along` differentiates any smooth function of a load along the path, such as a parameter.
         """
         return along(lambda load: load.unit_forces(mesh))
 

@@ -25,24 +25,42 @@ import abc
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
+from warpbrain.physics.load import Ramped
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
-from warpbrain.physics.ramp import Ramped
 from warpbrain.physics.term import Following
-from warpbrain.physics.values import Smallest
-from warpbrain.physics.words import Values, clauses, label, number
+from warpbrain.physics.words import Smallest, Values, clauses, label, number
+
+
+@dataclass(frozen=True)
+class ClosedSurface:
+    """A closed surface of triangles."""
+
+    file: str  # where it came from, for people
+    points: Floats = field(repr=False, compare=False)  # (n, 3) [m]
+    faces: NDArray[np.int32] = field(repr=False, compare=False)  # (k, 3), oriented in one way, inwards or outwards
+
+    def __str__(self) -> str:
+        return self.file
+
+    @property
+    def outward(self) -> NDArray[np.int32]:
+        """The triangles, all turned if they enclose a negative volume."""
+        a, b, c = (self.points[self.faces[:, i]] - self.points.mean(axis=0) for i in range(3))
+        return self.faces if np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0 else self.faces[:, ::-1]
+
 
 __all__ = [
     "Emptying",
@@ -69,53 +87,25 @@ KINDS = ("number", "text", "node set", "element set", "directions", "surface", "
 
 @dataclass(frozen=True)
 class Says:
-    """What is known of a parameter.
+    """What is known of a parameter."""
 
-    Attributes
-    ----------
-    doc : str
-        One sentence.
-    kind : str
-        One of `KINDS`.
-    unit : str
-        In which users give it.
-    si : float
-        How many of its SI unit one of these is.
-    above, below : float
-        Limits in the user's unit, themselves not allowed.
-    choices : tuple of str
-    needed : bool
-        Whether a case must give it, whatever default the class has.
-    absent : str
-        What it is taken to be where a case does not give it, in words, if that is not the default of the class.
-    expectation : Expectation or None
-        In the user's unit; None: never estimated.
-    typical : str
-        Range in the literature, with unit.
-    source : str
-    size : float
-        By how much it must change to change much where it is zero and nothing is expected of it, in the user's unit.
-    method : bool
-        It is a setting of the method, or weighed and known: never differentiated or estimated.
-    adds_up : bool
-        Of several numbers, whether their sum is a number of its own.
-    """
-
-    doc: str
-    kind: str = "number"
-    unit: str = ""
-    si: float = 1.0
-    above: float = -math.inf
+    doc: str  # one sentence
+    kind: str = "number"  # one of `KINDS`
+    unit: str = ""  # in which users give it
+    si: float = 1.0  # how many of its SI unit one of these is
+    above: float = -math.inf  # limits in the user's unit, themselves not allowed
     below: float = math.inf
     choices: tuple[str, ...] = ()
-    needed: bool = False
+    needed: bool = False  # whether a case must give it, whatever default the class has
+    #: What it is taken to be where a case does not give it, in words, if that is not the default of the class
     absent: str = ""
-    expectation: Expectation | None = None
-    typical: str = ""
+    expectation: Expectation | None = None  # in the user's unit; None: never estimated
+    typical: str = ""  # range in the literature, with unit
     source: str = ""
+    #: By how much it must change to change much where it is zero and nothing is expected of it, in the user's unit
     size: float = 1.0
-    method: bool = False
-    adds_up: bool = False
+    method: bool = False  # it is a setting of the method, or weighed and known: never differentiated or estimated
+    adds_up: bool = False  # of several numbers, whether their sum is a number of its own
 
 
 def parameter(doc: str, *, default: Any = dataclasses.MISSING, **known: Any) -> Any:
@@ -126,13 +116,7 @@ def parameter(doc: str, *, default: Any = dataclasses.MISSING, **known: Any) -> 
 
 
 class ParameterError(InputError):
-    """A parameter that is wrong.
-
-    Attributes
-    ----------
-    key : str
-        Its name.
-    """
+    """A parameter that is wrong; `key` is its name."""
 
     def __init__(self, key: str, message: str) -> None:
         super().__init__(message)
@@ -141,39 +125,20 @@ class ParameterError(InputError):
 
 @dataclass(frozen=True)
 class Reading:
-    """How the size of a mechanism can be read, without what it does to tissue.
+    """How the size of a mechanism can be read, without what it does to tissue."""
 
-    Attributes
-    ----------
-    error : float
-        Standard deviation [SI].
-    words : str
-        What is read, and how well.
-    """
-
-    error: float
-    words: str
+    error: float  # standard deviation [SI]
+    words: str  # what is read, and how well
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What a mechanism may know of the case that assumes it.
+    """What a mechanism may know of the case that assumes it."""
 
-    Attributes
-    ----------
-    mesh : TetMesh
-        The imaged anatomy, whole.
-    gravity_axis : (float, float, float) or None
-    density : float
-        [kg/m3]
-    removing : tuple of Mechanism
-        What else the case assumes that removes elements.
-    """
-
-    mesh: TetMesh
+    mesh: TetMesh  # the imaged anatomy, whole
     gravity_axis: tuple[float, float, float] | None = None
-    density: float = 1211.5
-    removing: tuple[Mechanism, ...] = ()
+    density: float = 1211.5  # [kg/m3]
+    removing: tuple[Mechanism, ...] = ()  # what else the case assumes that removes elements
 
     @cached_property
     def left(self) -> TetMesh:
@@ -187,12 +152,7 @@ class Facts:
 
 @dataclass(frozen=True, kw_only=True)
 class Mechanism(Ramped, abc.ABC):
-    """A piece of physics that a case assumes.
-
-    Parameters
-    ----------
-    ramp : sequence of (time, factor)
-    """
+    """A piece of physics that a case assumes."""
 
     #: Its name in `case.toml`, on the command line and in a diagnosis.
     kind: ClassVar[str]
@@ -230,18 +190,18 @@ class Mechanism(Ramped, abc.ABC):
         """What is known of each parameter, by name."""
         return {f.name: f.metadata["says"] for f in dataclasses.fields(cls) if "says" in f.metadata}
 
-    def with_body_turned(self, rotation: NDArray[np.float64]) -> Mechanism:
+    def with_body_turned(self, rotation: Floats) -> Mechanism:
         """As it acts on a body that is turned in the room by a rotation (3, 3); itself if it turns with the body."""
         return self
 
     @classmethod
     def required(cls) -> tuple[str, ...]:
         """Names of the parameters that a case must give."""
-        fields = (f for f in dataclasses.fields(cls) if "says" in f.metadata)
+        known, defaults = cls.parameters(), {f.name: f.default for f in dataclasses.fields(cls)}
         return tuple(
-            f.name
-            for f in fields
-            if f.metadata["says"].needed or (f.default is dataclasses.MISSING and not f.metadata["says"].absent)
+            name
+            for name, says in known.items()
+            if says.needed or (defaults[name] is dataclasses.MISSING and not says.absent)
         )
 
     @classmethod
@@ -263,31 +223,16 @@ class Mechanism(Ramped, abc.ABC):
 
     @classmethod
     def of_case(cls, values: Mapping[str, Any], facts: Facts) -> Self:
-        """The mechanism of a case.
+        """The mechanism of a case, from its parameters in SI units and RAS axes, and the ramp.
 
-        Parameters
-        ----------
-        values : mapping
-            Parameters in SI units and RAS axes, and the ramp.
-        facts : Facts
-
-        Raises
-        ------
-        ParameterError
-            If a parameter makes no sense in this case.
+        `ParameterError` if one of them makes no sense in this case.
         """
         made = cls(**values)
         made.check_in(facts)
         return made
 
     def in_case(self, facts: Facts) -> dict[str, Any]:
-        """Parameters by name, in SI units and RAS axes, of which `of_case` makes what does the same.
-
-        Parameters
-        ----------
-        facts : Facts
-            Of the case that is to say them.
-        """
+        """Parameters by name, in SI units and RAS axes, of which `of_case` makes what does the same in a case."""
         values = {name: getattr(self, name) for name in self.parameters()}
         return {name: value for name, value in values.items() if value is not None}
 
@@ -314,14 +259,20 @@ class Mechanism(Ramped, abc.ABC):
     def check(self, mesh: TetMesh) -> None:
         """Raise `ParameterError` if a parameter makes no sense with a mesh: a set that is not there, or is empty."""
         for name, says in self.parameters().items():
-            if says.kind in ("node set", "element set") and getattr(self, name):
-                _require_set(name, says.kind, getattr(self, name), mesh)
+            if says.kind not in ("node set", "element set") or not (value := getattr(self, name)):
+                continue
+            sets = mesh.node_sets if says.kind == "node set" else mesh.element_sets
+            if value not in sets:
+                known = ", ".join(sorted(sets)) or "none"
+                raise ParameterError(name, f"the mesh has no {says.kind} '{value}' (it has {known})")
+            if not sets[value].any():
+                raise ParameterError(name, f"the {says.kind} '{value}' is empty")
 
-    def held(self, mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def held(self, mesh: TetMesh) -> tuple[Ints, Floats]:
         """Nodes (k,), repeated if need be, and directions (k, 3) in which it holds them."""
         return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
 
-    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+    def acts_on(self, mesh: TetMesh) -> Bools:
         """Elements (m,) whose tissue carries what it does, so that it means nothing without them; none by default."""
         return np.zeros(len(mesh.tetrahedra), dtype=bool)
 
@@ -336,25 +287,14 @@ class Mechanism(Ramped, abc.ABC):
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
-        """How it may act where a case does not declare it.
-
-        Raises
-        ------
-        NotTestableError
-            If the data of the case cannot show it.
-        """
+        """How it may act where a case does not declare it; `NotTestableError` if the data cannot show it."""
         raise NotTestableError(f"needs {' and '.join(cls.needs) or 'more than is known of this case'}")
 
     @classmethod
     def about_law(cls, poisson: float, sd: float) -> Proposal:
         """It about the law that a case has, where it does nothing; of mechanisms that are `always` there a little.
 
-        Parameters
-        ----------
-        poisson : float
-            Of the case.
-        sd : float
-            Standard deviation of its coefficient.
+        `poisson` is the ratio of the case, `sd` the standard deviation of its coefficient.
         """
         raise NotImplementedError(cls.kind)
 
@@ -366,13 +306,9 @@ class Mechanism(Ramped, abc.ABC):
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
         """What was found of it, one clause for each thing that can be known, with direction and sign.
 
-        Parameters
-        ----------
-        values : mapping of str to Value
-            Finite parameters by name, each in the unit it has in `parameters`; components of vectors as ``value_x``,
-            their length as ``value_size``, of its ramp the last factor as ``share``.
-        gravity_axis : (float, float, float), optional
-            Where 'down' was said to be.
+        Of finite parameters by name, each in the unit it has in `parameters`; components of vectors as ``value_x``,
+        their length as ``value_size``, of its ramp the last factor as ``share``. `gravity_axis` is where 'down' was
+        said to be.
         """
         return clauses(cls.parameters(), values)
 
@@ -391,13 +327,10 @@ class Mechanism(Ramped, abc.ABC):
         """Whether what it lets go can leave the wall too, where it is pulled."""
         return False
 
-    def turned(self, rotation: NDArray[np.float64]) -> Self:
+    def turned(self, rotation: Floats) -> Self:
         """The same in a body that is turned: every direction `a` becomes `R a`, (3, 3).
 
-        Raises
-        ------
-        ParameterError
-            If it acts in a part of the body, or has directions of its own in each element: these would turn too.
+        `ParameterError` if it acts in a part of the body, or has directions in each element: these would turn too.
         """
         if np.allclose(rotation, np.eye(3)):
             return self
@@ -430,21 +363,11 @@ class Mechanism(Ramped, abc.ABC):
         return f" ({'; '.join(said)})" if said else ""
 
 
-def _require_set(key: str, kind: str, name: str, mesh: TetMesh) -> None:
-    sets = mesh.node_sets if kind == "node set" else mesh.element_sets
-    members = sets.get(name)
-    if members is None:
-        known = ", ".join(sorted(sets)) or "none"
-        raise ParameterError(key, f"the mesh has no {kind} '{name}' (it has {known})")
-    if not members.any():
-        raise ParameterError(key, f"the {kind} '{name}' is empty")
-
-
 @runtime_checkable
 class Weakening(Protocol):
     """A mechanism that makes the tissue's own elements softer or stiffer."""
 
-    def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+    def stiffness_factor(self, mesh: TetMesh, scale: float) -> Floats:
         """Factor (m,) on all moduli of each element, where the mechanism acts with a scale from 0 to 1."""
 
 
@@ -455,7 +378,7 @@ class Emptying(Protocol):
     def factor(self, time: float = math.inf) -> float:
         """Its scale at a time [s]; by default long after its ramp."""
 
-    def remaining_part(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+    def remaining_part(self, mesh: TetMesh, scale: float) -> Floats:
         """Part (m,) of each element that is left, where the mechanism acts with a scale from 0 to 1."""
 
 
@@ -463,7 +386,7 @@ class Emptying(Protocol):
 class Growing(Protocol):
     """A mechanism that makes the tissue's own elements larger or smaller."""
 
-    def growth(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+    def growth(self, mesh: TetMesh, scale: float) -> Floats:
         """Relative change of volume (m,) of each element without stress, at a scale from 0 to 1."""
 
 
@@ -479,7 +402,7 @@ class Substituting(Protocol):
 class Storing(Protocol):
     """A mechanism that stores energy where the deformation is homogeneous, beside the law's."""
 
-    def stored_energy(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+    def stored_energy(self, F: Floats) -> Floats:
         """Energy (n,) [Pa] per volume at rest, at deformation gradients (n, 3, 3)."""
 
 

@@ -35,21 +35,11 @@ PLACES = {
 
 @dataclass(frozen=True)
 class Enters:
-    """How a mechanism enters the total potential.
+    """How a mechanism enters the total potential."""
 
-    Attributes
-    ----------
-    place : str
-        One of `PLACES`.
-    symbol : str
-        Of it in the formula.
-    fills : str
-        Symbol of the energy of what takes the place of tissue; empty if there is none.
-    """
-
-    place: str
-    symbol: str
-    fills: str = ""
+    place: str  # one of `PLACES`
+    symbol: str  # of it in the formula
+    fills: str = ""  # symbol of the energy of what takes the place of tissue; empty if there is none
 
     def __post_init__(self) -> None:
         assert self.place in PLACES, self.place

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.free_surfaces import FreeSurface
 
 if TYPE_CHECKING:
     from warpbrain.physics.mechanism import Mechanism
 
-Floats = NDArray[np.float64]
 #: A point or a direction.
 Place = tuple[float, float, float]
 
@@ -36,29 +36,17 @@ class NotTestableError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Some of the nodes that a case holds.
+    """Some of the nodes that a case holds."""
 
-    Attributes
-    ----------
-    name, surface : str
-        Of the node set that they become, and of the one that they are a part of.
-    members, held : (n,) bool array
-        They, and all nodes of that surface.
-    centre : (3,) array
-        [m]
-    radius : float
-        [m]
-    """
-
-    name: str
-    surface: str
-    members: NDArray[np.bool_]
-    held: NDArray[np.bool_]
-    centre: Floats
-    radius: float
+    name: str  # of the node set that they become
+    surface: str  # of the one that they are a part of
+    members: Bools  # (n,), they
+    held: Bools  # (n,), all nodes of that surface
+    centre: Floats  # (3,) [m]
+    radius: float  # [m]
 
     @classmethod
-    def disc(cls, mesh: TetMesh, nodes: str, held: NDArray[np.bool_], centre: Floats, radius: float) -> Patch | None:
+    def disc(cls, mesh: TetMesh, nodes: str, held: Bools, centre: Floats, radius: float) -> Patch | None:
         """Nodes of a held set `nodes` (n,) within a radius [m] of a point; None if they have no face."""
         members = held & (np.linalg.norm(mesh.points - centre, axis=1) <= radius)
         if not members[mesh.boundary].all(axis=1).any():
@@ -69,48 +57,23 @@ class Patch:
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """What a mechanism may know of a case in which it is looked for.
+    """What a mechanism may know of a case in which it is looked for."""
 
-    Attributes
-    ----------
-    mesh : TetMesh
-        The simulated one.
-    gravity_axis : (float, float, float) or None
-    density, poisson : float
-        [kg/m3] and without unit.
-    assumed : frozenset of str
-        Kinds of mechanisms that the case assumes.
-    laws : frozenset of str
-        Of its tissues.
-    held : tuple of Patch
-        Parts of the surface that nothing moves.
-    free : tuple of FreeSurface
-        Parts of the surface that nothing holds, each a node set of the mesh.
-    instants : int
-        At how many times something was recorded.
-    volume_sites, surface_sites : (k, 3) array
-        Points [m] a spacing apart in the tissue, and on its free surface.
-    spacing : float
-        [m]
-    axes : (str, str, str)
-        How x, y and z run, for people.
-    named : tuple of (str, (k, 3) int array)
-        Every part of the surface that can move, with what people call it: what something acts on already, too.
-    """
-
-    mesh: TetMesh
+    mesh: TetMesh  # the simulated one
     gravity_axis: tuple[float, float, float] | None
-    density: float
+    density: float  # [kg/m3]
     poisson: float
-    assumed: frozenset[str]
-    laws: frozenset[str]
-    held: tuple[Patch, ...]
-    free: tuple[FreeSurface, ...]
-    instants: int
-    volume_sites: Floats
-    surface_sites: Floats
-    spacing: float
+    assumed: frozenset[str]  # kinds of mechanisms that the case assumes
+    laws: frozenset[str]  # of its tissues
+    held: tuple[Patch, ...]  # parts of the surface that nothing moves
+    free: tuple[FreeSurface, ...]  # parts of the surface that nothing holds, each a node set of the mesh
+    instants: int  # at how many times something was recorded
+    volume_sites: Floats  # (k, 3), points a spacing apart in the tissue [m]
+    surface_sites: Floats  # (k, 3), and on its free surface [m]
+    spacing: float  # [m]
+    #: How x, y and z run, for people
     axes: tuple[str, str, str] = ("from left to right", "from posterior to anterior", "from inferior to superior")
+    #: Every part of the surface that can move, with what people call it: what something acts on already, too
     named: tuple[tuple[str, NDArray[np.int32]], ...] = ()
 
     @cached_property
@@ -139,21 +102,13 @@ class Situation:
 
 @dataclass(frozen=True)
 class Tests:
-    """What a mechanism may know of the tests on a specimen that may be fitted.
-
-    Attributes
-    ----------
-    modes : frozenset of str
-    loads : int
-        How many different ones: other modes, or other directions of the tissue.
-    tension, compression : bool
-        Whether an axial test pulls, and whether one presses; what is pulled along two axes is pressed along the third.
-    """
+    """What a mechanism may know of the tests on a specimen that may be fitted."""
 
     # not a test of pytest's
     __test__ = False
     modes: frozenset[str]
-    loads: int
+    loads: int  # how many different ones: other modes, or other directions of the tissue
+    #: Whether an axial test pulls, and whether one presses; what is pulled along two axes is pressed along the third
     tension: bool
     compression: bool
 
@@ -163,20 +118,11 @@ class Varying:
     """Coefficients of a proposal that are smooth functions of time.
 
     A coefficient that varies is `mean + sum_j modes_j(t) c_j`, with modes of a Gaussian process.
-
-    Attributes
-    ----------
-    base : Proposal
-        What acts at one time.
-    times : (m,) array
-        [s], increasing: at which states are looked at; the last stands for the end.
-    modes : (m, r) array
-        At these times.
     """
 
-    base: Proposal
-    times: Floats
-    modes: Floats
+    base: Proposal  # what acts at one time
+    times: Floats  # (m,) [s], increasing: at which states are looked at; the last stands for the end
+    modes: Floats  # (m, r), at these times
 
     @property
     def fixed(self) -> tuple[int, ...]:
@@ -241,64 +187,36 @@ class Varying:
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """Mechanisms of one kind at one place.
+    """Mechanisms of one kind at one place."""
 
-    Attributes
-    ----------
-    make : callable
-        From coefficients (k,) to the mechanism.
-    mean, sd : (k,) array
-        Of the coefficients beforehand.
-    follows : str
-        One of `Follows`. A smooth one does nothing at `start`; a switch has one coefficient, its share; a course is
-        solved once, at `start`; what one that fades does at once is computed at `start`.
-    start : (k,) array
-        About which a smooth one is differentiated; zero if proportional.
-    nothing : (k,) array
-        Where it does nothing, `start` if not said.
-    patch : Patch or None
-        What the case's own boundaries no longer hold.
-    elsewhere : callable, or None
-        Of what acts in one place: from another centre (3,) [m] and radius [m] to the same there; a patch that would
-        have no face there stays as it is.
-    on_surface : bool
-        Whether that place is one of the surface.
-    history : callable, or None
-        Of a fading one: from coefficients (k,) and the time since the load came [s] to how many times what it does at
-        once at `start` is there, in proportion to the first of them; nothing is left in the end.
-    pace : callable, or None
-        Of a course: from coefficients to how many times faster than at `start` all of it goes.
-    centre, radius : (3,) array and float, or None
-        Where it acts [m], if somewhere.
-    region : str
-        Where it acts in words.
-    varying : tuple of int
-        Numbers of the coefficients that may be functions of time: all of them where it is in proportion to them.
-    in_turns : bool
-        Whether what acts at one time gives way to what acts at the next; else each coefficient has a ramp.
-    only_over_time : bool
-        Whether it is looked for with a course alone.
-    over_time : Varying or None
-        What its coefficients mean, if some are functions of time: `make` is what acts in the end.
-    """
-
-    make: Callable[[Floats], Mechanism]
-    mean: Floats
+    make: Callable[[Floats], Mechanism]  # from coefficients (k,) to the mechanism
+    mean: Floats  # (k,), of the coefficients beforehand
     sd: Floats
+    #: One of `Follows`. A smooth one does nothing at `start`; a switch has one coefficient, its share; a course is
+    #: solved once, at `start`; what one that fades does at once is computed at `start`.
     follows: Follows = "proportional"
+    #: (k,), about which a smooth one is differentiated; zero if proportional
     start: Floats = field(default_factory=lambda: np.zeros(0))
-    nothing: Floats = field(default_factory=lambda: np.zeros(0))
-    patch: Patch | None = None
+    nothing: Floats = field(default_factory=lambda: np.zeros(0))  # (k,), where it does nothing, `start` if not said
+    patch: Patch | None = None  # what the case's own boundaries no longer hold
+    #: Of what acts in one place: from another centre (3,) [m] and radius [m] to the same there; a patch that would
+    #: have no face there stays as it is
     elsewhere: Callable[[Floats, float], Proposal] | None = None
-    on_surface: bool = False
+    on_surface: bool = False  # whether that place is one of the surface
+    #: Of a fading one: from coefficients (k,) and the time since the load came [s] to how many times what it does at
+    #: once at `start` is there, in proportion to the first of them; nothing is left in the end
     history: Callable[[Floats, float], float] | None = None
+    #: Of a course: from coefficients to how many times faster than at `start` all of it goes
     pace: Callable[[Floats], float] | None = None
-    centre: Floats | None = None
-    radius: float | None = None
-    region: str = ""
+    centre: Floats | None = None  # (3,), where it acts, if somewhere [m]
+    radius: float | None = None  # [m]
+    region: str = ""  # where it acts in words
+    #: Numbers of the coefficients that may be functions of time: all of them where it is in proportion to them
     varying: tuple[int, ...] = ()
+    #: Whether what acts at one time gives way to what acts at the next; else each coefficient has a ramp
     in_turns: bool = False
-    only_over_time: bool = False
+    only_over_time: bool = False  # whether it is looked for with a course alone
+    #: What its coefficients mean, if some are functions of time: `make` is what acts in the end
     over_time: Varying | None = None
 
     def acting(self, c: Floats) -> tuple[Mechanism, ...]:
@@ -322,6 +240,11 @@ class Proposal:
 
         return cls(made, np.array([mean]), np.array([sd]), follows, np.array([start]), **where)  # type: ignore[arg-type]
 
+    @classmethod
+    def switch(cls, mechanism: Mechanism, sd: float, follows: Follows = "switch", **where: object) -> Proposal:
+        """What is there or not; its one coefficient, the share, says how exactly that is simulated."""
+        return cls.of_one(lambda _share: mechanism, 1.0, sd, follows, **where)
+
     @property
     def without(self) -> Floats:
         """Coefficients (k,) with which it does nothing."""
@@ -340,41 +263,30 @@ class Proposal:
     ) -> list[Proposal]:
         """Smooth ones of one coefficient, nothing at zero, in balls of some radii [m] throughout the tissue.
 
-        Parameters
-        ----------
-        make : callable
-            From the coefficient, the centre [m] and the radius [m] to the mechanism.
-        sd : float
-        radii : sequence of float
-        situation : Situation
-        varying : tuple of int
+        `make` is from the coefficient, the centre [m] and the radius [m] to the mechanism.
         """
 
         def ball(centre: Floats, radius: float) -> Proposal:
             x, y, z = centre.tolist()
-            one = partial(_placed, make, (x, y, z), radius)
-            return cls.of_one(one, 0.0, sd, "smooth", elsewhere=ball, centre=centre, radius=radius, varying=varying)
+
+            def made(coefficient: float) -> Mechanism:
+                return make(coefficient, (x, y, z), radius)
+
+            return cls.of_one(made, 0.0, sd, "smooth", elsewhere=ball, centre=centre, radius=radius, varying=varying)
 
         return [ball(site, radius) for site in situation.volume_sites for radius in radii]
 
     @classmethod
     def along_axes(
-        cls, make: Callable[[float, Place], Mechanism], sd: float, what: str, situation: Situation
+        cls, make: Callable[[Place, float], Mechanism], sd: float, what: str, situation: Situation
     ) -> list[Proposal]:
         """Proportional ones of one coefficient along each axis of the anatomy.
 
-        Parameters
-        ----------
-        make : callable
-            From the coefficient and the axis to the mechanism.
-        sd : float
-        what : str
-            What lies along the axis, for people.
-        situation : Situation
+        `make` is from the axis and the coefficient to the mechanism; `what` says to people what lies along the axis.
         """
         axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         return [
-            cls.of_one(partial(_along, make, axis), 0.0, sd, region=f"{what} {name}")
+            cls.of_one(partial(make, axis), 0.0, sd, region=f"{what} {name}")
             for name, axis in zip(situation.axes, axes, strict=True)
         ]
 
@@ -396,13 +308,3 @@ class Proposal:
 
     def __len__(self) -> int:
         return len(self.mean)
-
-
-def _placed(
-    make: Callable[[float, Place, float], Mechanism], centre: Place, radius: float, coefficient: float
-) -> Mechanism:
-    return make(coefficient, centre, radius)
-
-
-def _along(make: Callable[[float, Place], Mechanism], axis: Place, coefficient: float) -> Mechanism:
-    return make(coefficient, axis)

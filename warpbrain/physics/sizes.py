@@ -6,8 +6,7 @@ import math
 from collections.abc import Sequence
 
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.physics.values import Smallest, Value
-from warpbrain.physics.words import measured, number
+from warpbrain.physics.words import Smallest, Value, measured, number
 
 #: An effect that is seen only this improbably far out of what is expected [part] is no effect that is seen.
 _FAR = 1e-4
@@ -20,13 +19,8 @@ def size_in_words(
 ) -> tuple[str, ...]:
     """What was found of a mechanism, one clause for each thing that can be known; none of a switch.
 
-    Parameters
-    ----------
-    kind : str
-        What is none of the registry has the names of its numbers for words.
-    values : sequence of Value
-    gravity_axis : (float, float, float), optional
-        Where 'down' was said to be: what a tilt is counted from.
+    A kind that is not in the registry has the names of its numbers for words. A tilt is counted from `gravity_axis`,
+    where 'down' was said to be.
     """
     by_name = {value.name: value for value in values if math.isfinite(value.value)}
     if kind not in mechanisms():

@@ -9,7 +9,7 @@ The system knows no term by name.
 from __future__ import annotations
 
 import abc
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
@@ -17,6 +17,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
+from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import QuadraticMesh, TetMesh
 
@@ -67,31 +69,31 @@ class Body(Protocol):
         """Gradients of the shape functions of nodes 1 to 3 as rows, (m,) mat33 [1/m]."""
 
     @property
-    def constrained(self) -> NDArray[np.bool_]:
+    def constrained(self) -> Bools:
         """Components (n, 3) of the displacement that are prescribed."""
 
     @property
-    def movable(self) -> NDArray[np.bool_]:
+    def movable(self) -> Bools:
         """Nodes (n,) of which some component is not prescribed."""
 
     @property
-    def volumetric_moduli(self) -> NDArray[np.float64]:
+    def volumetric_moduli(self) -> Floats:
         """`lam` or `K` of each element (m,) [Pa]."""
 
     @property
-    def shear_moduli(self) -> NDArray[np.float64]:
+    def shear_moduli(self) -> Floats:
         """At rest, of each element (m,) [Pa]."""
 
     @property
-    def stiffness_factors(self) -> NDArray[np.float64]:
+    def stiffness_factors(self) -> Floats:
         """Factor (m,) on all moduli of each element, as it is now."""
 
     @property
-    def remaining_parts(self) -> NDArray[np.float64]:
+    def remaining_parts(self) -> Floats:
         """Part (m,) of each element that is left, as it is now."""
 
     @property
-    def growth_stretches(self) -> NDArray[np.float64]:
+    def growth_stretches(self) -> Floats:
         """Stretch (m,) of each element without stress, as it is now."""
 
 
@@ -101,54 +103,27 @@ class Coupling:
 
     Of the forces `-(db/du)^T p`, blocks can hold what they do at the same `p`. That `p` changes with `u` adds
     `(db/du)^T A^-1 (db/du)`, which is dense: linear solvers take `A` and `db/du` themselves.
-
-    Attributes
-    ----------
-    offsets, columns : wp.array of int
-        Sparse rows; a node without unknown has none.
-    compliance : wp.array
-        `A_ij`, positive definite.
-    yielding : wp.array
-        About `(db/du) K^-1 (db/du)^T`: how the solid gives way to `p`, in the same rows. Of a preconditioner, which no
-        solution depends on.
-    own, others : wp.array of vec3
-        `db_i/du_j` and `db_j/du_i`.
-    content : wp.array
-        `b(u) + A p` where the term advanced last, without what flowed in that step; zero once it has forgotten.
     """
 
-    offsets: wp.array
+    offsets: wp.array  # sparse rows; a node without unknown has none
     columns: wp.array
-    compliance: wp.array
+    compliance: wp.array  # `A_ij`, positive definite
+    #: About `(db/du) K^-1 (db/du)^T`: how the solid gives way to `p`, in the same rows. Of a preconditioner, which no
+    #: solution depends on.
     yielding: wp.array
-    own: wp.array
-    others: wp.array
+    own: wp.array  # `db_i/du_j`
+    others: wp.array  # `db_j/du_i`
+    #: `b(u) + A p` where the term advanced last, without what flowed in that step; zero once it has forgotten
     content: wp.array
 
 
 class Term(abc.ABC):
     """A family of stencils with forces, tangent blocks and, if there is one, an energy.
 
-    Forces are internal ones: minus what pushes the nodes. The tangent is symmetric: conjugate gradients need that, and
-    of a term that is not, the symmetric part is taken, at the price of a slower Newton's method.
-
-    Parameters
-    ----------
-    body : Body
-    stencils : (k, s) int array
-        Node ids, ascending in each row.
-    ramp : callable, optional
-        Factor over time [s]; 1 throughout if absent.
-
-    Attributes
-    ----------
-    scale : wp.array, shape (1,)
-        Factor on what it does, from 0 to 1 in load steps, times its ramp over time. On the device, so that a captured
-        graph follows it.
-    forces : wp.array of vec3, shape (k, s)
-        [N]
-    blocks : wp.array of mat33, shape (k, s (s + 1) / 2)
-        Tangent blocks [N/m] of the node pairs (a, b), a <= b, row by row.
+    Stencils are node ids (k, s) that ascend in each row. Forces (k, s) [N] are internal ones: minus what pushes the
+    nodes. The tangent is symmetric: conjugate gradients need that, and of a term that is not, the symmetric part is
+    taken, at the price of a slower Newton's method. Its blocks (k, s (s + 1) / 2) [N/m] are of the node pairs (a, b),
+    a <= b, row by row. The ramp is a factor over time [s], 1 throughout if absent.
     """
 
     #: Whether `energy` is the potential of the forces. If not, the work along a step stands for its change.
@@ -173,6 +148,7 @@ class Term(abc.ABC):
         self._ramp = ramp
         self.stencils = np.ascontiguousarray(stencils, dtype=np.int32)
         assert bool(np.all(np.diff(self.stencils, axis=1) > 0)), "nodes of a stencil ascend"
+        #: Factor on what it does, from 0 to 1 in load steps, times its ramp; a captured graph follows it on the device.
         self.scale = wp.ones(1, dtype=body.precision.scalar, device=body.device)
         self.forces: wp.array = None
         self.blocks: wp.array = None
@@ -210,21 +186,17 @@ class Term(abc.ABC):
     def add_stiffness(  # noqa: B027
         self, x: wp.array, factor: float, y: wp.array, columns: wp.array, rows: wp.array
     ) -> None:
-        """Add to `y` a factor times that part of its tangent times `x` which is not in the blocks.
+        """Add to `y` (n,) a factor times that part of its tangent times `x` (n,) which is not in the blocks.
 
-        Parameters
-        ----------
-        x, y : wp.array of vec3, shape (n,)
-        factor : float
-        columns, rows : wp.array of vec3, shape (n,)
-            1 for the components of `x` that count, and for those of `y` that are added to; 0 for others.
+        `columns` and `rows` (n,) are 1 for the components of `x` that count, and for those of `y` that are added to; 0
+        for others.
         """
 
-    def skew_stiffness(self, u: NDArray[np.float64]) -> Any:
+    def skew_stiffness(self, u: Floats) -> Any:
         """What of its tangent [N/m] is skew, which no block holds, SciPy sparse (3 n, 3 n); None if nothing is."""
         return None
 
-    def nodal_pressures(self) -> dict[str, NDArray[np.float64]]:
+    def nodal_pressures(self) -> dict[str, Floats]:
         """Pressures of its own at the nodes (n,) [Pa], by name, where the forces were last evaluated."""
         return {}
 
@@ -279,6 +251,64 @@ class Term(abc.ABC):
     def array(self, values: Any, dtype: Any) -> wp.array:
         """An array on the body's device."""
         return wp.array(values, dtype=dtype, device=self.body.device)
+
+
+class KernelTerm(Term):
+    """A term of kernels with a thread for each stencil: for forces, for forces with blocks, and for energies."""
+
+    def __init__(
+        self, body: Body, stencils: NDArray[np.integer], kernels: Sequence[Any], ramp: Callable[[float], float]
+    ) -> None:
+        super().__init__(body, stencils, ramp)
+        self._kernels = kernels
+        self._energies = wp.zeros(len(stencils), dtype=body.precision.scalar, device=body.device)
+
+    @abc.abstractmethod
+    def _inputs(self) -> list[Any]:
+        """What the kernels take before displacements [m] and outputs."""
+
+    def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
+        launch(kernel, len(self.stencils), [*self._inputs(), u, *outputs], self.body.device)
+
+    def evaluate_forces(self, u: wp.array) -> None:
+        self._launch(self._kernels[0], u, self.forces)
+
+    def evaluate_tangents(self, u: wp.array) -> None:
+        self._launch(self._kernels[1], u, self.forces, self.blocks)
+
+    def energy(self, u: wp.array) -> float:
+        self._launch(self._kernels[2], u, self._energies)
+        return float(np.sum(self._energies.numpy(), dtype=np.float64))
+
+
+class TriangleTerm(KernelTerm):
+    """Forces, tangent blocks and energies of triangles (k, 3) or (k, 6): ids that ascend, of six the corners first.
+
+    `points` (n, 3) are reference positions of the body's nodes [m], from any origin, `data` (k,) or (k, c) numbers of
+    each triangle. The three kernels are ``(nodes, points, data, scale, u) -> forces``, ``-> blocks`` and
+    ``-> energies``, with a thread for each triangle. The ramp is a factor over time [s].
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        triangles: NDArray[np.integer],
+        points: Floats,
+        data: Floats,
+        kernels: tuple[Any, Any, Any],
+        ramp: Callable[[float], float],
+    ) -> None:
+        super().__init__(body, triangles, kernels, ramp)
+        self._nodes = self.array(self.stencils, wp.vec3i if self.stencils.shape[1] == 3 else int)
+        self._points = self.array(points, body.precision.vec3)
+        self._data = self.array(data, body.precision.scalar)
+
+    def _inputs(self) -> list[Any]:
+        return [self._nodes, self._points, self._data, self.scale]
+
+    def evaluate_tangents(self, u: wp.array) -> None:
+        self.evaluate_forces(u)
+        self._launch(self._kernels[1], u, self.blocks)
 
 
 @runtime_checkable

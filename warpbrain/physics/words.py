@@ -9,12 +9,42 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.physics.values import Value
+from warpbrain.arrays import Floats
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter of a mechanism after the fit."""
+
+    name: str
+    value: float  # in the unit
+    sd: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Smallest:
+    """The smallest effect of a kind that these data show."""
+
+    size: float  # in the unit: nine of ten raise an alarm
+    unit: str
+    name: str  # of the parameter
+    named: float = float("inf")  # the size of which half would be named; infinite if none would
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Something that could be measured next."""
+
+    what: str
+    expected_nats: float  # by which it would tell the two most probable causes apart, expected log Bayes factor
+
 
 if TYPE_CHECKING:
     from warpbrain.physics.mechanism import Says
@@ -97,7 +127,7 @@ def along(direction: ArrayLike) -> str:
     return f"from {first} to {last}" if last else ""
 
 
-def _nearest(vector: NDArray[np.float64]) -> list[str]:
+def _nearest(vector: Floats) -> list[str]:
     most, second = np.argsort(-np.abs(vector), kind="stable")[:2].tolist()
     size = abs(vector)
     if not size[most] > 0.0:
@@ -112,7 +142,7 @@ def unsure(value: Value) -> bool:
     return value.sd > abs(value.value)
 
 
-def vector_in(values: Values, name: str) -> NDArray[np.float64]:
+def vector_in(values: Values, name: str) -> Floats:
     """Components (3,) of a parameter that is a vector; zero where nothing is known."""
     found = (values.get(f"{name}_{axis}") for axis in "xyz")
     return np.array([0.0 if one is None else one.value for one in found])

@@ -25,7 +25,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.mesh.quality import EDGES
 from warpbrain.physics.continuous import differ_in_numbers_only
 from warpbrain.physics.laws import Law
-from warpbrain.physics.laws.grown import grown
+from warpbrain.physics.laws.device import grown
 from warpbrain.physics.mechanism import Following, Growing, Weakening
 from warpbrain.physics.term import Term
 from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, averaged_terms, own_modulus

@@ -9,7 +9,7 @@ from testing_machine import case_of
 
 from warpbrain.inference.confirm import Confirmation, after_checks
 from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decision
-from warpbrain.physics.values import Value
+from warpbrain.physics.words import Value
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import CheckResults, Folds, folds_of, grown_errors, held_out
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen

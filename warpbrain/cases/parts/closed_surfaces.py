@@ -6,7 +6,7 @@ from pathlib import Path
 
 from warpbrain.frame import Frame
 from warpbrain.mesh.soundness import open_edges
-from warpbrain.physics.closed_surface import ClosedSurface
+from warpbrain.physics.mechanism import ClosedSurface
 from warpbrain.problems import Problems
 from warpbrain.recordings.surfaces import read_surface_mesh
 

@@ -14,10 +14,9 @@ from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.ramps import read_ramp
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
-from warpbrain.physics.load import Load
+from warpbrain.physics.load import Load, take_turns
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing, Says
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.physics.ramp import take_turns
 
 #: What to do where something of the case itself is missing.
 _CURES = {"gravity_axis": "gravity_axis = [0, -1, 0] for a patient who lies on the back, in RAS"}

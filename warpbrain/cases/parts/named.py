@@ -13,7 +13,7 @@ from warpbrain.cases.parts.closed_surfaces import read_closed_surface
 from warpbrain.cases.parts.directions import ENDINGS, read_directions
 from warpbrain.frame import Frame
 from warpbrain.mesh import TetMesh, wall_nodes
-from warpbrain.physics.closed_surface import ClosedSurface
+from warpbrain.physics.mechanism import ClosedSurface
 from warpbrain.problems import Problems
 
 

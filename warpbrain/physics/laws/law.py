@@ -19,15 +19,30 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 
 if TYPE_CHECKING:
     from warpbrain.physics.laws.device import InvariantLaw, PrincipalLaw
 
 FORMULATIONS = ("coupled", "uncoupled")
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One of the numbers that a distribution of laws is written in."""
+
+    name: str  # with the unit
+    noun: str  # in a sentence
+    reach: float  # how far a step of an estimation may go, so that the next equilibrium is within reach of the last
+    belief: str  # of its standard deviation about what a case declares, the key
+    low: float = -math.inf  # where it ends
+    high: float = math.inf
+    signed: bool = False  # whether positive and negative values are kinds of their own, with none between them
+
+
+#: That of every law: a step goes a factor of e.
+MODULUS = Coordinate("ln(mu0 / Pa)", "shear modulus", 1.0, "tissue.declared_modulus")
 
 
 @dataclass(frozen=True)
@@ -38,6 +53,13 @@ class Law(abc.ABC):
     name: ClassVar[str]
     #: Its keys in a tissue's table of `case.toml`, the fields of the class: one number, or a list of numbers.
     keys: ClassVar[Mapping[str, type]]
+    #: Its coordinates: the modulus, and those of its shape; none if it has no prior.
+    coordinates: ClassVar[tuple[Coordinate, ...]] = ()
+
+    @property
+    def shape(self) -> tuple[float, ...]:
+        """Its coordinates but for the modulus."""
+        return ()
 
     @property
     @abc.abstractmethod
@@ -47,7 +69,10 @@ class Law(abc.ABC):
     @classmethod
     @abc.abstractmethod
     def of_shear_modulus(cls, mu: float) -> Law:
-        """The law of a shear modulus [Pa] in its usual shape: what `--model` puts in the place of another law."""
+        """The law of a shear modulus [Pa] in its usual shape: what `--model` puts in the place of another law.
+
+        Where it has coordinates of its shape they are further arguments.
+        """
 
     @abc.abstractmethod
     def parameters(self) -> tuple[float, ...]:
@@ -59,7 +84,7 @@ class Law(abc.ABC):
         return [law.parameters() for law in laws]
 
     @abc.abstractmethod
-    def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
+    def energy(self, stretches: Floats) -> Floats:
         """Incompressible strain energy `w` [Pa] at principal stretches of shape (..., 3)."""
 
     @classmethod

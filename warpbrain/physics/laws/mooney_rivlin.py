@@ -13,11 +13,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.laws.device import InvariantLaw
-from warpbrain.physics.laws.law import Law, require_finite
+from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, require_finite
 
 
 @wp.func
@@ -95,6 +95,10 @@ class MooneyRivlin(Law):
     C2: float
     name: ClassVar[str] = "mooney-rivlin"
     keys: ClassVar[Mapping[str, type]] = {"C1": float, "C2": float}
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (
+        MODULUS,
+        Coordinate("C2 / (C1 + C2)", "ratio C2 / (C1 + C2)", 0.5, "tissue.declared_share", 0.0, 1.0),
+    )
 
     def __post_init__(self) -> None:
         require_finite(self.name, "C1, C2", self.C1, self.C2)
@@ -108,14 +112,18 @@ class MooneyRivlin(Law):
         return 2.0 * (self.C1 + self.C2)
 
     @classmethod
-    def of_shear_modulus(cls, mu: float) -> "MooneyRivlin":
-        """Equal coefficients."""
-        return cls(0.25 * mu, 0.25 * mu)
+    def of_shear_modulus(cls, mu: float, share: float = 0.5) -> "MooneyRivlin":
+        """Equal coefficients, unless the share of `C2` in both is given."""
+        return cls(0.5 * mu * (1.0 - share), 0.5 * mu * share)
+
+    @property
+    def shape(self) -> tuple[float, ...]:
+        return (self.C2 / (self.C1 + self.C2),)
 
     def parameters(self) -> tuple[float, ...]:
         return (self.C1, self.C2)
 
-    def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
+    def energy(self, stretches: Floats) -> Floats:
         squares = stretches**2
         I1 = np.sum(squares, axis=-1)
         I2 = squares[..., 0] * squares[..., 1] + squares[..., 1] * squares[..., 2] + squares[..., 2] * squares[..., 0]

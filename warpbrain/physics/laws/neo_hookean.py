@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.laws.device import InvariantLaw
-from warpbrain.physics.laws.law import Law, require_finite
+from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, require_finite
 
 
 @wp.func
@@ -87,6 +87,7 @@ class NeoHookean(Law):
     mu: float
     name: ClassVar[str] = "neo-hookean"
     keys: ClassVar[Mapping[str, type]] = {"mu": float}
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (MODULUS,)
 
     def __post_init__(self) -> None:
         require_finite(self.name, "mu", self.mu)
@@ -104,7 +105,7 @@ class NeoHookean(Law):
     def parameters(self) -> tuple[float, ...]:
         return (self.mu,)
 
-    def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
+    def energy(self, stretches: Floats) -> Floats:
         return 0.5 * self.mu * (np.sum(stretches**2, axis=-1) - 3.0)
 
     @classmethod

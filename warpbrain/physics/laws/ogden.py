@@ -13,12 +13,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.kernels.powers import power_minus_one, power_quotient
 from warpbrain.physics.laws.device import PrincipalLaw
-from warpbrain.physics.laws.law import Law, require_finite
+from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, require_finite
 
 #: Exponent of the one term that is the neo-Hookean law.
 NEO_HOOKEAN = 2.0
@@ -168,6 +168,10 @@ class Ogden(Law):
     alpha: tuple[float, ...]
     name: ClassVar[str] = "ogden"
     keys: ClassVar[Mapping[str, type]] = {"mu": list, "alpha": list}
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (
+        MODULUS,
+        Coordinate("alpha", "exponent", 4.0, "tissue.declared_exponent", signed=True),
+    )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mu", tuple(float(v) for v in self.mu))
@@ -196,9 +200,15 @@ class Ogden(Law):
         return 0.5 * sum(m * a for m, a in zip(self.mu, self.alpha, strict=True))
 
     @classmethod
-    def of_shear_modulus(cls, mu: float) -> "Ogden":
-        """One term with the exponent -4.7 of brain in compression and tension (Miller and Chinzei 2002)."""
-        return cls((2.0 * mu / -4.7,), (-4.7,))
+    def of_shear_modulus(cls, mu: float, alpha: float = -4.7) -> "Ogden":
+        """One term, of the exponent of brain in compression and tension unless given (Miller and Chinzei 2002)."""
+        return cls((2.0 * mu / alpha,), (alpha,))
+
+    @property
+    def shape(self) -> tuple[float, ...]:
+        if len(self.alpha) > 1:
+            raise InputError(f"{self}: has no coordinates: expected neo-Hookean, Mooney-Rivlin or Ogden with one term")
+        return self.alpha
 
     def parameters(self) -> tuple[float, ...]:
         return self.mu + self.alpha
@@ -214,7 +224,7 @@ class Ogden(Law):
             rows.append(mu + (0.0,) * (terms - own) + alpha + (2.0,) * (terms - own))
         return rows
 
-    def energy(self, stretches: NDArray[np.float64]) -> NDArray[np.float64]:
+    def energy(self, stretches: Floats) -> Floats:
         logs = np.log(stretches)
         terms = [m / a * np.sum(np.expm1(a * logs), axis=-1) for m, a in zip(self.mu, self.alpha, strict=True)]
         return np.sum(terms, axis=0)

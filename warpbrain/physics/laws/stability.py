@@ -22,14 +22,11 @@ A negative `lam` is refused as well: the energy of a coupled law then falls with
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.laws.law import Law
-from warpbrain.physics.laws.paths import Path, derivatives
-from warpbrain.physics.laws.total_energy import total_energy
-
-Floats = NDArray[np.float64]
+from warpbrain.physics.laws.total_energy import Path, derivatives, total_energy
 
 #: A factor of ten each way, far outside what tissue survives.
 _UNIAXIAL = Path((1.0, -0.5, -0.5), reach=10.0, steps=200)
@@ -126,6 +123,6 @@ def _require_growth(law: Law) -> None:
                 raise UnstableLawError(f"{law!r}: the {name} does not grow without bound as {end} (supplement Table 2)")
 
 
-def _nearest_to_rest(path: Path, where: NDArray[np.bool_]) -> float:
+def _nearest_to_rest(path: Path, where: Bools) -> float:
     logs = path.logs[where]
     return float(np.exp(logs[np.argmin(np.abs(logs))]))

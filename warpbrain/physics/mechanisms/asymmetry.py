@@ -22,15 +22,9 @@ from warpbrain.physics.words import Values, measured
 
 @dataclass(frozen=True, kw_only=True)
 class Asymmetry(Mechanism):
-    """Tension-compression asymmetry of all tissues.
+    """Tension-compression asymmetry of all tissues."""
 
-    Parameters
-    ----------
-    exponent : float
-        `alpha`, not zero.
-    """
-
-    exponent: float = parameter(
+    exponent: float = parameter(  # `alpha`
         "Ogden's exponent; 2 is the neo-Hookean law, a negative one stiffens in compression.",
         expectation=Normal(2.0, 15.0),
         typical="-24 to -17 in specimens, -19 in vivo, -4.7 in the classic test",
@@ -68,7 +62,6 @@ class Asymmetry(Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "exponent" not in values:
             return []
         exponent = values["exponent"]
@@ -80,11 +73,9 @@ class Asymmetry(Mechanism):
 
     @classmethod
     def check_tests(cls, tests: Tests) -> None:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         sheared = bool(tests.modes & {"shear", "torsion"})
         if tests.tension + tests.compression + sheared < 2:
             raise NotTestableError(f"needs {' and '.join(cls.needs)}")
 
     def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
-        """See `warpbrain.physics.mechanism.Substituting`."""
-        return Ogden((2.0 * law.shear_modulus / self.exponent,), (self.exponent,)), poisson, formulation
+        return Ogden.of_shear_modulus(law.shear_modulus, self.exponent), poisson, formulation

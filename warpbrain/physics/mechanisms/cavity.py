@@ -22,6 +22,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh, interface_faces
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
@@ -33,17 +34,7 @@ from warpbrain.physics.term import Body
 
 @dataclass(frozen=True, kw_only=True)
 class Cavity(Mechanism):
-    """Tissue of an element set that is taken out gradually.
-
-    Parameters
-    ----------
-    elements : str
-        Element set.
-    pressure : float
-        Of the fluid in the cavity [Pa], relative to that on the rest of the surface.
-    left : float
-        Part of stiffness, weight and mass that is left in the end.
-    """
+    """Tissue of an element set that is taken out gradually."""
 
     elements: str = parameter("Element set that is taken out.", default="resection", kind="element set")
     pressure: float = parameter(
@@ -75,7 +66,7 @@ class Cavity(Mechanism):
         situation.require_new(cls.kind)
         if "resection" not in situation.mesh.element_sets or not situation.mesh.element_sets["resection"].any():
             raise NotTestableError("needs an element set 'resection' of tissue that is still there")
-        return [Proposal.of_one(lambda _share: cls(), 1.0, 0.3, "switch", region="resection")]
+        return [Proposal.switch(cls(), 0.3, region="resection")]
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)
@@ -90,12 +81,10 @@ class Cavity(Mechanism):
             )
         return faces
 
-    def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
-        """See `warpbrain.physics.mechanism.Weakening`."""
+    def stiffness_factor(self, mesh: TetMesh, scale: float) -> Floats:
         return self.remaining_part(mesh, scale)
 
-    def remaining_part(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
-        """See `warpbrain.physics.mechanism.Emptying`."""
+    def remaining_part(self, mesh: TetMesh, scale: float) -> Floats:
         return np.where(mesh.element_sets[self.elements], 1.0 - scale * (1.0 - self.left), 1.0)
 
     def excludes(self, other: Mechanism, mesh: TetMesh) -> str:
@@ -114,5 +103,4 @@ class Cavity(Mechanism):
         return f"where {other.kind} acts on tissue that the cavity takes out: nothing would be left to act on"
 
     def bind(self, body: Body) -> PressureTerm:
-        """See `warpbrain.physics.term.Following`."""
         return PressureTerm(body, self.wall(body.mesh), self.pressure, self.factor)

@@ -16,13 +16,7 @@ from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Te
 
 @dataclass(frozen=True, kw_only=True)
 class Compressibility(Mechanism):
-    """Another Poisson ratio of all tissues.
-
-    Parameters
-    ----------
-    poisson : float
-        At rest, in (-1, 0.5).
-    """
+    """Another Poisson ratio of all tissues."""
 
     poisson: float = parameter(
         "Poisson ratio at rest.",
@@ -56,10 +50,8 @@ class Compressibility(Mechanism):
 
     @classmethod
     def check_tests(cls, tests: Tests) -> None:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "confined" not in tests.modes or tests.loads < 2:
             raise NotTestableError("needs confined compression and another test, so that the volume changes in one")
 
     def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
-        """See `warpbrain.physics.mechanism.Substituting`."""
         return law, self.poisson, formulation

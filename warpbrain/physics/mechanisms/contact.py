@@ -30,20 +30,18 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.kernels.distance_field import smooth_distance
 from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
 from warpbrain.mesh.extent import extent
-from warpbrain.mesh.free_surfaces import FreeSurface
-from warpbrain.physics.closed_surface import ClosedSurface
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
-from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import ClosedSurface, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
-from warpbrain.physics.proposal import Floats, NotTestableError, Patch, Proposal, Situation
-from warpbrain.physics.term import Body, Term
+from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
+from warpbrain.physics.term import Body, KernelTerm
 from warpbrain.physics.words import Values, measured
 
 STATES = ("fixed", "sliding", "lifting")
@@ -57,21 +55,7 @@ _SETTLED = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(Mechanism):
-    """Contact of a node set with a rigid surface.
-
-    Parameters
-    ----------
-    nodes : str
-        Node set.
-    state : str
-        One of `STATES`.
-    penalty : float
-        `k`, relative to the stiffness of a layer of surface elements.
-    friction : float
-        Coefficient.
-    surface : ClosedSurface, optional
-        Which the nodes stay inside of; the body's own if absent.
-    """
+    """Contact of a node set with a rigid surface."""
 
     nodes: str = parameter("Node set that touches the skull.", kind="node set")
     state: str = parameter("What it does there.", kind="text", choices=STATES, default="sliding")
@@ -128,39 +112,34 @@ class Contact(Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """What is held slides or lifts off instead; what is free slides along a wall where it was, or meets it."""
         released = [cls._let_go(state, patch, situation.mesh) for patch in situation.held for state in STATES[1:]]
-        walls = [cls._kept(state, surface) for surface in situation.free for state in STATES[1:]]
+        walls = [
+            Proposal.switch(cls(nodes=surface.name, state=state), 0.5, region=surface.words)
+            for surface in situation.free
+            for state in STATES[1:]
+        ]
         if not released and not walls:
             raise NotTestableError("has no surface")
         return [*released, *walls]
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "radius" not in values:
             return []
         return [f"what lets go has a radius of {measured(values['radius'].value, values['radius'].sd, 'mm')}"]
 
     @property
     def lifts(self) -> bool:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         return self.state == "lifting"
-
-    @classmethod
-    def _kept(cls, state: str, surface: FreeSurface) -> Proposal:
-        return Proposal.of_one(
-            lambda _share: cls(nodes=surface.name, state=state), 1.0, 0.5, "switch", region=surface.words
-        )
 
     @classmethod
     def _let_go(cls, state: str, patch: Patch, mesh: TetMesh) -> Proposal:
         def elsewhere(centre: Floats, radius: float) -> Proposal:
             return cls._let_go(state, Patch.disc(mesh, patch.surface, patch.held, centre, radius) or patch, mesh)
 
-        return Proposal.of_one(
-            lambda _share: cls(nodes=patch.name, state=state),
-            1.0,
+        return Proposal.switch(
+            cls(nodes=patch.name, state=state),
             0.5,
-            "release",
+            follows="release",
             patch=patch,
             elsewhere=None if patch.name == patch.surface else elsewhere,
             on_surface=True,
@@ -169,7 +148,7 @@ class Contact(Mechanism):
             region=patch.surface.replace("-", " ").replace("_", " "),
         )
 
-    def skull(self, mesh: TetMesh) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    def skull(self, mesh: TetMesh) -> tuple[Floats, NDArray[np.int32]]:
         """Points [m] and outward triangles of the surface it touches."""
         if self.surface is not None:
             return self.surface.points, self.surface.outward
@@ -178,26 +157,26 @@ class Contact(Mechanism):
             raise ParameterError("nodes", f"node set '{self.nodes}' holds no face of the surface")
         return mesh.points, own
 
-    def held(self, mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def held(self, mesh: TetMesh) -> tuple[Ints, Floats]:
         members = np.flatnonzero(mesh.node_sets[self.nodes])
         if self.state == "fixed":
             return np.repeat(members, 3), np.tile(np.eye(3), (len(members), 1))
         return members, vertex_normals(mesh)[members]
 
     def bind(self, body: Body) -> "ContactTerm":
-        """See `warpbrain.physics.term.Following`."""
         return ContactTerm(body, self)
 
 
-class ContactTerm(Term):
+class ContactTerm(KernelTerm):
     """`Contact` on a device; a stencil is a node."""
 
     memory = ("_found", "_pressing", "_directions", "_tractions")
-    lasting = ("_field",)
+    lasting = ("_field", "_wall")
 
     def __init__(self, body: Body, contact: Contact) -> None:
         members = np.flatnonzero(body.mesh.node_sets[contact.nodes])
-        super().__init__(body, members[:, None], contact.factor)
+        made, *kernels = _kernels(body.precision)
+        super().__init__(body, members[:, None], kernels, contact.factor)
         self.mechanism = contact
         precision, device = body.precision, body.device
         points, faces = contact.skull(body.mesh)
@@ -220,17 +199,18 @@ class ContactTerm(Term):
         self._movable, self._free = body.movable[members], ~body.constrained[members]
         self._points = self.array(body.mesh.points, precision.vec3)
         count = len(members)
-        self._start = wp.zeros(count, dtype=precision.scalar, device=device)
+        self._start, self._found, self._pressing, self._gaps = (
+            wp.zeros(count, dtype=precision.scalar, device=device) for _ in range(4)
+        )
+        self._directions, self._tractions = (wp.zeros(count, dtype=precision.vec3, device=device) for _ in range(2))
         if not given:
             reached = self.array(body.mesh.points[members], precision.vec3)
             self._field.at(reached, self._start, wp.zeros_like(reached))
-        self._found = wp.zeros(count, dtype=precision.scalar, device=device)
-        self._pressing = wp.zeros(count, dtype=precision.scalar, device=device)
-        self._directions = wp.zeros(count, dtype=precision.vec3, device=device)
-        self._tractions = wp.zeros(count, dtype=precision.vec3, device=device)
-        self._gaps = wp.zeros(count, dtype=precision.scalar, device=device)
-        self._energies = wp.zeros(count, dtype=precision.scalar, device=device)
-        self._kernels = _kernels(precision)
+        self._wall = made()
+        for name in ("nodes", "points", "area", "start", "numbers", *(name[1:] for name in self.memory)):
+            setattr(self._wall, name, getattr(self, f"_{name}"))
+        for name in ("coefficients", "origin", "spacing"):
+            setattr(self._wall, name, getattr(self._field, name))
 
     def set_scale(self, scale: float) -> None:
         # a wall is there, however little of the load is
@@ -241,17 +221,8 @@ class ContactTerm(Term):
         self.stiffness = self.mechanism.penalty * modulus / self._size
         self._numbers.assign([self.stiffness, self.mechanism.friction])
 
-    def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
-        scalar = self.body.precision.scalar
-        inputs = [
-            self._nodes, self._points, self._area, self._start, self._field.coefficients, self._field.origin,
-            scalar(self._field.spacing), STATES.index(self.mechanism.state), self._numbers,
-            self._found, self._pressing, self._directions, self._tractions, u, *outputs,
-        ]  # fmt: skip
-        launch(kernel, len(self.stencils), inputs, self.body.device)
-
-    def evaluate_forces(self, u: wp.array) -> None:
-        self._launch(self._kernels[0], u, self.forces)
+    def _inputs(self) -> list[Any]:
+        return [self._wall, STATES.index(self.mechanism.state)]
 
     def evaluate_tangents(self, u: wp.array) -> None:
         self.evaluate_forces(u)
@@ -261,16 +232,16 @@ class ContactTerm(Term):
         self._launch(self._kernels[2], u, self._energies, self._gaps)
         return float(np.sum(self._energies.numpy(), dtype=np.float64))
 
-    def gaps(self, u: wp.array) -> NDArray[np.float64]:
+    def gaps(self, u: wp.array) -> Floats:
         """Signed distance (k,) [m] of each node beyond the surface."""
         self.energy(u)
         return self._gaps.numpy().astype(np.float64)
 
-    def pressures(self) -> NDArray[np.float64]:
+    def pressures(self) -> Floats:
         """Pressure (k,) [Pa] that augmentation has found on each node."""
         return self._found.numpy().astype(np.float64)
 
-    def pressing(self) -> NDArray[np.float64]:
+    def pressing(self) -> Floats:
         """Pressure (k,) [Pa] on each node that friction goes with."""
         return self._pressing.numpy().astype(np.float64)
 
@@ -304,7 +275,7 @@ class ContactTerm(Term):
         if self.mechanism.friction != 0.0:
             self._press(u, self.stiffness * self.gaps(u) + self.pressures())
 
-    def _press(self, u: wp.array, pressure: NDArray[np.float64]) -> None:
+    def _press(self, u: wp.array, pressure: Floats) -> None:
         """Take a pressure (k,) [Pa] and the directions at a displacement [m] as those of friction."""
         self._pressing.assign(np.maximum(pressure, 0.0))
         reached = self.body.mesh.points[self.stencils[:, 0]] + u.numpy()[self.stencils[:, 0]]
@@ -316,126 +287,92 @@ class ContactTerm(Term):
         self._tractions.zero_()
 
 
-def _edge(points: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
+def _edge(points: Floats, faces: NDArray[np.int32]) -> float:
     """Median length [m] of the edges of triangles."""
     return float(np.median(np.linalg.norm(points[faces] - points[np.roll(faces, 1, axis=1)], axis=2)))
 
 
 @cache
-def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
-    """Kernels for forces, tangent blocks, and energies with distances; one thread for a node."""
+def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
+    """What kernels know of a wall, and those for forces, tangent blocks, and energies with distances, by node."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     module = compiled_module(f"contact_{precision.name}")
     slip = wp.constant(scalar(_SLIP))
     distance = smooth_distance(precision)
 
-    @wp.kernel(module=module)
-    def forces(
-        nodes: wp.array[int],
-        points: wp.array[vec3],
-        area: wp.array[scalar],
-        start: wp.array[scalar],
-        coefficients: wp.array3d[scalar],
-        origin: vec3,
-        spacing: scalar,
-        state: int,
-        numbers: wp.array[scalar],
-        found: wp.array[scalar],
-        pressing: wp.array[scalar],
-        directions: wp.array[vec3],
-        tractions: wp.array[vec3],
-        u: wp.array[vec3],
-        out: wp.array2d[vec3],
-    ):
-        t = wp.tid()
-        k = numbers[0]
-        friction = numbers[1]
-        d = u[nodes[t]]
-        if state == 0:
-            out[t, 0] = area[t] * (k * d + tractions[t])
-            return
-        g, slope, _H = distance(points[nodes[t]] + d, coefficients, origin, spacing)
-        pressure = k * (g - start[t]) + found[t]
-        if state == 2:
-            pressure = wp.max(pressure, scalar(0.0))
-        s = d - wp.dot(d, directions[t]) * directions[t]
-        rubbing = friction * pressing[t] / wp.sqrt(wp.dot(s, s) + slip * slip)
-        out[t, 0] = area[t] * (pressure * slope + rubbing * s)
+    @wp.struct
+    class Wall:
+        nodes: wp.array[int]
+        points: wp.array[vec3]
+        area: wp.array[scalar]
+        start: wp.array[scalar]
+        coefficients: wp.array3d[scalar]
+        origin: vec3
+        spacing: scalar
+        numbers: wp.array[scalar]
+        found: wp.array[scalar]
+        pressing: wp.array[scalar]
+        directions: wp.array[vec3]
+        tractions: wp.array[vec3]
 
     @wp.kernel(module=module)
-    def tangents(
-        nodes: wp.array[int],
-        points: wp.array[vec3],
-        area: wp.array[scalar],
-        start: wp.array[scalar],
-        coefficients: wp.array3d[scalar],
-        origin: vec3,
-        spacing: scalar,
-        state: int,
-        numbers: wp.array[scalar],
-        found: wp.array[scalar],
-        pressing: wp.array[scalar],
-        directions: wp.array[vec3],
-        tractions: wp.array[vec3],
-        u: wp.array[vec3],
-        out: wp.array2d[mat33],
-    ):
+    def forces(w: Wall, state: int, u: wp.array[vec3], out: wp.array2d[vec3]):
         t = wp.tid()
-        k = numbers[0]
-        friction = numbers[1]
+        k = w.numbers[0]
+        friction = w.numbers[1]
+        d = u[w.nodes[t]]
+        if state == 0:
+            out[t, 0] = w.area[t] * (k * d + w.tractions[t])
+            return
+        g, slope, _H = distance(w.points[w.nodes[t]] + d, w.coefficients, w.origin, w.spacing)
+        pressure = k * (g - w.start[t]) + w.found[t]
+        if state == 2:
+            pressure = wp.max(pressure, scalar(0.0))
+        s = d - wp.dot(d, w.directions[t]) * w.directions[t]
+        rubbing = friction * w.pressing[t] / wp.sqrt(wp.dot(s, s) + slip * slip)
+        out[t, 0] = w.area[t] * (pressure * slope + rubbing * s)
+
+    @wp.kernel(module=module)
+    def tangents(w: Wall, state: int, u: wp.array[vec3], out: wp.array2d[mat33]):
+        t = wp.tid()
+        k = w.numbers[0]
+        friction = w.numbers[1]
         one = wp.identity(n=3, dtype=scalar)
         if state == 0:
-            out[t, 0] = area[t] * k * one
+            out[t, 0] = w.area[t] * k * one
             return
-        d = u[nodes[t]]
-        g, slope, H = distance(points[nodes[t]] + d, coefficients, origin, spacing)
-        pressure = k * (g - start[t]) + found[t]
+        d = u[w.nodes[t]]
+        g, slope, H = distance(w.points[w.nodes[t]] + d, w.coefficients, w.origin, w.spacing)
+        pressure = k * (g - w.start[t]) + w.found[t]
         K = mat33()
         # what just touches counts as pressed: a first step that went through the wall would find no way back
         if state == 1 or pressure >= scalar(0.0):
             K = k * wp.outer(slope, slope) + pressure * H
         if friction != scalar(0.0):
-            n = directions[t]
+            n = w.directions[t]
             s = d - wp.dot(d, n) * n
             size = wp.sqrt(wp.dot(s, s) + slip * slip)
-            K += friction * pressing[t] / size * (one - wp.outer(n, n) - wp.outer(s, s) / (size * size))
-        out[t, 0] = area[t] * K
+            K += friction * w.pressing[t] / size * (one - wp.outer(n, n) - wp.outer(s, s) / (size * size))
+        out[t, 0] = w.area[t] * K
 
     @wp.kernel(module=module)
-    def energies(
-        nodes: wp.array[int],
-        points: wp.array[vec3],
-        area: wp.array[scalar],
-        start: wp.array[scalar],
-        coefficients: wp.array3d[scalar],
-        origin: vec3,
-        spacing: scalar,
-        state: int,
-        numbers: wp.array[scalar],
-        found: wp.array[scalar],
-        pressing: wp.array[scalar],
-        directions: wp.array[vec3],
-        tractions: wp.array[vec3],
-        u: wp.array[vec3],
-        out: wp.array[scalar],
-        gaps: wp.array[scalar],
-    ):
+    def energies(w: Wall, state: int, u: wp.array[vec3], out: wp.array[scalar], gaps: wp.array[scalar]):
         t = wp.tid()
-        k = numbers[0]
-        friction = numbers[1]
-        d = u[nodes[t]]
+        k = w.numbers[0]
+        friction = w.numbers[1]
+        d = u[w.nodes[t]]
         if state == 0:
             gaps[t] = wp.length(d)
-            q = k * d + tractions[t]
-            out[t] = scalar(0.5) * area[t] / k * wp.dot(q, q)
+            q = k * d + w.tractions[t]
+            out[t] = scalar(0.5) * w.area[t] / k * wp.dot(q, q)
             return
-        g, _slope, _H = distance(points[nodes[t]] + d, coefficients, origin, spacing)
-        gaps[t] = g - start[t]
-        pressure = k * gaps[t] + found[t]
+        g, _slope, _H = distance(w.points[w.nodes[t]] + d, w.coefficients, w.origin, w.spacing)
+        gaps[t] = g - w.start[t]
+        pressure = k * gaps[t] + w.found[t]
         if state == 2:
             pressure = wp.max(pressure, scalar(0.0))
-        s = d - wp.dot(d, directions[t]) * directions[t]
-        rubbed = friction * pressing[t] * (wp.sqrt(wp.dot(s, s) + slip * slip) - slip)
-        out[t] = area[t] * (scalar(0.5) / k * pressure * pressure + rubbed)
+        s = d - wp.dot(d, w.directions[t]) * w.directions[t]
+        rubbed = friction * w.pressing[t] * (wp.sqrt(wp.dot(s, s) + slip * slip) - slip)
+        out[t] = w.area[t] * (scalar(0.5) / k * pressure * pressure + rubbed)
 
-    return forces, tangents, energies
+    return Wall, forces, tangents, energies

@@ -28,13 +28,12 @@ follow the pressure there, which overshoots (Vermeer and Verruijt 1981).
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.kernels.minimal_residual import MinimalResidual
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.pore import pore_kernels
@@ -56,27 +55,9 @@ _LOOKED_FOR = 11
 
 @dataclass(frozen=True, kw_only=True)
 class Drainage(Mechanism):
-    """Fluid in the pores of tissue.
+    """Fluid in the pores of tissue."""
 
-    Parameters
-    ----------
-    permeability : float
-        `k` [m4/(N s)].
-    storage : float
-        `S` [1/Pa].
-    drained : str
-        Node set whose faces are open; empty: the whole surface.
-    pressure : float
-        Of the fluid at drained faces [Pa].
-    exchange : float
-        `k_c` [1/(Pa s)].
-    capillary_pressure : float
-        `p_c` [Pa].
-    elements : str
-        Element set that has pores; empty: all.
-    """
-
-    permeability: float = parameter(
+    permeability: float = parameter(  # `k`
         "Permeability over the viscosity of the fluid.",
         unit="m4/(N s)",
         above=0.0,
@@ -86,7 +67,7 @@ class Drainage(Mechanism):
         "and Bilston 2007), 5.6e-12 (Rey and Sarntinoranont 2018, who cite 1e-16 to 1e-7); 5e-12 grey, 1e-10 white "
         "(Paulsen 1999)",
     )
-    storage: float = parameter(
+    storage: float = parameter(  # `S`
         "Fluid that a pressure stores without a change of volume; zero if nothing is compressible.",
         default=0.0,
         unit="1/Pa",
@@ -100,7 +81,7 @@ class Drainage(Mechanism):
     pressure: float = parameter(
         "Pressure of the fluid at drained faces.", default=0.0, unit="Pa", expectation=Normal(0.0, 500.0)
     )
-    exchange: float = parameter(
+    exchange: float = parameter(  # `k_c`
         "Fluid that comes out of the blood vessels, for each Pa below the capillary pressure.",
         default=0.0,
         unit="1/(Pa s)",
@@ -108,7 +89,7 @@ class Drainage(Mechanism):
         # as much in 100 s
         size=1e-6,
     )
-    capillary_pressure: float = parameter(
+    capillary_pressure: float = parameter(  # `p_c`
         "Pressure at which nothing is exchanged with the blood vessels; lower under mannitol, higher in oedema.",
         default=0.0,
         unit="Pa",
@@ -158,28 +139,21 @@ class Drainage(Mechanism):
         # the outermost reach as far as their neighbours do
         width = math.log(edges[-1] / edges[-2])
 
-        def pace(c: NDArray[np.float64]) -> float:
-            return math.exp(float(c[0]) - start)
-
         every = len(situation.mesh.boundary)
         parts = {surface.name: surface.words for surface in situation.free if len(surface.faces) < every}
         return [
             Proposal(
-                partial(cls._through, nodes),
+                lambda c, nodes=nodes: cls(permeability=math.exp(float(c[0])), drained=nodes),
                 np.array([math.log(expected.quantile((number + 0.5) / _LOOKED_FOR))]),
                 np.full(1, width),
                 "course",
                 np.array([start]),
-                pace=pace,
+                pace=lambda c: math.exp(float(c[0]) - start),
                 region=f"all tissue, drained through the {words}" if nodes else "all tissue",
             )
             for nodes, words in {"": "", **parts}.items()
             for number in range(_LOOKED_FOR)
         ]
-
-    @classmethod
-    def _through(cls, nodes: str, c: NDArray[np.float64]) -> "Drainage":
-        return cls(permeability=math.exp(float(c[0])), drained=nodes)
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)
@@ -187,10 +161,10 @@ class Drainage(Mechanism):
             name = f"node set '{self.drained}'" if self.drained else "the surface"
             raise ParameterError("drained", f"{name} holds no face of the tissue with pores: its fluid could not leave")
 
-    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+    def acts_on(self, mesh: TetMesh) -> Bools:
         return np.isin(np.arange(len(mesh.tetrahedra)), elements_of(mesh, self.elements))
 
-    def open_nodes(self, mesh: TetMesh) -> NDArray[np.bool_]:
+    def open_nodes(self, mesh: TetMesh) -> Bools:
         """Nodes (n,) at which the pressure of the fluid is given: of the drained faces of elements with pores."""
         faces = mesh.boundary
         if self.drained:
@@ -202,19 +176,14 @@ class Drainage(Mechanism):
         return nodes & porous
 
     def bind(self, body: Body) -> "DrainageTerm":
-        """See `warpbrain.physics.term.Following`."""
         return DrainageTerm(body, self)
 
 
 class DrainageTerm(Term):
     """`Drainage` on a device, with the fluid that it remembers.
 
-    The pressure is held as that of the drained nodes and what is `beyond` it, zero there.
-
-    Attributes
-    ----------
-    softness : wp.array, shape (k,)
-        `1/(2 mu)` of each element [1/Pa], of the stabilisation; with the factor that its moduli have.
+    The pressure is held as that of the drained nodes and what is `beyond` it, zero there. `softness` (k,) is `1/(2 mu)`
+    of each element [1/Pa], of the stabilisation; with the factor that its moduli have.
     """
 
     memory = ("_held", "_shape", "_beyond")
@@ -329,7 +298,7 @@ class DrainageTerm(Term):
             self._contributions, self._entries, self._closed, out,
         )  # fmt: skip
 
-    def _yielding(self) -> NDArray[np.float64]:
+    def _yielding(self) -> Floats:
         """How the solid gives way to the pressure, element by element (k, 10): mass over `lam + 2 mu`.
 
         So much it does to a pressure that varies over a length that is short beside the body.
@@ -349,7 +318,7 @@ class DrainageTerm(Term):
         )  # fmt: skip
         self._solver.solve(self._tolerance)
 
-    def pressures(self) -> NDArray[np.float64]:
+    def pressures(self) -> Floats:
         """Pressure of the fluid at the nodes (n,) [Pa], at the displacement of the last evaluation.
 
         Zero where there are no pores.
@@ -358,7 +327,7 @@ class DrainageTerm(Term):
         found = base + self._beyond.numpy().astype(np.float64)
         return np.where(self._lumped.numpy() > 0.0, found, 0.0)
 
-    def nodal_pressures(self) -> dict[str, NDArray[np.float64]]:
+    def nodal_pressures(self) -> dict[str, Floats]:
         return {"fluid_pressure": self.pressures()}
 
     # -- memory ---------------------------------------------------------------------------------------------------

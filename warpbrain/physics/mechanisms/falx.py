@@ -24,23 +24,12 @@ from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
-from warpbrain.physics.term import Body
-from warpbrain.physics.triangle_term import TriangleTerm
+from warpbrain.physics.term import Body, TriangleTerm
 
 
 @dataclass(frozen=True, kw_only=True)
 class Falx(Mechanism):
-    """A membrane on the faces of a node set, inside the tissue or on its surface.
-
-    Parameters
-    ----------
-    nodes : str
-        Node set.
-    stiffness : float
-        Young's modulus [Pa].
-    thickness : float
-        [m]
-    """
+    """A membrane on the faces of a node set, inside the tissue or on its surface."""
 
     nodes: str = parameter("Node set of the membrane: faces of which all nodes are in it.", kind="node set")
     stiffness: float = parameter(
@@ -84,10 +73,7 @@ class Falx(Mechanism):
         names = [name for name in situation.mesh.node_sets if any(word in name for word in ("falx", "tentorium"))]
         if not names:
             raise NotTestableError("needs a node set 'falx' or 'tentorium' in the mesh")
-        return [
-            Proposal.of_one(lambda _share, nodes=nodes: cls(nodes=nodes), 1.0, 0.3, "switch", region=nodes)
-            for nodes in names
-        ]
+        return [Proposal.switch(cls(nodes=nodes), 0.3, region=nodes) for nodes in names]
 
     def faces(self, mesh: TetMesh) -> NDArray[np.int32]:
         """Triangles (k, 3) of the membrane."""
@@ -98,7 +84,6 @@ class Falx(Mechanism):
         return own
 
     def bind(self, body: Body) -> "MembraneTerm":
-        """See `warpbrain.physics.term.Following`."""
         return MembraneTerm(body, self)
 
 

@@ -12,17 +12,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.directions import element_directions, unit_vector
 from warpbrain.physics.expectation import LogNormal, Uniform
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
-from warpbrain.physics.regions import elements_of
+from warpbrain.physics.regions import element_directions, elements_of, unit_vector
 from warpbrain.physics.term import Body
 from warpbrain.physics.words import Values, along, measured, vector_in
 
@@ -92,23 +91,7 @@ _CODE = ExtraEnergy("fibres", _energy, _stress, _moduli)
 
 @dataclass(frozen=True, kw_only=True)
 class Fibres(Mechanism):
-    """Fibres in all tissue or in an element set.
-
-    Parameters
-    ----------
-    direction : (float, float, float), optional
-        Of any length but zero.
-    field : str
-        Vectors of the mesh's elements, in the place of one direction.
-    stiffness : float
-        `k1` [Pa].
-    exponent : float
-        `k2`.
-    dispersion : float
-        `d`, 0 to 1/3.
-    elements : str
-        Element set; empty: everywhere.
-    """
+    """Fibres in all tissue or in an element set."""
 
     direction: tuple[float, float, float] | None = parameter(
         "Direction of the fibres, if it is the same everywhere.", kind="vector", default=None
@@ -169,18 +152,16 @@ class Fibres(Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy."""
         return Proposal.along_axes(
-            lambda k1, axis: cls(direction=axis, stiffness=max(k1, 1e-9)), 500.0, "fibres", situation
+            lambda axis, k1: cls(direction=axis, stiffness=max(k1, 1e-9)), 500.0, "fibres", situation
         )
 
     @classmethod
     def check_tests(cls, tests: Tests) -> None:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if tests.loads < 2:
             raise NotTestableError(f"needs {' and '.join(cls.needs)}")
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         known = {
             "stiffness": "their stiffness is",
             "exponent": "the exponent with which they stiffen is",
@@ -194,7 +175,7 @@ class Fibres(Mechanism):
         line = along(vector_in(values, "direction"))
         return [*found, *([f"they run {line}"] if line else [])]
 
-    def stored_energy(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+    def stored_energy(self, F: Floats) -> Floats:
         """See `warpbrain.physics.mechanism.Storing`; one direction of fibres."""
         if self.direction is None:
             raise InputError("fibres: field: a homogeneous state has one direction of them")
@@ -204,7 +185,6 @@ class Fibres(Mechanism):
         return np.asarray(self.stiffness / (2.0 * self.exponent) * np.expm1(self.exponent * E**2))
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
-        """See `warpbrain.physics.term.Following`."""
         elements = elements_of(body.mesh, self.elements)
         directions = element_directions(body.mesh, elements, self.direction, self.field)
         row = np.tile([self.stiffness, self.exponent, self.dispersion], (len(elements), 1))

@@ -25,8 +25,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import (
     QuadraticMesh,
@@ -36,12 +36,12 @@ from warpbrain.mesh import (
     integrals_on_plane,
     tangents,
 )
-from warpbrain.physics.directions import unit_vector
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Along, BodyForce
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
+from warpbrain.physics.regions import unit_vector
 from warpbrain.physics.words import Values, measured, towards, vector_in
 
 #: Standard gravity [m/s2] as used by the verification cases of this project.
@@ -174,7 +174,7 @@ class Gravity(BodyForce, Mechanism):
         points = situation.mesh.points
         if situation.gravity_axis is None:
 
-            def anywhere(c: NDArray[np.float64]) -> Gravity:
+            def anywhere(c: Floats) -> Gravity:
                 share = float(np.linalg.norm(c))
                 direction = tuple((c if share else np.array([0.0, 0.0, -1.0])).tolist())
                 return cls(direction=direction, density=CSF_DENSITY, ramp=((0.0, share),))
@@ -186,7 +186,7 @@ class Gravity(BodyForce, Mechanism):
         found = []
         for level in np.linspace(-0.05, 0.9, _LEVELS) * height:
 
-            def drained(c: NDArray[np.float64], middle: float = float(level)) -> Gravity:
+            def drained(c: Floats, middle: float = float(level)) -> Gravity:
                 level = middle + (float(c[3]) if len(c) > 3 else 0.0)
                 direction = down + c[1] * across[0] + c[2] * across[1]
                 # of a head that is tilted another point is the lowest one, as for a case that is read
@@ -202,24 +202,13 @@ class Gravity(BodyForce, Mechanism):
             sd = np.array([_SHARE, _POSE, _POSE])
             usual = np.array([1.0, 0.0, 0.0])
             found.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(3)))
-            found.append(
-                Proposal(
-                    drained,
-                    np.append(usual, 0.0),
-                    np.append(sd, _FALL * height),
-                    "smooth",
-                    np.append(usual, 0.0),
-                    np.zeros(4),
-                    varying=(3,),
-                    in_turns=True,
-                    only_over_time=True,
-                )
-            )
+            sd, usual = np.append(sd, _FALL * height), np.append(usual, 0.0)
+            over_time: dict[str, Any] = {"varying": (3,), "in_turns": True, "only_over_time": True}
+            found.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(4), **over_time))
         return found
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         found = []
         if "csf_level" in values:
             level = values["csf_level"]
@@ -257,7 +246,7 @@ class Gravity(BodyForce, Mechanism):
         imaged = unit_vector("imaged_direction", self.imaged_direction)
         return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(down, imaged)), down @ imaged)))
 
-    def with_body_turned(self, rotation: NDArray[np.float64]) -> Gravity:
+    def with_body_turned(self, rotation: Floats) -> Gravity:
         """See `warpbrain.physics.mechanism.Mechanism`; levels are counted from what is the lowest point then."""
         direction = tuple((rotation.T @ np.array(self.direction)).tolist())
         return dataclasses.replace(self, direction=direction, lowest=None)
@@ -266,7 +255,7 @@ class Gravity(BodyForce, Mechanism):
         """Height [m], `-x . direction`, of the point that levels are counted from."""
         return float((mesh.points @ self._up).min()) if self.lowest is None else self.lowest
 
-    def unit_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
+    def unit_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         whole = integrals_of_shapes(mesh)[:, :, None]
         if self.csf_level is None:
             return -self.density * STANDARD_GRAVITY * whole * self._up
@@ -276,7 +265,7 @@ class Gravity(BodyForce, Mechanism):
             force = force + (self.tissue_density - CSF_DENSITY) * STANDARD_GRAVITY * whole * self._turned
         return force
 
-    def unit_forces_rate(self, mesh: TetMesh | QuadraticMesh, along: Along) -> NDArray[np.float64]:
+    def unit_forces_rate(self, mesh: TetMesh | QuadraticMesh, along: Along) -> Floats:
         whole = integrals_of_shapes(mesh)[:, :, None]
         up_rate = along(lambda gravity: gravity._up)
         if self.csf_level is None:
@@ -293,17 +282,17 @@ class Gravity(BodyForce, Mechanism):
         return rate
 
     @property
-    def _up(self) -> NDArray[np.float64]:
+    def _up(self) -> Floats:
         return -unit_vector("direction", self.direction)
 
     @property
-    def _turned(self) -> NDArray[np.float64]:
+    def _turned(self) -> Floats:
         """Direction of gravity less that while imaged."""
         assert self.imaged_direction is not None
         return -self._up - unit_vector("imaged_direction", self.imaged_direction)
 
 
-def _down(values: Values, axis: tuple[float, float, float] | None) -> NDArray[np.float64]:
+def _down(values: Values, axis: tuple[float, float, float] | None) -> Floats:
     """Where 'down' was found to be (3,): a component that is not known better than beforehand is where it was."""
     found = vector_in(values, "direction")
     if axis is None:
@@ -312,7 +301,7 @@ def _down(values: Values, axis: tuple[float, float, float] | None) -> NDArray[np
     return np.where(known, found, unit_vector("gravity_axis", axis))
 
 
-def _tilt(values: Values, axis: tuple[float, float, float] | None, found: NDArray[np.float64]) -> list[str]:
+def _tilt(values: Values, axis: tuple[float, float, float] | None, found: Floats) -> list[str]:
     components = [values[name] for letter in "xyz" if (name := f"direction_{letter}") in values]
     if axis is None or not components:
         return []

@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
-from warpbrain.physics.values import Smallest
-from warpbrain.physics.words import Values, measured, number, radius_in_words
+from warpbrain.physics.words import Smallest, Values, measured, number, radius_in_words
 
 #: Where it is looked for: standard deviation of the logarithm of the ratio, and radii of balls [m].
 _USUAL, _RADII = 1.2, (0.012, 0.018, 0.027)
@@ -29,17 +28,7 @@ _USUAL, _RADII = 1.2, (0.012, 0.018, 0.027)
 
 @dataclass(frozen=True, kw_only=True)
 class Inclusion(Mechanism):
-    """Another stiffness in an element set or a ball.
-
-    Parameters
-    ----------
-    ratio : float
-        Of the moduli there to those around, positive.
-    elements : str
-        Element set.
-    centre, radius : optional
-        A ball in its place [m].
-    """
+    """Another stiffness in an element set or a ball."""
 
     ratio: float = parameter(
         "Of its moduli to those of the tissue around.",
@@ -67,15 +56,12 @@ class Inclusion(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Balls of two sizes throughout the tissue; the coefficient is the logarithm of the ratio."""
-
-        def ball(s: float, centre: tuple[float, float, float], radius: float) -> Inclusion:
-            return cls(ratio=math.exp(s), centre=centre, radius=radius)
-
-        return Proposal.in_balls(ball, _USUAL, _RADII, situation)
+        return Proposal.in_balls(
+            lambda s, centre, radius: cls(ratio=math.exp(s), centre=centre, radius=radius), _USUAL, _RADII, situation
+        )
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "ratio" not in values or not values["ratio"].value > 0.0:
             return radius_in_words(values)
         ratio = values["ratio"]
@@ -85,7 +71,6 @@ class Inclusion(Mechanism):
 
     @classmethod
     def smallest_in_words(cls, smallest: Smallest) -> str:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if smallest.name != "ratio":
             return super().smallest_in_words(smallest)
         return f"from {number(1.0 + smallest.size)} times the stiffness around it"
@@ -94,7 +79,7 @@ class Inclusion(Mechanism):
         super().check(mesh)
         region_weights(mesh, self.elements, self.centre, self.radius)
 
-    def stiffness_factor(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
+    def stiffness_factor(self, mesh: TetMesh, scale: float) -> Floats:
         """See `warpbrain.physics.mechanism.Weakening`; a stiffness is there from the start, whatever the load."""
         weights = region_weights(mesh, self.elements, self.centre, self.radius)
         return np.exp(self.factor() * np.log(self.ratio) * weights)

@@ -35,6 +35,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.kernels.curved_pressure import curved_pressure_kernels
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
@@ -45,25 +46,15 @@ from warpbrain.physics.mechanism import Mechanism, ParameterError, Reading, para
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_with
-from warpbrain.physics.term import Body
-from warpbrain.physics.triangle_term import TriangleTerm
+from warpbrain.physics.term import Body, TriangleTerm
 from warpbrain.physics.words import HARDLY, Values, measured, unsure
 
 Ints = NDArray[np.int32]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pressure(Mechanism):
-    """A pressure that follows the faces of a node set.
-
-    Parameters
-    ----------
-    nodes : str
-        Node set; its faces of the mesh's surface carry the pressure.
-    value : float
-        [Pa], positive pushes on the tissue.
-    """
+    """A pressure that follows the faces of a node set."""
 
     nodes: str = parameter("Node set whose faces carry it.", kind="node set")
     value: float = parameter(
@@ -104,7 +95,7 @@ class Pressure(Mechanism):
             )
         return own
 
-    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+    def acts_on(self, mesh: TetMesh) -> Bools:
         return elements_with(mesh, self.faces(mesh))
 
     @classmethod
@@ -113,13 +104,16 @@ class Pressure(Mechanism):
         if not situation.free:
             raise NotTestableError("needs a part of the surface that nothing holds")
         return [
-            Proposal.of_one(partial(_pressing, surface.name), 0.0, 400.0, region=surface.words, varying=(0,))
+            Proposal.of_one(partial(cls._of_value, surface.name), 0.0, 400.0, region=surface.words, varying=(0,))
             for surface in situation.free
         ]
 
     @classmethod
+    def _of_value(cls, nodes: str, value: float) -> "Pressure":
+        return cls(nodes=nodes, value=value)
+
+    @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "value" not in values:
             return []
         found = values["value"]
@@ -133,27 +127,11 @@ class Pressure(Mechanism):
         return [f"it is {measured(abs(found.value), found.sd, 'Pa')} {word} there than elsewhere, and {does}"]
 
     def bind(self, body: Body) -> "PressureTerm":
-        """See `warpbrain.physics.term.Following`."""
         return PressureTerm(body, self.faces(body.mesh), self.value, self.factor)
 
 
-def _pressing(nodes: str, value: float) -> Pressure:
-    return Pressure(nodes=nodes, value=value)
-
-
 class PressureTerm(TriangleTerm):
-    """A pressure on triangles of a body, on a device.
-
-    Parameters
-    ----------
-    body : Body
-    faces : (k, 3) int array
-        Corners of the triangles, oriented away from the tissue that the pressure pushes on.
-    value : float
-        [Pa]
-    ramp : callable
-        Factor over time [s].
-    """
+    """A pressure [Pa] on triangles (k, 3) of a body, oriented away from the tissue that it pushes on."""
 
     def __init__(self, body: Body, faces: Ints, value: float, ramp: Callable[[float], float]) -> None:
         order = np.argsort(faces, axis=1)

@@ -15,13 +15,12 @@ import numpy as np
 import warp as wp
 
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.directions import element_directions, unit_vector
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
-from warpbrain.physics.regions import elements_of
+from warpbrain.physics.regions import element_directions, elements_of, unit_vector
 from warpbrain.physics.term import Body
 from warpbrain.physics.words import HARDLY, Values, along, measured, unsure, vector_in
 
@@ -54,21 +53,9 @@ _CODE = ExtraEnergy("residual_stress", _energy, _stress, _moduli, "tissue")
 
 @dataclass(frozen=True, kw_only=True)
 class ResidualStress(Mechanism):
-    """A tension along a direction in all tissue or in an element set.
+    """A tension along a direction in all tissue or in an element set."""
 
-    Parameters
-    ----------
-    tension : float
-        `sigma` [Pa]; negative is compression.
-    direction : (float, float, float), optional
-        Of any length but zero.
-    field : str
-        Vectors of the mesh's elements, in the place of one direction.
-    elements : str
-        Element set; empty: everywhere.
-    """
-
-    tension: float = parameter(
+    tension: float = parameter(  # `sigma`
         "Stress before anything is done; negative is compression.",
         unit="Pa",
         expectation=Normal(0.0, 300.0),
@@ -112,12 +99,11 @@ class ResidualStress(Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy, in all tissue."""
         return Proposal.along_axes(
-            lambda tension, axis: cls(tension=tension, direction=axis), 300.0, "tension", situation
+            lambda axis, tension: cls(tension=tension, direction=axis), 300.0, "tension", situation
         )
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "tension" not in values:
             return []
         tension, where = values["tension"], along(vector_in(values, "direction"))
@@ -127,7 +113,6 @@ class ResidualStress(Mechanism):
         return [f"{found}, {HARDLY}" if unsure(tension) else found]
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
-        """See `warpbrain.physics.term.Following`."""
         elements = elements_of(body.mesh, self.elements)
         directions = element_directions(body.mesh, elements, self.direction, self.field)
         row = np.full((len(elements), 1), self.tension)

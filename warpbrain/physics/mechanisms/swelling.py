@@ -1,7 +1,7 @@
 """Swelling or shrinkage: tissue would have another volume if nothing held it.
 
 `F = F_e F_g` with `F_g = (1 + g)^(1/3) I`; only `F_e` makes stress (Rodriguez et al. 1994), in the law
-(`warpbrain.physics.laws.grown`), in fibres, in viscosity: swelling that nothing holds makes none.
+(`warpbrain.physics.laws.device`), in fibres, in viscosity: swelling that nothing holds makes none.
 """
 
 from __future__ import annotations
@@ -10,9 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Normal
 from warpbrain.physics.mechanism import Mechanism, parameter
@@ -27,19 +25,9 @@ _EVERYWHERE, _SOMEWHERE, _RADII = 0.03, 0.2, (0.012, 0.018, 0.027)
 
 @dataclass(frozen=True, kw_only=True)
 class Swelling(Mechanism):
-    """A change of volume of all tissue, of an element set or of a ball.
+    """A change of volume of all tissue, of an element set or of a ball."""
 
-    Parameters
-    ----------
-    amount : float
-        `g`, relative change of volume without stress; above -1.
-    elements : str
-        Element set; empty: everywhere.
-    centre, radius : optional
-        A ball in its place [m].
-    """
-
-    amount: float = parameter(
+    amount: float = parameter(  # `g`
         "Relative change of volume where nothing holds the tissue; negative shrinks.",
         unit="%",
         si=1e-2,
@@ -72,15 +60,17 @@ class Swelling(Mechanism):
         everywhere = Proposal.of_one(
             lambda g: cls(amount=g), 0.0, _EVERYWHERE, "smooth", region="all tissue", varying=(0,)
         )
-
-        def ball(g: float, centre: tuple[float, float, float], radius: float) -> Swelling:
-            return cls(amount=g, centre=centre, radius=radius)
-
-        return [everywhere, *Proposal.in_balls(ball, _SOMEWHERE, _RADII, situation, varying=(0,))]
+        balls = Proposal.in_balls(
+            lambda g, centre, radius: cls(amount=g, centre=centre, radius=radius),
+            _SOMEWHERE,
+            _RADII,
+            situation,
+            varying=(0,),
+        )
+        return [everywhere, *balls]
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "amount" not in values:
             return radius_in_words(values)
         amount = values["amount"]
@@ -95,6 +85,5 @@ class Swelling(Mechanism):
         super().check(mesh)
         region_weights(mesh, self.elements, self.centre, self.radius)
 
-    def growth(self, mesh: TetMesh, scale: float) -> NDArray[np.float64]:
-        """See `warpbrain.physics.mechanism.Growing`."""
+    def growth(self, mesh: TetMesh, scale: float) -> Floats:
         return scale * self.amount * region_weights(mesh, self.elements, self.centre, self.radius)

@@ -15,8 +15,8 @@ from functools import lru_cache, partial
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.mesh import QuadraticMesh, TetMesh, patch_around, surface_forces
 from warpbrain.physics.expectation import Uniform
 from warpbrain.physics.load import Load
@@ -34,17 +34,7 @@ _KEPT = 1024
 
 @dataclass(frozen=True, kw_only=True)
 class Traction(Load, Mechanism):
-    """A traction around a point of the surface.
-
-    Parameters
-    ----------
-    centre : (float, float, float)
-        Point [m].
-    value : (float, float, float)
-        Traction at the centre [Pa].
-    radius : float
-        Where it has fallen to zero [m].
-    """
+    """A traction around a point of the surface."""
 
     centre: tuple[float, float, float] = parameter("Point of the surface around which it acts.", kind="position")
     value: tuple[float, float, float] = parameter(
@@ -80,7 +70,7 @@ class Traction(Load, Mechanism):
         if not self.nodal_forces(mesh).any() and any(self.value):
             raise ParameterError("centre", "no face of the surface lies within the radius of this point")
 
-    def acts_on(self, mesh: TetMesh) -> NDArray[np.bool_]:
+    def acts_on(self, mesh: TetMesh) -> Bools:
         return elements_with(mesh, mesh.boundary[patch_around(mesh.points, mesh.boundary, self.centre, self.radius)])
 
     @classmethod
@@ -91,7 +81,6 @@ class Traction(Load, Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if "value_size" not in values:
             return radius_in_words(values)
         size = values["value_size"]
@@ -99,10 +88,10 @@ class Traction(Load, Mechanism):
         return [f"it acts with {measured(size.value, size.sd, 'Pa')} {where}".rstrip(), *radius_in_words(values)]
 
     @classmethod
-    def _pulling(cls, situation: Situation, site: NDArray[np.float64], radius: float) -> Proposal:
+    def _pulling(cls, situation: Situation, site: Floats, radius: float) -> Proposal:
         x, y, z = site.tolist()
 
-        def make(c: NDArray[np.float64]) -> Traction:
+        def make(c: Floats) -> Traction:
             return cls(centre=(x, y, z), value=tuple(c.tolist()), radius=radius)
 
         return Proposal(
@@ -117,7 +106,7 @@ class Traction(Load, Mechanism):
             varying=(0, 1, 2),
         )
 
-    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> NDArray[np.float64]:
+    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         nodes, areas = _patch(mesh, tuple(map(float, self.centre)), float(self.radius))
         found = np.zeros(mesh.points.shape)
         found[nodes] = np.outer(areas, self.value)
@@ -125,15 +114,13 @@ class Traction(Load, Mechanism):
 
 
 @lru_cache(maxsize=_KEPT)
-def _patch(
-    mesh: TetMesh | QuadraticMesh, centre: tuple[float, ...], radius: float
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _patch(mesh: TetMesh | QuadraticMesh, centre: tuple[float, ...], radius: float) -> tuple[Ints, Floats]:
     """Nodes of a patch, and areas [m2] with which a traction at its centre acts on them: a scan asks for them often."""
 
     corners = mesh if isinstance(mesh, TetMesh) else mesh.corners
     triangles = patch_around(corners.points, corners.boundary, centre, radius)
 
-    def profile(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def profile(points: Floats) -> Floats:
         away = np.minimum(np.linalg.norm(points - np.array(centre), axis=1) / radius, 1.0)
         found = np.zeros(points.shape)
         found[:, 0] = 0.5 * (1.0 + np.cos(np.pi * away))

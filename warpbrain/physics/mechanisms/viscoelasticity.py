@@ -23,20 +23,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.kernels.invariants import cofactor
 from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks, store_forces
 from warpbrain.physics.expectation import LogNormal, LogUniform
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
-from warpbrain.physics.term import Body, Term
-from warpbrain.physics.values import Smallest, Value
-from warpbrain.physics.words import HARDLY, Values, measured, number, unsure
+from warpbrain.physics.term import Body, KernelTerm
+from warpbrain.physics.words import HARDLY, Smallest, Value, Values, measured, number, unsure
 
 #: Relaxation times [s] that are looked for, alone and in pairs.
 _LOOKED_FOR = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
@@ -52,17 +50,9 @@ _LEAST = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Viscoelasticity(Mechanism):
-    """Branches of a Prony series, in all tissues.
+    """Branches of a Prony series, in all tissues."""
 
-    Parameters
-    ----------
-    moduli : tuple of floats
-        `beta_i`, relative to the case's own shear modulus; positive.
-    times : tuple of floats
-        `tau_i` [s], as many; positive.
-    """
-
-    moduli: tuple[float, ...] = parameter(
+    moduli: tuple[float, ...] = parameter(  # `beta_i`
         "Modulus of each branch, relative to the case's own, which is what is left in the end.",
         kind="numbers",
         expectation=LogNormal(1.0, 2.7),
@@ -70,7 +60,7 @@ class Viscoelasticity(Mechanism):
         typical="0.7 kPa left and 2.0 kPa that relax in 9.7 s (cortex); 0.3 and 0.9 kPa, 14.9 s (corona radiata)",
         source="Budday et al. 2017 (diagnosis design, M8)",
     )
-    times: tuple[float, ...] = parameter(
+    times: tuple[float, ...] = parameter(  # `tau_i`
         "Relaxation time of each branch.",
         kind="numbers",
         unit="s",
@@ -136,7 +126,6 @@ class Viscoelasticity(Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         found = []
         if "moduli" in values:
             moduli = values["moduli"]
@@ -159,13 +148,12 @@ class Viscoelasticity(Mechanism):
 
     @classmethod
     def smallest_in_words(cls, smallest: Smallest) -> str:
-        """See `warpbrain.physics.mechanism.Mechanism`."""
         if not smallest.name.startswith("moduli"):
             return super().smallest_in_words(smallest)
         return f"from a tissue that at first is {number(1.0 + smallest.size)} times as stiff as in the end"
 
     @classmethod
-    def _of_coefficients(cls, c: NDArray[np.float64]) -> "Viscoelasticity":
+    def _of_coefficients(cls, c: Floats) -> "Viscoelasticity":
         shares, times = _spectrum(c)
         # the faster branch first
         order = np.argsort(times)
@@ -173,15 +161,13 @@ class Viscoelasticity(Mechanism):
         return cls(moduli=tuple(moduli[order].tolist()), times=tuple(times[order].tolist()))
 
     def branches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """See `warpbrain.physics.mechanism.Relaxing`."""
         return self.moduli, self.times
 
     def bind(self, body: Body) -> "ViscoelasticTerm":
-        """See `warpbrain.physics.term.Following`."""
         return ViscoelasticTerm(body, self)
 
 
-def _spectrum(c: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _spectrum(c: Floats) -> tuple[Floats, Floats]:
     """Shares and times [s] of the branches of a proposal, (1,) or (2,), from its coefficients."""
     if len(c) == 2:
         return np.ones(1), np.exp(c[1:])
@@ -189,7 +175,7 @@ def _spectrum(c: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.f
     return np.array([first, 1.0 - first]), np.exp(c[1:3])
 
 
-def _left(c: NDArray[np.float64], time: float) -> float:
+def _left(c: Floats, time: float) -> float:
     """Modulus that has not relaxed at a time [s], as a proposal has it: that of strain that is held."""
     shares, times = _spectrum(c)
     return float(c[0] * (shares @ np.exp(-time / times)))
@@ -202,13 +188,15 @@ def _time_in_words(value: Value) -> str:
     return measured(value.value, value.sd, value.unit)
 
 
-class ViscoelasticTerm(Term):
+class ViscoelasticTerm(KernelTerm):
     """`Viscoelasticity` on a device, with its memory."""
 
     memory = ("_q", "_S")
+    lasting = ("_branches",)
 
     def __init__(self, body: Body, mechanism: Viscoelasticity) -> None:
-        super().__init__(body, body.tetrahedra, mechanism.factor)
+        made, *kernels = _kernels(body.precision)
+        super().__init__(body, body.tetrahedra, kernels, mechanism.factor)
         self.mechanism = mechanism
         scalar, mat33 = body.precision.scalar, body.precision.mat33
         count, branches = len(self.stencils), len(mechanism.times)
@@ -219,8 +207,11 @@ class ViscoelasticTerm(Term):
         self._response = wp.zeros(branches, dtype=scalar, device=body.device)
         self._q = wp.zeros((count, branches), dtype=mat33, device=body.device)
         self._S = wp.zeros(count, dtype=mat33, device=body.device)
-        self._energy = wp.zeros(count, dtype=scalar, device=body.device)
-        self._kernels = _kernels(body.precision)
+        self._branches = made()
+        self._branches.nodes, self._branches.inverse_edges = body.nodes, body.inverse_edges
+        self._branches.q, self._branches.S_before, self._branches.scale = self._q, self._S, self.scale
+        for name in ("weights", "decay", "response"):
+            setattr(self._branches, name, getattr(self, f"_{name}"))
         self.forgets_in = min(mechanism.times)
 
     def set_time_step(self, h: float) -> None:
@@ -237,29 +228,16 @@ class ViscoelasticTerm(Term):
         self._q.zero_()
         self._S.zero_()
 
-    def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
-        body = self.body
-        inputs = [body.nodes, body.inverse_edges, self._weights, self._decay, self._response, self._q, self._S]
-        launch(kernel, len(self.stencils), [*inputs, self.scale, u, *outputs], body.device)
-
-    def evaluate_forces(self, u: wp.array) -> None:
-        self._launch(self._kernels[0], u, self.forces)
-
-    def evaluate_tangents(self, u: wp.array) -> None:
-        self._launch(self._kernels[1], u, self.forces, self.blocks)
+    def _inputs(self) -> list[Any]:
+        return [self._branches]
 
     def advance(self, u: wp.array) -> None:
-        self._launch(self._kernels[2], u)
-
-    def energy(self, u: wp.array) -> float:
-        """Potential of the step [J]; 0 in an equilibrium, where everything has relaxed."""
-        self._launch(self._kernels[3], u, self._energy)
-        return float(np.sum(self._energy.numpy(), dtype=np.float64))
+        self._launch(self._kernels[3], u)
 
 
 @cache
-def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
-    """Kernels for forces, forces with tangent blocks, the end of a step and energies; one thread for an element."""
+def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any, Any]:
+    """What kernels know, and those for forces, with tangent blocks, energies and the end of a step, by element."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     module = compiled_module(f"viscoelasticity_{precision.name}")
 
@@ -292,109 +270,76 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
         K[2, 2] += isotropic
         return K
 
-    @wp.kernel(module=module)
-    def forces(
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        weights: wp.array2d[scalar],
-        decay: wp.array[scalar],
-        response: wp.array[scalar],
-        q: wp.array2d[mat33],
-        S_before: wp.array[mat33],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        element_forces: wp.array2d[vec3],
-    ):
-        e = wp.tid()
-        G = inverse_edges[e]
-        s = weights[e, 2]
-        F = deformation_gradient(u, nodes[e], G) / s
-        change = isochoric(F, weights[e, 1]) - S_before[e]
-        total = mat33()
-        for k in range(decay.shape[0]):
-            total += decay[k] * q[e, k] + response[k] * change
-        store_forces(scale[0] * weights[e, 0] * s * s * (F * total), G, element_forces, e)
+    @wp.struct
+    class Branches:
+        nodes: wp.array[wp.vec4i]
+        inverse_edges: wp.array[mat33]
+        weights: wp.array2d[scalar]
+        decay: wp.array[scalar]
+        response: wp.array[scalar]
+        q: wp.array2d[mat33]
+        S_before: wp.array[mat33]
+        scale: wp.array[scalar]
 
     @wp.kernel(module=module)
-    def tangents(
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        weights: wp.array2d[scalar],
-        decay: wp.array[scalar],
-        response: wp.array[scalar],
-        q: wp.array2d[mat33],
-        S_before: wp.array[mat33],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        element_forces: wp.array2d[vec3],
-        element_blocks: wp.array2d[mat33],
-    ):
+    def forces(b: Branches, u: wp.array[vec3], element_forces: wp.array2d[vec3]):
         e = wp.tid()
-        G = inverse_edges[e]
-        s = weights[e, 2]
-        F = deformation_gradient(u, nodes[e], G) / s
-        mu = weights[e, 1]
+        G = b.inverse_edges[e]
+        s = b.weights[e, 2]
+        F = deformation_gradient(u, b.nodes[e], G) / s
+        change = isochoric(F, b.weights[e, 1]) - b.S_before[e]
+        total = mat33()
+        for k in range(b.decay.shape[0]):
+            total += b.decay[k] * b.q[e, k] + b.response[k] * change
+        store_forces(b.scale[0] * b.weights[e, 0] * s * s * (F * total), G, element_forces, e)
+
+    @wp.kernel(module=module)
+    def tangents(b: Branches, u: wp.array[vec3], element_forces: wp.array2d[vec3], element_blocks: wp.array2d[mat33]):
+        e = wp.tid()
+        G = b.inverse_edges[e]
+        s = b.weights[e, 2]
+        F = deformation_gradient(u, b.nodes[e], G) / s
+        mu = b.weights[e, 1]
         S = isochoric(F, mu)
         total = mat33()
         all = scalar(0.0)
-        for k in range(decay.shape[0]):
-            total += decay[k] * q[e, k] + response[k] * (S - S_before[e])
-            all += response[k]
-        V = scale[0] * weights[e, 0] * s
+        for k in range(b.decay.shape[0]):
+            total += b.decay[k] * b.q[e, k] + b.response[k] * (S - b.S_before[e])
+            all += b.response[k]
+        V = b.scale[0] * b.weights[e, 0] * s
         store_forces(V * s * (F * total), G, element_forces, e)
-        a, b, c = G[0], G[1], G[2]
+        a1, a2, a3 = G[0], G[1], G[2]
         store_blocks(
-            V * moduli(F, S, total, mu, all, a, a),
-            V * moduli(F, S, total, mu, all, a, b),
-            V * moduli(F, S, total, mu, all, a, c),
-            V * moduli(F, S, total, mu, all, b, b),
-            V * moduli(F, S, total, mu, all, b, c),
-            V * moduli(F, S, total, mu, all, c, c),
+            V * moduli(F, S, total, mu, all, a1, a1),
+            V * moduli(F, S, total, mu, all, a1, a2),
+            V * moduli(F, S, total, mu, all, a1, a3),
+            V * moduli(F, S, total, mu, all, a2, a2),
+            V * moduli(F, S, total, mu, all, a2, a3),
+            V * moduli(F, S, total, mu, all, a3, a3),
             element_blocks,
             e,
         )
 
     @wp.kernel(module=module)
-    def advance(
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        weights: wp.array2d[scalar],
-        decay: wp.array[scalar],
-        response: wp.array[scalar],
-        q: wp.array2d[mat33],
-        S_before: wp.array[mat33],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-    ):
+    def advance(b: Branches, u: wp.array[vec3]):
         e = wp.tid()
-        S = isochoric(deformation_gradient(u, nodes[e], inverse_edges[e]) / weights[e, 2], weights[e, 1])
-        for k in range(decay.shape[0]):
-            q[e, k] = decay[k] * q[e, k] + response[k] * (S - S_before[e])
-        S_before[e] = S
+        S = isochoric(deformation_gradient(u, b.nodes[e], b.inverse_edges[e]) / b.weights[e, 2], b.weights[e, 1])
+        for k in range(b.decay.shape[0]):
+            b.q[e, k] = b.decay[k] * b.q[e, k] + b.response[k] * (S - b.S_before[e])
+        b.S_before[e] = S
 
     @wp.kernel(module=module)
-    def energies(
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        weights: wp.array2d[scalar],
-        decay: wp.array[scalar],
-        response: wp.array[scalar],
-        q: wp.array2d[mat33],
-        S_before: wp.array[mat33],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        energy: wp.array[scalar],
-    ):
+    def energies(b: Branches, u: wp.array[vec3], energy: wp.array[scalar]):
         e = wp.tid()
-        s = weights[e, 2]
-        F = deformation_gradient(u, nodes[e], inverse_edges[e]) / s
+        s = b.weights[e, 2]
+        F = deformation_gradient(u, b.nodes[e], b.inverse_edges[e]) / s
         root = wp.cbrt(wp.determinant(F))
-        psi = scalar(0.5) * weights[e, 1] * (wp.ddot(F, F) / (root * root) - scalar(3.0))
+        psi = scalar(0.5) * b.weights[e, 1] * (wp.ddot(F, F) / (root * root) - scalar(3.0))
         strain = wp.transpose(F) * F - wp.identity(n=3, dtype=scalar)
         total = scalar(0.0)
-        for k in range(decay.shape[0]):
-            kept = decay[k] * q[e, k] - response[k] * S_before[e]
-            total += response[k] * psi + scalar(0.5) * wp.ddot(kept, strain)
-        energy[e] = scale[0] * weights[e, 0] * s * s * s * total
+        for k in range(b.decay.shape[0]):
+            kept = b.decay[k] * b.q[e, k] - b.response[k] * b.S_before[e]
+            total += b.response[k] * psi + scalar(0.5) * wp.ddot(kept, strain)
+        energy[e] = b.scale[0] * b.weights[e, 0] * s * s * s * total
 
-    return forces, tangents, advance, energies
+    return Branches, forces, tangents, energies, advance

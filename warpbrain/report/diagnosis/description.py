@@ -14,7 +14,7 @@ from warpbrain.inference.causes import Kind
 from warpbrain.inference.decide import Decision
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import smallest_in_words
-from warpbrain.physics.values import Smallest, Value
+from warpbrain.physics.words import Smallest, Value
 from warpbrain.report.files import plain
 from warpbrain.report.fingerprints import fingerprints
 from warpbrain.report.summary import machine

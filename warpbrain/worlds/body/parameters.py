@@ -8,7 +8,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.physics.mechanism import Mechanism
-from warpbrain.physics.values import Smallest, Value
+from warpbrain.physics.words import Smallest, Value
 from warpbrain.worlds.body.effects import Effect
 
 

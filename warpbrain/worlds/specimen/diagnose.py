@@ -12,7 +12,7 @@ from warpbrain.errors import InputError
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import after_checks
 from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, Decision, decide
-from warpbrain.physics.values import Measurement
+from warpbrain.physics.words import Measurement
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.seconds import Seconds
 from warpbrain.simulation.specimen import not_transmitted, specimen_of

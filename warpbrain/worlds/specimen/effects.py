@@ -29,7 +29,7 @@ from warpbrain.inference.causes import Kind
 from warpbrain.inference.decide import UNKNOWN
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import NotTestableError
-from warpbrain.physics.values import Value
+from warpbrain.physics.words import Value
 from warpbrain.simulation.specimen import specimen_of
 from warpbrain.worlds.specimen.noise import smooth_patterns
 from warpbrain.worlds.specimen.protocol import Chain, Protocol

@@ -7,7 +7,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.physics.values import Measurement, Smallest, Value
+from warpbrain.physics.words import Measurement, Smallest, Value
 from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
 from warpbrain.worlds.specimen.noise import noise_factor
 from warpbrain.worlds.specimen.protocol import REST, Protocol, Test

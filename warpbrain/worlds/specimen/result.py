@@ -11,7 +11,7 @@ from warpbrain.cases.case import Case
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.decide import Decision
-from warpbrain.physics.values import Measurement, Smallest, Value
+from warpbrain.physics.words import Measurement, Smallest, Value
 from warpbrain.shown import Shown
 from warpbrain.worlds.specimen.protocol import Protocol
 
