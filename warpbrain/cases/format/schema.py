@@ -1,7 +1,8 @@
 """The JSON Schema of `case.toml`, made from the tables that it is read by.
 
-Editors complete and check with it what a person types (``#:schema case.schema.json`` on the first line, in those that
-know Taplo). It says what a file may say; what its words mean together with the mesh, only reading the case can tell.
+Editors that know Taplo complete and check with it what a person types: ``warpbrain cases schema > case.schema.json``,
+and ``#:schema case.schema.json`` on the first line of a case. It says what a file may say; what its words mean together
+with the mesh, only reading the case can tell.
 """
 
 from __future__ import annotations
@@ -14,9 +15,6 @@ from typing import Any
 from warpbrain.cases.format.keys import Key, Table
 from warpbrain.cases.format.tables import PRIOR, TABLES
 from warpbrain.physics.laws import LAWS
-
-#: Where the schema ships, relative to `warpbrain.cases`.
-FILE = "case.schema.json"
 
 _NUMBER = {"type": "number"}
 _KINDS: dict[str, dict[str, Any]] = {
@@ -54,7 +52,7 @@ def case_schema() -> dict[str, Any]:
 
 
 def schema_text() -> str:
-    """The schema as it ships."""
+    """The schema as `warpbrain cases schema` prints it."""
     return json.dumps(case_schema(), indent=2) + "\n"
 
 
