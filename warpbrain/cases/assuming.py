@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from warpbrain.cases.case import Case
-from warpbrain.cases.parts.mechanisms import in_si
+from warpbrain.cases.format.tables import MECHANISM
 from warpbrain.cases.parts.named import Named
 from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.composition import require_composable, require_left
@@ -66,7 +66,7 @@ def assume(case: Case, said: str) -> Case:
             if named.problems:
                 raise InputError(f"{said}: {key}: {named.problems.found[0]}")
         else:
-            values[key] = in_si(says, value, case.frame)
+            values[key] = MECHANISM.keys_of(kind)[key].in_si(value, case.frame)
     missing = [key for key in mechanism.required() if key not in values]
     if missing:
         says = mechanism.parameters()[missing[0]]
