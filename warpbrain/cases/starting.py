@@ -9,19 +9,19 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.atomic import check_new_folder, check_writable, whole_file, whole_folder
-from warpbrain.cases.building.errors import BuildError, require_extra
-from warpbrain.cases.building.first_sets import first_sets
-from warpbrain.cases.building.label_image import read_labels
+from warpbrain.cases.building.errors import BuildError, check_volume_in, cm3, require_extra
+from warpbrain.cases.building.label_fields import label_volumes, read_labels
 from warpbrain.cases.building.labels import LabelMesh, mesh_labels
-from warpbrain.cases.building.plausible import check_volume_in, cm3
-from warpbrain.cases.building.presets import Preset, preset
+from warpbrain.cases.building.node_sets import first_sets
 from warpbrain.cases.building.tissue_names import (
     OUTSIDE,
     RESECTION,
     VENTRICLE,
     Assignment,
+    Preset,
     assign,
     parse_names,
+    preset,
     usual_name,
 )
 from warpbrain.cases.case_template import case_text
@@ -117,7 +117,7 @@ def start_from_labels(
     require_extra(("mmgpy", "nibabel", "scipy", "meshio"))
     progress(f"reading {labels}")
     image = read_labels(labels)
-    volumes = image.volumes()
+    volumes = label_volumes(image)
     chosen = parse_names(names, volumes)
     for label in sorted(usual.unsure.keys() & volumes.keys() - chosen.keys()):
         raise InputError(f"{labels}: label {label}: {usual.unsure[label]}: say which with --tissue {label}=NAME")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from warpbrain.cases.building.remeshing import Size
+from warpbrain.cases.building.mmg import Size
 
 
 @dataclass(frozen=True)
@@ -75,40 +75,24 @@ def _about(nodes: int) -> tuple[int, int]:
     return int(nodes * 0.98) + 1, int(nodes * 1.02)
 
 
-@dataclass(frozen=True)
-class _Clinical:
-    """What the paper publishes of a clinical case (Tables 4 and 5)."""
-
-    volume: float
-    side: str
-    single: int
-    multi: int
-
-
-# volume [m3], side of the temporal lobe, nodes of the mesh of one tissue and of two
-CLINICAL: dict[str, _Clinical] = {
-    "0529": _Clinical(1.1654e-3, "left", 3619, 5060),
-    "0614": _Clinical(1.0617e-3, "left", 2692, 4112),
-    "0660": _Clinical(1.1344e-3, "left", 2795, 4308),
-    "0685": _Clinical(1.0899e-3, "left", 2425, 4093),
-    "0535": _Clinical(1.2388e-3, "right", 2662, 4225),
-    "0555": _Clinical(1.1706e-3, "right", 2221, 3932),
-    "0603": _Clinical(1.0601e-3, "right", 2742, 4348),
-    "0684": _Clinical(1.1865e-3, "right", 2250, 3930),
+# What the paper publishes of the clinical cases (Tables 4 and 5): volume [m3], side of the temporal lobe, nodes of the
+# mesh of one tissue and of two.
+_CLINICAL = {
+    "0529": (1.1654e-3, "left", 3619, 5060),
+    "0614": (1.0617e-3, "left", 2692, 4112),
+    "0660": (1.1344e-3, "left", 2795, 4308),
+    "0685": (1.0899e-3, "left", 2425, 4093),
+    "0535": (1.2388e-3, "right", 2662, 4225),
+    "0555": (1.1706e-3, "right", 2221, 3932),
+    "0603": (1.0601e-3, "right", 2742, 4348),
+    "0684": (1.1865e-3, "right", 2250, 3930),
 }
 
 
-def _stand_in(name: str, published: _Clinical) -> CaseRecipe:
-    return CaseRecipe(
-        volume=published.volume,
-        meshes=(
-            MeshRecipe("single", multi=False, nodes=_about(published.single)),
-            MeshRecipe("multi", multi=True, nodes=_about(published.multi)),
-        ),
-        # an individual of its own for every case, the same at every build
-        seed=int(name),
-        resection=published.side,
-    )
+def _stand_in(name: str, volume: float, side: str, single: int, multi: int) -> CaseRecipe:
+    meshes = MeshRecipe("single", False, _about(single)), MeshRecipe("multi", True, _about(multi))
+    # an individual of its own for every case, the same at every build
+    return CaseRecipe(volume, meshes, seed=int(name), resection=side)
 
 
 # Volumes: the published values for the phantom and for the clinical cases. The fine meshes have as many more
@@ -123,5 +107,5 @@ RECIPES: dict[str, CaseRecipe] = {
             MeshRecipe("multi-fine", multi=True, finer_than=("multi-coarse", 136.8 / 55.43)),
         ),
     ),
-    **{name: _stand_in(name, published) for name, published in CLINICAL.items()},
+    **{name: _stand_in(name, *published) for name, published in _CLINICAL.items()},
 }

@@ -1,11 +1,16 @@
-"""Which label is which tissue: what the user says with `--tissue`, and what is done with what was not said."""
+"""Which label is which tissue: what the user says with `--tissue`, what a program is known to write (`presets.toml`),
+and what is done with what was not said.
+"""
 
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cache
+from importlib.resources import files
 
 from warpbrain.errors import InputError
 
@@ -191,3 +196,35 @@ def _with_volumes(volumes: Mapping[int, float], labels: Sequence[int], most: int
 def _example(volumes: Mapping[int, float], labels: Sequence[int]) -> str:
     largest = sorted(labels, key=lambda label: -volumes[label])
     return ",".join(f"{label}={name}" for label, name in zip(largest, ("grey", "white", VENTRICLE), strict=False))
+
+
+@dataclass(frozen=True)
+class Preset:
+    """What the labels of a program are, by number, and which can mean something else: that the user must say."""
+
+    names: dict[int, str]
+    unsure: dict[int, str]
+
+
+@cache
+def presets() -> dict[str, Preset]:
+    """What labels are by the names of the programs that write them: the tables of `presets.toml`."""
+    text = (files("warpbrain.cases.building") / "presets.toml").read_text(encoding="utf-8")
+    made: dict[str, Preset] = {}
+    for program, table in tomllib.loads(text).items():
+        unsure = {int(label): meaning for label, meaning in table.pop("unsure", {}).items()}
+        del table["source"]
+        names: dict[int, str] = {}
+        for tissue, labels in table.items():
+            for label in labels:
+                first, _, last = str(label).partition("-")
+                names |= dict.fromkeys(range(int(first), int(last or first) + 1), tissue)
+        made[program] = Preset(names, unsure)
+    return made
+
+
+def preset(name: str) -> Preset:
+    """The labels of a program; `InputError` if there is no preset of that name."""
+    if name not in presets():
+        raise InputError(f"--preset: found '{name}', expected one of {', '.join(presets())}")
+    return presets()[name]
