@@ -52,17 +52,12 @@ class LabelMesh:
 
     Attributes
     ----------
-    points : (n, 3) array
-        [mm, RAS]
-    tetrahedra : (m, 4) int64 array
-    tissue : (m,) int64 array
-        Numbers of the assignment.
+    points, tetrahedra, tissue : (n, 3), (m, 4) and (m,) arrays
+        [mm, RAS]; tissues have the numbers of the assignment.
     size : float
         Wanted mean edge [mm].
-    labelled : dict of int to float
-        Volume [mm3] of the labels of each tissue.
-    labelled_cavity : float
-        The same of the cavities.
+    labelled, labelled_cavity
+        Volume [mm3] of the labels of each tissue, by number, and of the cavities.
     in_place : dict of int to float
         Share of the voxels of each tissue that lie in that tissue of the mesh, before the cutting.
     fields : LabelFields
@@ -93,23 +88,9 @@ def mesh_labels(
     size: float | None = None,
     progress: Callable[[str], None] = lambda line: None,
 ) -> LabelMesh:
-    """Mesh a segmentation.
+    """Mesh a segmentation with a wanted mean edge [mm], by default one that gives about 5,000 nodes.
 
-    Parameters
-    ----------
-    image : Image
-        Of labels, see `read_labels`.
-    assignment : Assignment
-        What each label is.
-    size : float, optional
-        Wanted mean edge [mm]; by default what gives about 5,000 nodes.
-    progress : callable
-        Called with one line of text whenever something is begun.
-
-    Raises
-    ------
-    InputError
-        If the labels cannot be those of a brain, the size does not suit them, or no good mesh is found.
+    `InputError` if the labels cannot be those of a brain, the size does not suit them, or no good mesh is found.
     """
     regions = make_regions(image, assignment)
     tissue_volume = regions.grid.voxel_volume * float(((regions.codes != 0) & (regions.codes != CAVITY)).sum())

@@ -9,21 +9,9 @@ from warpbrain.cases.building.mmg import Size
 
 @dataclass(frozen=True)
 class MeshRecipe:
-    """One mesh of a case.
-
-    Attributes
-    ----------
-    file : str
-        Name of the file, without its ending.
-    multi : bool
-        Grey and white matter with a conforming interface, instead of one tissue.
-    nodes : (int, int) or None
-        Wanted number of nodes, from - to.
-    finer_than : (str, float) or None
-        Instead: wanted number of tetrahedra as a multiple of another mesh of the case.
-    with_examples : str
-        Name of a second file, of the same mesh with the sets that examples of mechanisms act on; empty: none.
-    """
+    """One mesh of a case: its file without ending, whether it has grey and white matter with a conforming interface,
+    the wanted number of nodes (from, to) or of tetrahedra as a multiple of another mesh of the case, and the name of a
+    second file of it with the sets that examples of mechanisms act on."""
 
     file: str
     multi: bool
@@ -42,19 +30,9 @@ class MeshRecipe:
 
 @dataclass(frozen=True)
 class CaseRecipe:
-    """A case: one anatomy and its meshes.
-
-    Attributes
-    ----------
-    volume : float
-        Volume of the whole brain without its ventricles [m3]; meshes are scaled to it.
-    meshes : tuple of MeshRecipe
-        In the order of making.
-    seed : int or None
-        Seed of the individual deformation; None for the template itself.
-    resection : {"left", "right"} or None
-        Side of the anterior temporal lobe resection.
-    """
+    """A case: the volume [m3] of the whole brain without its ventricles, to which meshes are scaled, these in the order
+    of making, the seed of the individual deformation (None: the template itself), and the side of the resection of an
+    anterior temporal lobe."""
 
     volume: float
     meshes: tuple[MeshRecipe, ...]

@@ -55,19 +55,8 @@ _NAME = re.compile(r"[^\W_](?:[\w ().+/-]{0,58}[\w)])?")
 
 @dataclass(frozen=True)
 class Assignment:
-    """Names of labels.
-
-    Attributes
-    ----------
-    tissues : mapping of int to str
-        Tissues of the mesh by their number, which is the first label that was given their name.
-    number : mapping of int to int
-        From every label of the volume that is tissue to the number of its tissue.
-    cavity : tuple of int
-        Labels that are open cavities.
-    outside : tuple of int
-        Labels that lie outside the body.
-    """
+    """What labels are: names of tissues by their number, which is the first label that was given the name; the number
+    of its tissue for every label that is tissue; labels of open cavities; labels outside the body."""
 
     tissues: Mapping[int, str]
     number: Mapping[int, int]
@@ -78,18 +67,9 @@ class Assignment:
 def parse_names(arguments: Sequence[str], there: Collection[int] | None = None) -> dict[int, str]:
     """Names by label, from arguments such as ``"2=grey,1000-2035=grey"``, in the order given.
 
-    Parameters
-    ----------
-    arguments : sequence of str
-    there : collection of int, optional
-        Labels that there are: a range names those of them that are in it. Not known yet without it, and ranges are
-        checked only.
-
-    Raises
-    ------
-    InputError
-        For anything that is not LABEL=NAME or FIRST-LAST=NAME, a label named twice, a range in which there is no label,
-        and a name that could be meant in two ways.
+    A range names the labels in it that are `there`; without these it is checked only. `InputError` for anything that is
+    not LABEL=NAME or FIRST-LAST=NAME, a label named twice, a range in which there is no label, and a name that could be
+    meant in two ways.
     """
     names: dict[int, str] = {}
     for pair in (piece.strip() for argument in arguments for piece in argument.split(",")):
@@ -134,21 +114,10 @@ def usual_name(name: str) -> str:
 
 
 def assign(volumes: Mapping[int, float], names: Mapping[int, str], others: str | None) -> Assignment:
-    """Decide what every label is.
+    """Decide what every label is, by the volume [mm3] of each there is.
 
-    Parameters
-    ----------
-    volumes : mapping of int to float
-        Volume [mm3] of each label there is.
-    names : mapping of int to str
-        What the user named; if empty, every label becomes a tissue of its own.
-    others : str or None
-        Name of every label that `names` leaves out.
-
-    Raises
-    ------
-    InputError
-        If a name was given to a label that is not there, a label is left without one, or there is no tissue.
+    Without names every label becomes a tissue of its own; `others` is the name of every label that `names` leaves out.
+    `InputError` if a name was given to a label that is not there, a label is left without one, or there is no tissue.
     """
     if absent := [label for label in names if label not in volumes]:
         raise InputError(f"--tissue: the volume has no label {_listed(absent)}; it has {_listed(sorted(volumes))}")

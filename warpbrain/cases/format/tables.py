@@ -192,13 +192,7 @@ RECORDING = Table(
     (
         Key("name", "text", "For people.", needed=True),
         Key("file", "file", "Its file in this folder.", needed=True),
-        Key(
-            "role",
-            "text",
-            "A check recording is never fitted, only scored",
-            choices=("fit", "check"),
-            default="fit",
-        ),
+        Key("role", "text", "A check recording is never fitted, only scored", choices=("fit", "check"), default="fit"),
         Key(
             "sigma",
             "number",
