@@ -124,8 +124,8 @@ def _cropped(image: Image, assignment: Assignment) -> tuple[Codes, Grid]:
         codes[labels == label] = value
     affine = image.grid.affine.copy()
     affine[:3, 3] += affine[:3, :3] @ np.array([side.start - 1 for side in box])
-    codes = np.pad(codes, 1)
-    return codes, Grid(codes.shape, affine)
+    i, j, k = (n + 2 for n in labels.shape)
+    return np.pad(codes, 1), Grid((i, j, k), affine)
 
 
 # standard deviation of the smoothing: share of the element size, and at least this many voxels along each axis of the

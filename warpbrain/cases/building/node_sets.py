@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.building.errors import BuildError
@@ -88,7 +89,7 @@ def first_sets(
     return sets
 
 
-def _facing_up(points: Floats, faces: Ints) -> Floats:
+def _facing_up(points: Floats, faces: NDArray[np.integer[Any]]) -> Floats:
     """How much the surface faces up at each node (n,): 1 up, -1 down, 0 where there are no faces."""
     total = np.zeros_like(points)
     np.add.at(total, faces.ravel(), np.repeat(face_vectors(points, faces), 3, axis=0))

@@ -72,9 +72,8 @@ def _law_keys(name: str) -> tuple[Key, ...]:
         kinds = [{float: "number", list: "numbers"}[takes[key]]] if key in takes else []
         doc = _LAW_KEYS[key] if key in takes else 'Only "prior": the generative model gives the law.'
         hint = "" if key in takes else f"{name} takes {', '.join(takes)}"
-        unit, choices = "" if key == "alpha" or not kinds else "Pa", ()
-        if key == "mu":
-            kinds, choices = [*kinds, "text"], (PRIOR,)
+        unit, choices = "" if key == "alpha" or not kinds else "Pa", (PRIOR,) if key == "mu" else ()
+        kinds += ["text"] if choices else []
         keys.append(Key(key, "|".join(kinds), doc, unit, choices=choices, hint=hint))
     return tuple(keys)
 

@@ -35,6 +35,7 @@ def read_recordings(
             table.problem("kind", f"'{table.variant}' belongs to {other}")
             continue
         common = _common(table)
+        recording: Recording | None
         if table.variant == "surface":
             nodes = None if named is None or found is None else named.nodes(table, found)
             recording = None if common is None or nodes is None else read_surface(**common, nodes=nodes)
