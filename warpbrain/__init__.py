@@ -15,70 +15,40 @@ InputError, SolveError             what went wrong: the argument and the cure, o
 dir(wb) names everything, help(wb.run) says more of one; `warpbrain --help` is the same in a shell.
 """
 
+from functools import cache
 from importlib import import_module
 from typing import Any
 
-#: Where each public name is. They are imported when they are first used, so that `import warpbrain` loads nothing
-#: heavy; type checkers and editors read `__init__.pyi`. Without `__all__`, `help(warpbrain)` is the page above and not
-#: all that can be said of every class.
-
-_HOMES = {
-    "errors": ("InputError", "SolveError"),
-    "mesh": ("MeshError", "TetMesh", "read_mesh", "write_mesh"),
-    "physics.laws": ("Law", "MooneyRivlin", "NeoHookean", "Ogden"),
-    "physics.laws.stability": ("require_stable",),
-    "physics.force": ("NodalForce",),
-    "physics.mechanisms.gravity": ("Gravity",),
-    "physics.mechanisms.resection": ("Resection",),
-    "simulation.model": ("Damping", "Material", "Model"),
-    "simulation.of_case": ("model_of",),
-    "simulation.run": ("Run", "run"),
-    "simulation.specimen_run": ("SpecimenRun",),
-    "report.plot": ("grid", "plot"),
-    "report.in_notebook": ("html",),
-    "cases.assuming": ("assume",),
-    "estimation.posterior": ("Posterior",),
-    "ensemble.results": ("EnsembleResult",),
-    "simulation.system": ("System",),
-    "simulation.equilibrium": ("Equilibrium", "EquilibriumOptions", "EquilibriumSolver", "solve_equilibrium"),
-    "simulation.dynamics": ("Simulator",),
-    "simulation.relaxation": ("relax_to_rest",),
-    "simulation.result": ("Result", "result_of"),
-    "gp.literature.studies": ("read_studies",),
-    "gp.trained": ("find_model", "trained"),
-    "gp.sampling": ("draw_laws",),
-    "gp.prior": ("Prior",),
-    "cases.case": ("Case",),
-    "cases.drawn": ("with_prior_draw",),
-    "cases.reading": ("read_case",),
-    "cases.shipped": ("find_case",),
-    "cases.writing": ("write_case",),
-    "cases.checking": ("check_case",),
-    "simulation.observation": ("observe",),
-    "estimation.estimate": ("estimate",),
-    "estimation.options": ("EstimationOptions",),
-    "diagnosis.diagnose": ("diagnose",),
-    "worlds.options": ("DiagnosisOptions",),
-    "diagnosis.result": ("Diagnosis",),
-}
-_HOME = {name: home for home, names in _HOMES.items() for name in names}
 #: Rooms of the house that are public names themselves: `cases` can be asked for a case, `ensemble` can be called.
 _ROOMS = ("cases", "ensemble")
 
 
+@cache
+def _homes() -> dict[str, str]:
+    """Modules of the public names, which are imported when they are first used, so that `import warpbrain` loads
+    nothing heavy. `__init__.pyi`, which type checkers and editors read, says where they are. Without `__all__`,
+    `help(warpbrain)` is the page above and not all that can be said of every class."""
+    import re
+    from pathlib import Path
+
+    stub = Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8")
+    pairs = re.findall(r"^from (warpbrain\.[\w.]+) import \w+ as (\w+)$", stub, re.MULTILINE)
+    return {name: home for home, name in pairs if name not in _ROOMS}
+
+
 def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(import_module(f"warpbrain.{_HOME[name]}"), name)
+    if name == "__version__":
+        return _version()
+    if name.startswith("_"):
+        raise AttributeError(name)
     if name in _ROOMS:
         return import_module(f"warpbrain.{name}")
     if name == "laws":
         return import_module("warpbrain.physics.laws").LAWS
     if name == "mechanisms":
         return import_module("warpbrain.physics.mechanisms").mechanisms()
-    if name == "__version__":
-        return _version()
-    if name.startswith("_"):
-        raise AttributeError(name)
+    if name in _homes():
+        return getattr(import_module(_homes()[name]), name)
     from difflib import get_close_matches
 
     near = get_close_matches(name, __dir__(), 1)
@@ -97,4 +67,4 @@ def _version() -> str:
 
 
 def __dir__() -> list[str]:
-    return sorted([*_HOME, *_ROOMS, "laws", "mechanisms"])
+    return sorted([*_homes(), *_ROOMS, "laws", "mechanisms"])

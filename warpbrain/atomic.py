@@ -38,22 +38,15 @@ def whole_file(path: Path) -> Iterator[Path]:
         If the folder cannot be written to.
     """
     check_writable(path)
-    try:
+    with _told(path.parent, "cannot be written to"):
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f"{UNFINISHED}{path.stem}-", suffix=path.suffix)
-    except OSError as error:
-        if is_full(error):
-            raise
-        raise InputError(f"{path.parent}: cannot be written to: {error.strerror}") from None
     os.close(handle)
     temporary = Path(name)
     _unfinished.add(temporary)
     try:
         yield temporary
-        # mkstemp makes private files; a result should have the rights that any new file has
-        mask = os.umask(0)
-        os.umask(mask)
         _to_disk(temporary)
-        temporary.chmod(0o666 & ~mask)
+        _make_public(temporary, 0o666)
         temporary.replace(path)
         _entries_to_disk(path.parent)
     finally:
@@ -73,19 +66,12 @@ def whole_folder(path: Path) -> Iterator[Path]:
     check_new_folder(path)
     # what is really written, where `path` ends in a dot or is a link
     target = path.resolve()
-    try:
+    with _told(target.parent, "cannot be written to"):
         temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix=f"{UNFINISHED}{target.name}-"))
-    except OSError as error:
-        if is_full(error):
-            raise
-        raise InputError(f"{target.parent}: cannot be written to: {error.strerror}") from None
     _unfinished.add(temporary)
     try:
         yield temporary
-        # mkdtemp makes private folders; a result should have the rights that any new folder has
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o777 & ~mask)
+        _make_public(temporary, 0o777)
         for folder, _, names in os.walk(temporary, topdown=False):
             for name in names:
                 _to_disk(Path(folder, name))
@@ -98,6 +84,24 @@ def whole_folder(path: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
         _unfinished.discard(temporary)
+
+
+@contextmanager
+def _told(path: Path, what: str) -> Iterator[None]:
+    """What the system refuses in the block is bad input, unless the disk is full."""
+    try:
+        yield
+    except OSError as error:
+        if is_full(error):
+            raise
+        raise InputError(f"{path}: {what}: {error.strerror}") from None
+
+
+def _make_public(path: Path, rights: int) -> None:
+    """Give it the rights that any new file or folder has: temporary ones are made private."""
+    mask = os.umask(0)
+    os.umask(mask)
+    path.chmod(rights & ~mask)
 
 
 def _to_disk(path: Path) -> None:
@@ -126,11 +130,7 @@ def check_new_folder(path: Path) -> None:
             raise InputError(f"{path}: there is a folder of that name that is not empty: choose another one")
     elif path.exists() or path.is_symlink():
         raise InputError(f"{path}: there is a file of that name: choose another one")
-    parent = path.resolve().parent
-    if not parent.is_dir():
-        raise InputError(f"{parent}: cannot be written to: no such folder")
-    if not os.access(parent, os.W_OK | os.X_OK):
-        raise InputError(f"{parent}: cannot be written to")
+    _check_folder(path.resolve().parent)
 
 
 def safe_name(name: str) -> str:
@@ -142,40 +142,41 @@ def check_writable(path: Path) -> None:
     """`InputError` if a file cannot be written there: to know it before long work, not after."""
     if path.is_dir():
         raise InputError(f"{path}: cannot be written: there is a folder of that name")
-    if not path.parent.is_dir():
-        raise InputError(f"{path.parent}: cannot be written to: no such folder")
-    if not os.access(path.parent, os.W_OK | os.X_OK):
-        raise InputError(f"{path.parent}: cannot be written to")
+    _check_folder(path.parent)
+
+
+def _check_folder(path: Path) -> None:
+    if not path.is_dir():
+        raise InputError(f"{path}: cannot be written to: no such folder")
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: cannot be written to")
 
 
 def remove_unfinished() -> None:
     """Remove what is half-written, before the process is ended from outside the block that writes it."""
     for temporary in list(_unfinished):
-        if temporary.is_dir():
-            shutil.rmtree(temporary, ignore_errors=True)
-        else:
-            temporary.unlink(missing_ok=True)
+        remove(temporary)
 
 
 def remove_leftovers(folder: Path) -> None:
     """Remove what a process that was killed left half-written in a folder, which no other process may be writing to."""
     for left in folder.glob(f"{UNFINISHED}*"):
-        if left in _unfinished:
-            continue
-        if left.is_dir() and not left.is_symlink():
-            shutil.rmtree(left, ignore_errors=True)
-        else:
-            left.unlink(missing_ok=True)
+        if left not in _unfinished:
+            remove(left)
+
+
+def remove(path: Path) -> None:
+    """Remove a file, a link or a folder with all that is in it."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def output_folder(path: Path) -> Path:
     """Make a folder for output if it is not there; `InputError` if it cannot be one."""
-    try:
+    with _told(path, "cannot be made a folder for output"):
         path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        if is_full(error):
-            raise
-        raise InputError(f"{path}: cannot be made a folder for output: {error.strerror}") from None
     # known now, not only when there is something to write
     if not os.access(path, os.W_OK | os.X_OK):
         raise InputError(f"{path}: cannot be written to")

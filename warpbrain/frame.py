@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
-
-Floats = NDArray[np.float64]
 
 #: Metres of one unit of length.
 METRES = {"m": 1.0, "mm": 1e-3}

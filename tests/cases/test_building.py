@@ -9,12 +9,10 @@ import pytest
 pytest.importorskip("scipy")
 
 from warpbrain.cases.building import NAMES, BuildError, build
-from warpbrain.cases.building.cutting import compact, cut
-from warpbrain.cases.building.individual import individual_warp
-from warpbrain.cases.building.lattice import bcc_lattice
-from warpbrain.cases.building.optimising import open_angles
-from warpbrain.cases.building.remeshing import Cells, Size
-from warpbrain.cases.building.resection import anterior_temporal_lobe
+from warpbrain.cases.building.cleaning import open_angles
+from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
+from warpbrain.cases.building.mmg import Cells, Size
+from warpbrain.cases.building.template import IndividualWarp, anterior_temporal_lobe
 from warpbrain.mesh import boundary_faces, dihedral_angles, pinched_nodes, read_mesh, split_boundary
 from warpbrain.mesh.tet_mesh import signed_volumes
 
@@ -80,10 +78,10 @@ def test_open_angles_opens_them_and_keeps_the_shape():
 
 def test_individual_warp_is_smooth_repeatable_and_invertible():
     points = np.random.default_rng(0).uniform(-80, 80, (500, 3))
-    warp = individual_warp(7, 3.0)
+    warp = IndividualWarp(7, 3.0)
     moved = warp(points)
-    np.testing.assert_array_equal(moved, individual_warp(7, 3.0)(points))
-    assert not np.allclose(moved, individual_warp(8, 3.0)(points))
+    np.testing.assert_array_equal(moved, IndividualWarp(7, 3.0)(points))
+    assert not np.allclose(moved, IndividualWarp(8, 3.0)(points))
     shift = np.linalg.norm(moved - points, axis=1)
     assert 1.0 < np.sqrt((shift**2).mean()) < 6.0
     step = 1e-3

@@ -5,13 +5,13 @@ import sys
 
 import pytest
 
-from warpbrain.cases.catalogue import catalogue, read_entry
-from warpbrain.cases.shipped import SHIPPED
+from concealed.catalogue import read_entry
+from warpbrain.cases.shipped import SHIPPED, catalogue
 
 
 @pytest.mark.parametrize("entry", catalogue(), ids=lambda entry: f"{entry.name}-{entry.tissue}")
 def test_an_entry_is_what_the_case_is(entry):
-    assert entry == read_entry(entry.name, entry.tissue), "python -m warpbrain.cases.catalogue writes it anew"
+    assert entry == read_entry(entry.name, entry.tissue), "python -m concealed.catalogue writes it anew"
 
 
 def test_it_has_every_case():

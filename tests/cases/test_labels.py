@@ -10,15 +10,14 @@ pytest.importorskip("nibabel")
 import nibabel
 from segmentations import CENTRE, NAMES, ellipsoids, grid_affine, volume_of, write_ellipsoids, write_labels
 
-from warpbrain.cases.building.crumbs import crumbs_given_away
-from warpbrain.cases.building.first_sets import first_sets
-from warpbrain.cases.building.label_fields import make_fields
-from warpbrain.cases.building.label_image import LabelImage, read_labels
-from warpbrain.cases.building.label_regions import CAVITY, make_regions
+from warpbrain.cases.building.cleaning import crumbs_given_away
+from warpbrain.cases.building.label_fields import CAVITY, label_volumes, make_fields, make_regions, read_labels
 from warpbrain.cases.building.lattice import bcc_lattice
-from warpbrain.cases.building.presets import preset, preset_names
-from warpbrain.cases.building.tissue_names import Assignment, assign, parse_names
+from warpbrain.cases.building.node_sets import first_sets
+from warpbrain.cases.building.tissue_names import Assignment, assign, parse_names, preset, presets
 from warpbrain.errors import InputError
+from warpbrain.images.grid import Grid
+from warpbrain.images.reading import Image
 from warpbrain.mesh import boundary_faces, components, dihedral_angles, pinched_nodes, split_boundary
 from warpbrain.mesh.tet_mesh import signed_volumes
 
@@ -32,7 +31,7 @@ def meshed(path, names=NAMES, size=SIZE):
     from warpbrain.cases.building.labels import mesh_labels
 
     image = read_labels(path)
-    return mesh_labels(image, assign(image.volumes(), parse_names([names]), None), size)
+    return mesh_labels(image, assign(label_volumes(image), parse_names([names]), None), size)
 
 
 # reading
@@ -42,29 +41,29 @@ def meshed(path, names=NAMES, size=SIZE):
 def test_labels_and_affine_are_read(tmp_path, ending):
     affine = np.array([[0, 2.0, 0, -7], [-1.5, 0, 0, 8], [0, 0, 3, 9], [0, 0, 0, 1]])
     image = read_labels(write_labels(tmp_path / f"a.{ending}", SMALL, affine))
-    np.testing.assert_array_equal(image.labels, SMALL)
-    np.testing.assert_allclose(image.affine, affine)
-    np.testing.assert_allclose(image.voxel, [1.5, 2, 3])
-    assert image.volumes() == {2: pytest.approx(120 * 9.0)}
+    np.testing.assert_array_equal(image.values, SMALL)
+    np.testing.assert_allclose(image.grid.affine, affine)
+    np.testing.assert_allclose(image.grid.voxel, [1.5, 2, 3])
+    assert label_volumes(image) == {2: pytest.approx(120 * 9.0)}
     assert image.notes == ()
 
 
 def test_one_frame_of_four_dimensions_and_whole_floats(tmp_path):
     image = read_labels(write_labels(tmp_path / "a.nii", SMALL[..., None].astype(np.float32), np.eye(4)))
-    np.testing.assert_array_equal(image.labels, SMALL)
+    np.testing.assert_array_equal(image.values, SMALL)
 
 
 def test_freesurfer_volumes_are_read(tmp_path):
     nibabel.save(nibabel.MGHImage(SMALL, np.diag([2.0, 2, 2, 1])), tmp_path / "aseg.mgz")
     image = read_labels(tmp_path / "aseg.mgz")
-    np.testing.assert_array_equal(image.labels, SMALL)
-    np.testing.assert_allclose(image.affine, np.diag([2.0, 2, 2, 1]))
+    np.testing.assert_array_equal(image.values, SMALL)
+    np.testing.assert_allclose(image.grid.affine, np.diag([2.0, 2, 2, 1]))
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("meter", 1000.0), ("micron", 0.001), ("unknown", 1.0)])
 def test_units_become_millimetres(tmp_path, unit, factor):
     image = read_labels(write_labels(tmp_path / "a.nii", SMALL, np.diag([2.0, 2, 2, 1]), unit))
-    np.testing.assert_allclose(image.voxel, 2 * factor)
+    np.testing.assert_allclose(image.grid.voxel, 2 * factor)
     assert (f"in units of {unit}: converted" in " ".join(image.notes)) == (factor != 1)
 
 
@@ -76,7 +75,7 @@ def test_sform_and_qform_that_disagree_are_noted(tmp_path):
     image.set_qform(np.eye(4), 1)
     nibabel.save(image, tmp_path / "a.nii")
     read = read_labels(tmp_path / "a.nii")
-    assert read.affine[0, 3] == 12
+    assert read.grid.affine[0, 3] == 12
     assert "disagree by up to 12 mm: the sform is used" in read.notes[0]
 
 
@@ -214,8 +213,8 @@ def test_labels_that_are_not_named():
 
 
 def regions_of(labels, voxel=2.0, names=NAMES):
-    image = LabelImage("a.nii", labels.astype(np.int32), np.diag([voxel, voxel, voxel, 1.0]))
-    return make_regions(image, assign(image.volumes(), parse_names([names]), "ignore"))
+    image = Image("a.nii", labels.astype(np.int32), Grid(labels.shape, np.diag([voxel, voxel, voxel, 1.0])))
+    return make_regions(image, assign(label_volumes(image), parse_names([names]), "ignore"))
 
 
 def cube():
@@ -229,7 +228,7 @@ def cube():
 def test_regions_are_cropped_and_stay_where_they_are():
     regions = regions_of(cube())
     assert regions.codes.shape == (18, 17, 16)
-    np.testing.assert_allclose(regions.affine[:3, 3], [6, 8, 10])
+    np.testing.assert_allclose(regions.grid.affine[:3, 3], [6, 8, 10])
     assert regions.labelled == pytest.approx({1: 8.0 * (16 * 15 * 14 - 512), 2: 8.0 * (512 - 8), CAVITY: 64.0})
     assert regions.notes == ()
 
@@ -254,9 +253,9 @@ def test_a_mistake_of_units_is_noticed(voxel, volume):
 @pytest.mark.parametrize(("voxel", "shape"), [((3, 3, 3), (40, 42, 40)), ((0.9, 0.9, 6), (120, 132, 20))])
 def test_fields_keep_volumes(voxel, shape):
     affine = grid_affine(voxel, shape)
-    image = LabelImage("a.nii", ellipsoids(affine, shape).astype(np.int32), affine)
-    fields = make_fields(make_regions(image, assign(image.volumes(), parse_names([NAMES]), None)), 8.0)
-    cell = abs(np.linalg.det(fields.affine[:3, :3])) * 1e-9
+    image = Image("a.nii", ellipsoids(affine, shape).astype(np.int32), Grid(shape, affine))
+    fields = make_fields(make_regions(image, assign(label_volumes(image), parse_names([NAMES]), None)), 8.0)
+    cell = abs(np.linalg.det(fields.grid.affine[:3, :3])) * 1e-9
     inside, hollow = fields.body > 0, fields.cavity > 0
     ruling = np.argmax(fields.tissues, axis=0) + 2
     found = {label: ((ruling == label) & inside & ~hollow).sum() * cell for label in (2, 3)}
@@ -366,7 +365,7 @@ def test_a_tissue_too_thin_for_the_size_is_named(tmp_path):
 
 
 def test_presets_name_labels_as_the_programs_do():
-    for name in preset_names():
+    for name in presets():
         assert preset(name).names
     names = preset("freesurfer").names
     assert (names[3], names[41], names[16], names[4]) == ("grey matter", "white matter", "brain stem", "ventricle")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpbrain.cases.building.example_sets import RADIUS, with_example_sets
+from warpbrain.cases.building.node_sets import RADIUS, with_example_sets
 from warpbrain.mesh import (
     Quality,
     TetMesh,

@@ -17,7 +17,7 @@ from recording_files import messages, read
 from shapes import box
 
 from warpbrain.cases.checking import check_case
-from warpbrain.cases.parts.directions import read_directions
+from warpbrain.cases.parts.named import read_directions
 from warpbrain.cases.reading import read_case
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame

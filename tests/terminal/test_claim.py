@@ -9,9 +9,8 @@ from contextlib import contextmanager
 import pytest
 
 from warpbrain.errors import InputError
-from warpbrain.terminal import claim as module
-from warpbrain.terminal.claim import TakenError, claim, release
-from warpbrain.terminal.result_folder import choose_folder
+from warpbrain.terminal import result_folder as module
+from warpbrain.terminal.result_folder import TakenError, choose_folder, claim, release
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="locks of POSIX")
 
@@ -26,7 +25,7 @@ def released():
 def another_process_has(folder):
     """A process that claims the folder and is killed when the block ends."""
     code = (
-        f"from pathlib import Path; from warpbrain.terminal.claim import claim; claim(Path({str(folder)!r})); "
+        f"from pathlib import Path; from warpbrain.terminal.result_folder import claim; claim(Path({str(folder)!r})); "
         "print('has it', flush=True); input()"
     )
     with subprocess.Popen(

@@ -5,9 +5,8 @@ import warnings
 import pytest
 
 from warpbrain.errors import InputError
-from warpbrain.terminal.claim import release
 from warpbrain.terminal.record import LOG, Record, files_of
-from warpbrain.terminal.result_folder import MARKS, choose_folder, results_in
+from warpbrain.terminal.result_folder import MARKS, choose_folder, release, results_in
 
 
 @pytest.fixture(autouse=True)

@@ -14,6 +14,8 @@ from collections.abc import Iterator
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from warpbrain.cases.shipped import SHIPPED, find_case
+
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
 
@@ -22,25 +24,17 @@ class _Shipped(ModuleType):
     """This package, with the shipped cases in it; `find_case` reads those of one tissue, and a user's own."""
 
     def __getitem__(self, name: str) -> Case:
-        from warpbrain.cases.shipped import SHIPPED, find_case
-
         if name not in SHIPPED:
             raise KeyError(f"'{name}' is no shipped case; there are: {', '.join(SHIPPED)}")
         return find_case(name)
 
     def __iter__(self) -> Iterator[str]:
-        from warpbrain.cases.shipped import SHIPPED
-
         return iter(SHIPPED)
 
     def __len__(self) -> int:
-        from warpbrain.cases.shipped import SHIPPED
-
         return len(SHIPPED)
 
     def __contains__(self, name: object) -> bool:
-        from warpbrain.cases.shipped import SHIPPED
-
         return name in SHIPPED
 
 

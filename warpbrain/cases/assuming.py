@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from warpbrain.cases.case import Case
-from warpbrain.cases.parts.mechanisms import in_si
+from warpbrain.cases.format.tables import MECHANISM
 from warpbrain.cases.parts.named import Named
 from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.composition import require_composable, require_left
@@ -46,60 +46,57 @@ def assume(case: Case, said: str) -> Case:
     """
     require_kind(case, Case, "case", "a Case, as warpbrain.find_case gives")
     require_kind(said, str, "said", 'a text such as "gravity:csf_level=60"')
-    kind, _, rest = said.partition(":")
-    known = mechanisms()
-    if kind not in known:
-        near = difflib.get_close_matches(kind, known, 1)
-        raise InputError(f"{said}: no mechanism '{kind}': {f'did you mean {near[0]}?' if near else ', '.join(known)}")
-    mechanism = known[kind]
-    values: dict[str, Any] = {}
-    named = Named(case.mesh, case.tissues, case.frame, Problems())
-    for part in rest.split(",") if rest else []:
-        word, equals, text = part.partition("=")
-        key = _key(said, mechanism, word)
-        if not equals or key in values:
-            raise InputError(f"{said}: {part}: expected KEY=VALUE, each key once")
-        says = mechanism.parameters()[key]
-        value = _value(said, says, key, text)
-        if isinstance(value, str):
-            values[key] = named.look_up(says.kind, value, partial(Path, value))
-            if named.problems:
-                raise InputError(f"{said}: {key}: {named.problems.found[0]}")
-        else:
-            values[key] = in_si(says, value, case.frame)
-    missing = [key for key in mechanism.required() if key not in values]
-    if missing:
-        says = mechanism.parameters()[missing[0]]
-        raise InputError(f"{said}: {missing[0]} is missing{f' [{says.unit}]' if says.unit else ''}: {says.doc}")
-    others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
-    removing = tuple(there for there in others if isinstance(there, Removing))
-    facts = Facts(named.mesh, case.gravity_axis, case.density, removing)
     try:
-        made = mechanism.of_case(values, facts)
+        return _with(case, said)
     except ParameterError as error:
         raise InputError(f"{said}: {error.key}: {error}") from None
     except InputError as error:
         raise InputError(f"{said}: {error}") from None
-    acting = (*others, made)
-    try:
-        require_composable(acting, require_left(acting, named.mesh))
-    except InputError as error:
-        raise InputError(f"{said}: {error}") from None
+
+
+def _with(case: Case, said: str) -> Case:
+    kind, _, rest = said.partition(":")
+    known = mechanisms()
+    if kind not in known:
+        near = difflib.get_close_matches(kind, known, 1)
+        raise InputError(f"no mechanism '{kind}': {f'did you mean {near[0]}?' if near else ', '.join(known)}")
+    mechanism, keys = known[kind], MECHANISM.keys_of(kind)
+    values: dict[str, Any] = {}
+    named = Named(case.mesh, case.tissues, case.frame, Problems())
+    for part in rest.split(",") if rest else []:
+        word, equals, text = part.partition("=")
+        key = _key(mechanism, word)
+        if not equals or key in values:
+            raise InputError(f"{part}: expected KEY=VALUE, each key once")
+        says = mechanism.parameters()[key]
+        value = keys[key].in_si(_value(says, key, text), case.frame)
+        values[key] = named.look_up(says.kind, value, partial(Path, value)) if isinstance(value, str) else value
+        if named.problems:
+            raise InputError(f"{key}: {named.problems.found[0]}")
+    missing = [key for key in mechanism.required() if key not in values]
+    if missing:
+        says = mechanism.parameters()[missing[0]]
+        raise InputError(f"{missing[0]} is missing{f' [{says.unit}]' if says.unit else ''}: {says.doc}")
+    others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
+    removing = tuple(there for there in others if isinstance(there, Removing))
+    facts = Facts(named.mesh, case.gravity_axis, case.density, removing)
+    acting = (*others, mechanism.of_case(values, facts))
+    require_composable(acting, require_left(acting, named.mesh))
     return replace(case, mesh=named.mesh, mechanisms=acting)
 
 
-def _key(said: str, mechanism: type[Mechanism], word: str) -> str:
+def _key(mechanism: type[Mechanism], word: str) -> str:
     keys = list(mechanism.parameters())
     found = [key for key in keys if key == word] or [key for key in keys if key.endswith(f"_{word}")]
     if len(found) != 1:
-        raise InputError(f"{said}: no key '{word}' of {mechanism.kind}: expected one of {', '.join(keys)}")
+        raise InputError(f"no key '{word}' of {mechanism.kind}: expected one of {', '.join(keys)}")
     return found[0]
 
 
-def _value(said: str, says: Says, key: str, text: str) -> Any:
+def _value(says: Says, key: str, text: str) -> Any:
     if says.kind in _NAMES:
         if says.choices and text not in says.choices:
-            raise InputError(f"{said}: {key}: found '{text}', expected one of {', '.join(says.choices)}")
+            raise InputError(f"{key}: found '{text}', expected one of {', '.join(says.choices)}")
         return text
     try:
         numbers = [float(part) for part in text.split("/")]
@@ -108,9 +105,8 @@ def _value(said: str, says: Says, key: str, text: str) -> Any:
     count = {"number": 1, "position": 3, "vector": 3}.get(says.kind)
     if not numbers or (count is not None and len(numbers) != count):
         expected = {1: "a number", 3: "three numbers joined by /"}.get(count or 0, "numbers joined by /")
-        raise InputError(f"{said}: {key}: found '{text}', expected {expected}{f' [{says.unit}]' if says.unit else ''}")
+        raise InputError(f"{key}: found '{text}', expected {expected}{f' [{says.unit}]' if says.unit else ''}")
     for number in numbers:
         if not says.above < number < says.below:
-            limits = f"between {says.above:g} and {says.below:g}"
-            raise InputError(f"{said}: {key}: found {number:g}, expected a number {limits}")
+            raise InputError(f"{key}: found {number:g}, expected a number between {says.above:g} and {says.below:g}")
     return numbers[0] if count == 1 else numbers

@@ -7,24 +7,16 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.physics.mechanism import ClosedSurface
 
-Floats = NDArray[np.float64]
 Ramp = Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Boundary:
-    """What all kinds have.
-
-    Attributes
-    ----------
-    name : str
-    nodes : str
-        Node set of the case's mesh.
-    """
+    """What all kinds have: a name, and a node set of the case's mesh."""
 
     kind: ClassVar[str]
     name: str
@@ -91,14 +83,7 @@ class Displaced(Boundary):
 
 @dataclass(frozen=True, kw_only=True)
 class Forced(Boundary):
-    """Nodes that share a force evenly.
-
-    Attributes
-    ----------
-    total : (float, float, float)
-        [N]
-    ramp : sequence of (time, factor)
-    """
+    """Nodes that share a total force [N] evenly, times a factor over time [s]."""
 
     kind: ClassVar[str] = "force"
     total: tuple[float, float, float]
@@ -111,14 +96,7 @@ class Forced(Boundary):
 
 @dataclass(frozen=True, kw_only=True)
 class Pressed(Boundary):
-    """Faces of the nodes under a pressure that follows them.
-
-    Attributes
-    ----------
-    value : float
-        [Pa]; positive pushes on the tissue.
-    ramp : sequence of (time, factor)
-    """
+    """Faces of the nodes under a pressure [Pa] that follows them, times a factor over time [s]; positive pushes."""
 
     kind: ClassVar[str] = "pressure"
     value: float
@@ -130,13 +108,7 @@ class Pressed(Boundary):
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(Boundary):
-    """Nodes that cannot cross a closed surface.
-
-    Attributes
-    ----------
-    surface : ClosedSurface
-    friction : float
-    """
+    """Nodes that cannot cross a closed surface."""
 
     kind: ClassVar[str] = "contact"
     surface: ClosedSurface

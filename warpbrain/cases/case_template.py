@@ -72,21 +72,9 @@ kind = "fixed"
 
 
 def case_text(name: str, source: str, tissues: Mapping[int, str], cavities: bool, resected: bool = False) -> str:
-    """Text of a `case.toml` that can be run as it is.
-
-    Parameters
-    ----------
-    name : str
-        Of the case.
-    source : str
-        File that the mesh was made from.
-    tissues : mapping of int to str
-        Names of the tissues, by number.
-    cavities : bool
-        Whether the mesh has the node set `ventricle`.
-    resected : bool
-        Whether the mesh has the element set `resection`, which is then taken out.
-    """
+    """Text of a `case.toml` that can be run as it is, of a mesh that was made from the file `source`: names of its
+    tissues by number, whether it has the node set `ventricle`, and the element set `resection`, which is then taken
+    out."""
     return _TEXT.format(
         name=quoted(name),
         source=quoted(source),

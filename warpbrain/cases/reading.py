@@ -8,15 +8,13 @@ import os
 from pathlib import Path
 
 from warpbrain.cases.case import Case
-from warpbrain.cases.format.parsing import parse_toml
+from warpbrain.cases.format.reading import Context, parse_toml
 from warpbrain.cases.format.tables import CASE, TABLES
 from warpbrain.cases.parts.anatomy import read_anatomy
 from warpbrain.cases.parts.boundaries import check_faces, check_together, read_boundaries
-from warpbrain.cases.parts.context import Context
 from warpbrain.cases.parts.magnitudes import check_magnitudes
 from warpbrain.cases.parts.mechanisms import read_mechanisms
 from warpbrain.cases.parts.named import Named
-from warpbrain.cases.parts.node_sets import NodeSets
 from warpbrain.cases.parts.recordings import read_recordings
 from warpbrain.cases.parts.tissues import read_body, read_tissues
 from warpbrain.errors import InputError, require_kind
@@ -65,38 +63,31 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
                 file, name, "unknown key", f"did you mean '{near[0]}'?" if near else f"expected {', '.join(names)}"
             )
     head = context.table(CASE)
-    context.frame = Frame(head.get("units", "mm"), head.get("axes", "RAS"))
-    axis = None
-    if head.has("gravity_axis"):
-        x, y, z = context.frame.directions(head.get("gravity_axis")).tolist()
-        axis = (x, y, z)
-        if not any(axis):
-            head.problem("gravity_axis", f"expected 3 numbers that are not all zero, found {head.get('gravity_axis')}")
-            axis = None
+    context.frame = Frame(head.get("units"), head.get("axes"))
+    axis = head.si("gravity_axis")
+    if axis is not None and not any(axis):
+        head.problem("gravity_axis", f"expected 3 numbers that are not all zero, found {head.get('gravity_axis')}")
+        axis = None
     registration = None
-    if head.has("registration"):
-        accuracy = head.get("registration")
+    if accuracy := head.get("registration"):
         registration = Registration(0.001 * accuracy["mm"], math.radians(accuracy["degrees"]))
 
     mesh_file, found, specimen = read_anatomy(context)
-    sets = None if found is None else NodeSets(context, found)
     context.mesh = None if found is None else found.mesh
     tissues = read_tissues(context)
     density, poisson = read_body(context)
-    boundaries = read_boundaries(context, sets)
-    # with the node sets that files of this folder name
-    mesh = None if sets is None else sets.mesh()
-    named = None if mesh is None else Named(mesh, tissues, context.frame, problems)
+    named = None if found is None else Named(found.mesh, tissues, context.frame, problems)
+    boundaries = read_boundaries(context, named, found)
     mechanisms = read_mechanisms(context, named, axis, density)
-    recordings = read_recordings(context, sets, {boundary.name for boundary in boundaries})
+    recordings = read_recordings(context, named, found, {boundary.name for boundary in boundaries})
     if named is None:
         return None
-    # with the element sets and vectors that mechanisms name
+    # with the sets and vectors that keys name
     mesh = named.mesh
     case = Case(
-        name=head.get("name", ""),
-        title=head.get("title", head.get("name", "")),
-        origin=head.get("origin", ""),
+        name=head.get("name") or "",
+        title=head.get("title" if head.has("title") else "name") or "",
+        origin=head.get("origin") or "",
         path=file,
         frame=context.frame,
         gravity_axis=axis,

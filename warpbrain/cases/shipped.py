@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +15,7 @@ if TYPE_CHECKING:
     from warpbrain.cases.case import Case
 
 _DATA = Path(__file__).parent / "data"
+CATALOGUE = _DATA / "catalogue.json"
 
 #: Grey and white matter apart, or one tissue.
 TISSUES = ("multi", "single")
@@ -36,6 +39,39 @@ SHIPPED = {
 
 #: Other names of shipped cases: the paper calls its phantom synthetic.
 ALIASES = {"synthetic": "phantom", "synthetic-fine": "phantom-fine"}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What a shipped case is with one of its meshes.
+
+    Attributes
+    ----------
+    name : str
+    tissue : str
+        ``"multi"`` or ``"single"``.
+    title, origin : str
+        As `Case` has them.
+    nodes, tetrahedra : int
+        Of the imaged anatomy, whole.
+    volume_cm3 : float
+    recordings : dict of str to int
+        How many rows, points or instants each has.
+    """
+
+    name: str
+    tissue: str
+    title: str
+    origin: str
+    nodes: int
+    tetrahedra: int
+    volume_cm3: float
+    recordings: dict[str, int]
+
+
+def catalogue() -> list[Entry]:
+    """Every shipped case, each once for every mesh, without reading these; `concealed.catalogue` writes its file."""
+    return [Entry(**entry) for entry in json.loads(CATALOGUE.read_text(encoding="utf-8"))]
 
 
 def files_of(name: str) -> list[Path]:

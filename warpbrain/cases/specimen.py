@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.mesh import TetMesh, boundary_faces, nodes_of
 from warpbrain.mesh.tet_mesh import signed_volumes
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Elements along the longest side of a block, and along the diameter of a cylinder.
 CELLS = 12
@@ -52,7 +49,7 @@ class Specimen:
         return TetMesh(unit * size, tetrahedra, node_sets=sets)  # type: ignore[arg-type]  # TetMesh converts
 
 
-def _block(cells: list[int]) -> tuple[Floats, Integers]:
+def _block(cells: list[int]) -> tuple[Floats, Ints]:
     """A unit cube about the z axis: nodes on a regular grid, six tetrahedra a cell."""
     i, j, k = np.meshgrid(*(np.arange(n + 1) for n in cells), indexing="ij")
     points = np.stack([i / cells[0] - 0.5, j / cells[1] - 0.5, k / cells[2]], axis=-1).reshape(-1, 3)
@@ -62,7 +59,7 @@ def _block(cells: list[int]) -> tuple[Floats, Integers]:
     return points, np.stack(corners, axis=1)[:, _SIX].reshape(-1, 4)
 
 
-def _cylinder(rings: int, layers: int) -> tuple[Floats, Integers]:
+def _cylinder(rings: int, layers: int) -> tuple[Floats, Ints]:
     """A cylinder of diameter 1 and height 1: rings of 6, 12, 18, ... nodes, in layers of prisms."""
     from scipy.spatial import Delaunay
 

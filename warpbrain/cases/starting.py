@@ -9,19 +9,19 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.atomic import check_new_folder, check_writable, whole_file, whole_folder
-from warpbrain.cases.building.errors import BuildError, require_extra
-from warpbrain.cases.building.first_sets import first_sets
-from warpbrain.cases.building.label_image import read_labels
+from warpbrain.cases.building.errors import BuildError, check_volume_in, cm3, require_extra
+from warpbrain.cases.building.label_fields import label_volumes, read_labels
 from warpbrain.cases.building.labels import LabelMesh, mesh_labels
-from warpbrain.cases.building.plausible import check_volume_in, cm3
-from warpbrain.cases.building.presets import Preset, preset
+from warpbrain.cases.building.node_sets import first_sets
 from warpbrain.cases.building.tissue_names import (
     OUTSIDE,
     RESECTION,
     VENTRICLE,
     Assignment,
+    Preset,
     assign,
     parse_names,
+    preset,
     usual_name,
 )
 from warpbrain.cases.case_template import case_text
@@ -44,19 +44,14 @@ class StartedCase:
 
     Attributes
     ----------
-    folder : Path
-    mesh : TetMesh
+    folder, mesh, quality
     tissues : dict of int to str
         Names by number.
-    quality : Quality
-    labelled : dict of int to float, or None
-        Volume [m3] of the labels of each tissue, if it was made from labels.
-    in_place : dict of int to float, or None
-        Share of the voxels of each tissue that lie in that tissue of the mesh.
-    cavity : float
-        Volume [m3] of the closed cavities of the mesh.
-    labelled_cavity : float
-        Volume [m3] of the labels of cavities.
+    labelled, in_place : dict of int to float, or None
+        Of what was made from labels, for each tissue: volume [m3] of its labels, and the share of its voxels that lie
+        in that tissue of the mesh.
+    cavity, labelled_cavity : float
+        Volume [m3] of the closed cavities of the mesh, and of the labels of cavities.
     notes : tuple of str
         What was mended, left out or not reached.
     """
@@ -88,21 +83,17 @@ def start_from_labels(
     Parameters
     ----------
     folder : Path
-        Must not be there yet, or be empty.
+        Must not be there yet, or be empty, unless mesh and `case.toml` that are in it may be overwritten.
     labels : Path
         See `read_labels`.
-    names : sequence of str
-        Arguments of `--tissue`, see `parse_names`.
-    others : str, optional
-        Name of every label that `names` leaves out.
+    names, others
+        Arguments of `--tissue`, see `parse_names`, and the name of every label that they leave out.
     size : float, optional
         Wanted mean edge [mm]; by default what gives about 5,000 nodes.
     progress : callable
         Called with one line of text whenever something is begun.
     program : str, optional
         Whose labels they are, see `preset`; `names` take precedence, and labels that the volume lacks are no mistake.
-    overwrite : bool
-        Whether mesh and `case.toml` of a case that is in the folder may be replaced.
 
     Raises
     ------
@@ -117,7 +108,7 @@ def start_from_labels(
     require_extra(("mmgpy", "nibabel", "scipy", "meshio"))
     progress(f"reading {labels}")
     image = read_labels(labels)
-    volumes = image.volumes()
+    volumes = label_volumes(image)
     chosen = parse_names(names, volumes)
     for label in sorted(usual.unsure.keys() & volumes.keys() - chosen.keys()):
         raise InputError(f"{labels}: label {label}: {usual.unsure[label]}: say which with --tissue {label}=NAME")
@@ -170,19 +161,13 @@ def start_from_mesh(
 
     Parameters
     ----------
-    folder : Path
-        Must not be there yet, or be empty.
-    file : Path
-        Any tetrahedral mesh that meshio reads; its tissues are those of `read_regions`, its node and element sets are
-        kept.
-    frame : Frame
-        Unit and axes of the file.
-    names : sequence of str
-        Arguments of `--tissue`: names of the labels of the mesh.
+    folder, names, overwrite
+        As of `start_from_labels`; the labels are those of the mesh.
+    file, frame
+        Any tetrahedral mesh that meshio reads, with its unit and axes; its tissues are those of `read_regions`, its
+        node and element sets are kept.
     array : str, optional
         Cell array of the labels, where several could be it.
-    overwrite : bool
-        Whether mesh and `case.toml` of a case that is in the folder may be replaced.
 
     Raises
     ------

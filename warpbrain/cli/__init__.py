@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from warpbrain import __version__
 from warpbrain.cli import cases, compare, completion, diagnose, doctor, ensemble, estimate, gp, run, view, warp
-from warpbrain.cli.grouped import GroupedParser
 from warpbrain.terminal.command import OneLineParser, exit_status
 from warpbrain.terminal.completing import complete
 from warpbrain.terminal.record import Record
@@ -21,6 +21,38 @@ _GROUPS = {
     "what goes in": {"cases": cases, "gp": gp},
     "this machine": {"doctor": doctor, "completion": completion},
 }
+
+
+class _GroupedParser(OneLineParser):
+    """A parser whose help lists its commands under titles.
+
+    Attributes
+    ----------
+    commands : argparse action
+        Of `add_subparsers`.
+    groups : mapping of str to sequence of str
+        Title and names of its commands, in their order.
+    """
+
+    commands: argparse._SubParsersAction[Any]
+    groups: Mapping[str, Sequence[str]]
+
+    def format_help(self) -> str:
+        """As `argparse` formats it, with a section for each group."""
+        formatter = self._get_formatter()
+        formatter.add_usage(self.usage, self._actions, self._mutually_exclusive_groups)
+        formatter.add_text(self.description)
+        by_name = {action.dest: action for action in self.commands._get_subactions()}
+        sections: dict[str, list[argparse.Action]] = {
+            title: [by_name[name] for name in names] for title, names in self.groups.items()
+        }
+        sections["options"] = [action for action in self._actions if action is not self.commands]
+        for title, actions in sections.items():
+            formatter.start_section(title)
+            formatter.add_arguments(actions)
+            formatter.end_section()
+        formatter.add_text(self.epilog)
+        return formatter.format_help()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,8 +68,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return exit_status(parser.prog, lambda: _call(options), options.record, debug)
 
 
-def _parser() -> GroupedParser:
-    parser = GroupedParser(
+def _parser() -> _GroupedParser:
+    parser = _GroupedParser(
         prog="warpbrain",
         description="Simulates the deformation of the brain, and says what it left out.",
         epilog="Begin with: warpbrain run --case 0529. More of a command: warpbrain COMMAND --help.",

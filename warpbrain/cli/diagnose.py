@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli import output, warp
+from warpbrain.cli import warp
+from warpbrain.cli.options import WARPED, add_results, add_to, note_case
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
@@ -23,9 +25,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "and shows the fit improve on data it was not fitted to. Writes "
         "report.html, diagnosis.json, map.vtu, state.vtu, points.csv, covariance.npz and explained/.",
     )
-    add = parser.add_argument
-    add("--case", required=True, metavar="NAME", help="0529, ... (see warpbrain cases), or the path of a case folder")
-    add("--tissue", choices=("single", "multi"), default="multi", help="one tissue, or grey and white (default)")
+    add = partial(add_to, parser)
+    add("--case", "--tissue")
     add(
         "--candidates",
         default="all",
@@ -33,8 +34,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="mechanisms to look for, joined by commas (default: all; their names: docs/mechanisms)",
     )
     add("--alpha", type=float, default=0.05, metavar="P", help="probability of a false alarm (default: 0.05)")
-    add("--seed", type=int, default=0, metavar="S", help="of all draws (default: 0)")
-    add("--no-discretisation", action="store_true", help="take the mesh for exact")
+    add("--seed", default=0, help="of all draws (default: 0)")
+    add("--no-discretisation")
     add(
         "--ablation",
         choices=("no-nuisances",),
@@ -42,9 +43,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "registration and mesh could explain",
     )
     add("--homogeneous", action="store_true", help="of a specimen: take its state for homogeneous whatever its grips")
-    add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
-    warp.add_arguments(parser)
-    output.add_arguments(parser, "warpbrain-diagnose-CASE")
+    add("--device", *WARPED)
+    add_results(parser, "warpbrain-diagnose-CASE")
     parser.set_defaults(call=_run)
 
 
@@ -81,27 +81,24 @@ def _run(options: argparse.Namespace) -> None:
     images = warp.asked_for(options)
     case = find_case(options.case, options.tissue)
     warp.check_place(images, case)
-    way = _of_a_body() if case.specimen is None else _of_a_specimen()
-    progress = Progress("diagnosis", options.quiet)
+    run, tables = _of_a_body() if case.specimen is None else _of_a_specimen()
 
     def on_stage(text: str) -> None:
         progress.clear()
         say(f"  {text}")
 
-    diagnosing = way.diagnosing(case, asked, device, Listener(on_stage, progress.show))
-    out = choose_folder(options.out, f"warpbrain-diagnose-{safe_name(case.name)}", options.overwrite)
-    output.note_case(record, case, device)
-    say(case.title)
-    try:
+    with Progress("diagnosis", options.quiet) as progress:
+        diagnosing = run(case, asked, device, Listener(on_stage, progress.show))
+        out = choose_folder(options.out, f"warpbrain-diagnose-{safe_name(case.name)}", options.overwrite)
+        note_case(record, case, device)
+        say(case.title)
         found = diagnosing.run()
-    finally:
-        progress.clear()
     said = describe(found, asked, device)
     say("", *diagnosis_lines(said), sep="\n")
     with results_in(out, record, options.overwrite):
-        for name, write in way.tables.items():
+        for name, write in tables.items():
             write(out / name, found)
-        record.files += ["report.html", "diagnosis.json", *way.tables]
+        record.files += ["report.html", "diagnosis.json", *tables]
         if found.explained is not None:
             write_explained(out / "explained", found.explained)
             record.files.append("explained")
@@ -111,14 +108,10 @@ def _run(options: argparse.Namespace) -> None:
         write_page(out / "report.html", found, said, state)
         if images is not None:
             record.files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
-        say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
 
 
-class _Way(NamedTuple):
-    """How cases of one kind are diagnosed, and what is written of it beside what all have."""
-
-    diagnosing: Callable[..., Any]
-    tables: dict[str, Callable[[Path, Any], None]]
+#: What diagnoses a case, and what is written of it beside what all cases have.
+_Way = tuple[Callable[..., Any], dict[str, Callable[[Path, Any], None]]]
 
 
 def _of_a_body() -> _Way:
@@ -126,18 +119,16 @@ def _of_a_body() -> _Way:
     from warpbrain.report.diagnosis.files import write_covariance, write_map, write_points
     from warpbrain.report.state_files import write_diagnosed_state
 
-    tables: dict[str, Callable[[Path, Any], None]]
-    tables = {
+    return Diagnosing, {
         "map.vtu": write_map,
         "state.vtu": write_diagnosed_state,
         "points.csv": write_points,
         "covariance.npz": write_covariance,
     }
-    return _Way(Diagnosing, tables)
 
 
 def _of_a_specimen() -> _Way:
     from warpbrain.report.diagnosis.files import write_curves
     from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 
-    return _Way(DiagnosingSpecimen, {"curves.csv": write_curves})
+    return DiagnosingSpecimen, {"curves.csv": write_curves}

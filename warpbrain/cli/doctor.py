@@ -33,9 +33,8 @@ def _doctor(options: argparse.Namespace) -> None:
 
     record: Record = options.record
     start_warp_quietly()
-    progress = Progress("self-test", options.json)
-    found = health(lambda device: progress.show(0.0, device))
-    progress.clear()
+    with Progress("self-test", options.json) as progress:
+        found = health(lambda device: progress.show(0.0, device))
     record.say(*([json.dumps(found, indent=1)] if options.json else health_lines(found)), sep="\n")
     failed = [test["device"] for test in found["self_test"] if test["problem"]]
     if failed:

@@ -7,10 +7,11 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli import output
+from warpbrain.cli.options import add_to, note_case, require_poisson, require_tolerance, require_whole
 from warpbrain.ensemble import SAMPLES
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
@@ -38,15 +39,9 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "writes samples.csv, fields.vtu, spread.png and summary.json. What a killed run has computed is kept: the same "
         "command goes on with what is missing.",
     )
-    add = parser.add_argument
-    add(
-        "--case",
-        required=True,
-        metavar="NAME",
-        help="synthetic (the phantom), 0529, ... (see warpbrain cases), or the path of a case folder",
-    )
-    add("--tissue", choices=("single", "multi"), default="multi", help="one tissue, or grey and white (default)")
-    add("--model", metavar="LAW", help="neo-hookean, mooney-rivlin or ogden for every tissue (default: the case's own)")
+    add = partial(add_to, parser)
+    add("--case", help="synthetic (the phantom), 0529, ... (see warpbrain cases), or the path of a case folder")
+    add("--tissue", "--model")
     chosen = parser.add_mutually_exclusive_group()
     chosen.add_argument(
         "--samples", type=int, metavar="N", help=f"draws 0 to N - 1 of the tissues' joint prior (default: {SAMPLES})"
@@ -56,25 +51,14 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         action="store_true",
         help="the paper's sweep instead: curves of -2 to 2 standard deviations, 17 for a tissue, 289 pairs for two",
     )
-    add("--seed", type=int, metavar="S", help="another sequence of draws (default: 0)")
-    add(
-        "--gp",
-        metavar="MODEL",
-        help="generative model: hierarchical (default), coregionalised (default of --grid) or a folder",
-    )
-    add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
+    add("--seed", help="another sequence of draws (default: 0)")
+    add("--gp", help="generative model: hierarchical (default), coregionalised (default of --grid) or a folder")
+    add("--poisson")
     motion = parser.add_mutually_exclusive_group()
-    motion.add_argument("--steps", type=int, metavar="N", help="follow the motion for N time steps of 1 ms")
-    motion.add_argument("--to-rest", action="store_true", help="follow the damped motion until it is at rest (default)")
-    add(
-        "--tolerance",
-        type=float,
-        default=1e-8,
-        metavar="TOL",
-        help="out-of-balance force at rest, relative to all nodal forces (default: 1e-8)",
-    )
-    add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
-    add("--precision", choices=("double", "single"), default="double", help="default: double")
+    add_to(motion, "--steps")
+    add_to(motion, "--to-rest", help="follow the damped motion until it is at rest (default)")
+    add("--tolerance", help="out-of-balance force at rest, relative to all nodal forces (default: 1e-8)")
+    add("--device", "--precision")
     add("--batch", default="auto", metavar="B", help="samples at a time on a device (default: auto, by its memory)")
     add("--processes", type=int, metavar="P", help="processes on the CPU (default: one for each processor)")
     add(
@@ -83,9 +67,9 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="spread over a Dask cluster, one worker a device: tcp://host:8786, or local[:N] for processes of this "
         "machine",
     )
-    add("--out", type=Path, metavar="DIR", help="folder for the results (default: warpbrain-ensemble-CASE-TISSUE)")
-    add("--overwrite", action="store_true", help="compute all anew, whatever is in that folder")
-    add("--quiet", action="store_true", help="print nothing but errors")
+    add("--out", help="folder for the results (default: warpbrain-ensemble-CASE-TISSUE)")
+    add("--overwrite", help="compute all anew, whatever is in that folder")
+    add("--quiet")
     parser.set_defaults(call=_ensemble)
 
 
@@ -95,6 +79,7 @@ def _ensemble(options: argparse.Namespace) -> None:
     say = record.say
 
     from warpbrain.atomic import safe_name
+    from warpbrain.ensemble.job import Job
     from warpbrain.ensemble.results import results_of
     from warpbrain.ensemble.run import chosen_workers
     from warpbrain.ensemble.store import Store, discard
@@ -110,7 +95,7 @@ def _ensemble(options: argparse.Namespace) -> None:
     case = _case(options)
     samples, chosen = _samples(options, case)
     model = model_of(case)
-    job = _job(options, model, samples)
+    job = Job(model, tuple(samples), steps=options.steps, tolerance=options.tolerance, precision=options.precision)
     described = tables.describe_case(case, model)
     course = "to rest" if options.steps is None else f"{options.steps} steps of 1 ms"
     say(described["title"])
@@ -130,17 +115,15 @@ def _ensemble(options: argparse.Namespace) -> None:
     processes = options.processes or processors()
     with chosen_workers(options.device, options.batch, processes, options.dask, start_warp_quietly) as workers:
         about = {"case": case.name, "samples": len(samples), "chosen": chosen, "course": course}
-        output.note_case(record, case, workers.name)
+        note_case(record, case, workers.name)
         store = Store(out, job, workers.kind, about)
         for name in store.damaged:
             say(f"  damaged   {name}: nothing of it is used")
         seconds, computed = _compute(job, store, workers, say, Progress("samples", options.quiet))
 
-    progress = Progress("summing up", options.quiet)
-    result = results_of(
-        case, model.mesh, samples, store.outcomes(), options.steps is None, lambda n: progress.show(n / len(samples))
-    )
-    progress.clear()
+    with Progress("summing up", options.quiet) as progress:
+        to_rest, outcomes = options.steps is None, store.outcomes()
+        result = results_of(case, model.mesh, samples, outcomes, to_rest, lambda n: progress.show(n / len(samples)))
     said = describe_ensemble(result)
     say("", *ensemble_lines(said), sep="\n")
     summary = {
@@ -157,7 +140,6 @@ def _ensemble(options: argparse.Namespace) -> None:
     }
     with results_in(out, record, options.overwrite):
         record.files += _write(out, result, summary, f"{course}: {chosen}", case.title, len(samples))
-        say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
     if result.fields is None:
         raise SolveError(f"no sample of {len(samples)} has an answer; the reasons are in {out / 'samples.csv'}")
 
@@ -183,14 +165,9 @@ def _write(
 
 def _check(options: argparse.Namespace) -> None:
     """Refuse bad numbers before anything heavy is imported; reads the size of a batch."""
-    for name, least in (("samples", 1), ("steps", 1), ("processes", 1), ("seed", 0)):
-        value = getattr(options, name)
-        if value is not None and value < least:
-            raise InputError(f"--{name} {value}: expected a whole number of at least {least}")
-    if options.poisson is not None and not -1.0 < options.poisson < 0.5:
-        raise InputError(f"--poisson {options.poisson:g}: expected a number in the open interval (-1, 0.5)")
-    if not 0.0 < options.tolerance < 1.0:
-        raise InputError(f"--tolerance {options.tolerance:g}: expected a number between 0 and 1")
+    require_whole(options, samples=1, steps=1, processes=1, seed=0)
+    require_poisson(options.poisson)
+    require_tolerance(options.tolerance)
     if options.grid and options.seed is not None:
         raise InputError(f"--seed {options.seed}: means nothing with --grid")
     if options.dask is not None and options.processes is not None:
@@ -228,9 +205,8 @@ def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str
     if options.grid:
         return chosen_samples(case, "grid", process=process), f"the paper's sweep by {by}"
     count, seed = options.samples or SAMPLES, options.seed or 0
-    progress = Progress("drawing", options.quiet)
-    samples = chosen_samples(case, count, seed, process, lambda n: progress.show(n / count))
-    progress.clear()
+    with Progress("drawing", options.quiet) as progress:
+        samples = chosen_samples(case, count, seed, process, lambda n: progress.show(n / count))
     return samples, f"draws 0 to {count - 1} of seed {seed} by {by}"
 
 
@@ -249,12 +225,6 @@ def _warn(model: Model, samples: list[Sample], options: argparse.Namespace, say:
             f"estimate it presses tissue to nothing{borne}. They may fail; percentiles are then of the rest "
             "(docs/ensembles.md)"
         )
-
-
-def _job(options: argparse.Namespace, model: Any, samples: list[Sample]) -> Job:
-    from warpbrain.ensemble.job import Job
-
-    return Job(model, tuple(samples), steps=options.steps, tolerance=options.tolerance, precision=options.precision)
 
 
 def _compute(
@@ -276,11 +246,9 @@ def _compute(
         left = (total - there - done) / rate
         progress.show((there + done) / total, f"{rate:.3g} a second, {_duration(left)} left")
 
-    try:
+    with progress:
         progress.show(there / total, "loading kernels; the first run on a machine compiles them")
         done = compute_missing(job, store, workers, on_done)
-    finally:
-        progress.clear()
     seconds = time.perf_counter() - start
     say(f"  computed  {done} samples in {_duration(seconds)}, {done / seconds:.3g} a second")
     return seconds, done

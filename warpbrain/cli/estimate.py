@@ -6,10 +6,12 @@ import argparse
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli import output, warp
+from warpbrain.cli import warp
+from warpbrain.cli.options import WARPED, add_results, add_to, note_case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -37,21 +39,15 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         description="Estimates the laws of a case's tissues from its recordings, and says how well they are known. "
         "Writes report.html, estimate.json, state.vtu, predictions and figures, or sweep.csv and its figure.",
     )
-    add = parser.add_argument
-    add("--case", required=True, metavar="NAME", help="0529, ... (see warpbrain cases), or the path of a case folder")
-    add("--tissue", choices=("single", "multi"), default="multi", help="one tissue, or grey and white (default)")
-    add("--model", metavar="LAW", help="neo-hookean, mooney-rivlin or ogden for every tissue (default: the case's own)")
+    add = partial(add_to, parser)
+    add("--case", "--tissue", "--model")
     add(
         "--method",
         choices=("posterior", "grid"),
         default="posterior",
         help="posterior (default), or the paper's sweep over 17 curves a tissue",
     )
-    add(
-        "--gp",
-        metavar="MODEL",
-        help="generative model: hierarchical (default), coregionalised (default of --method grid) or a folder",
-    )
+    add("--gp", help="generative model: hierarchical (default), coregionalised (default of --method grid) or a folder")
     add(
         "--registration",
         nargs=2,
@@ -67,7 +63,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         metavar="NU",
         help="inf: no point is a gross error; any other number: those that are are found (default: 4)",
     )
-    add("--no-discretisation", action="store_true", help="take the mesh for exact")
+    add("--no-discretisation")
     add(
         "--causes",
         action=argparse.BooleanOptionalAction,
@@ -75,10 +71,9 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         f"what may (default: on meshes of up to {_LARGEST} nodes)",
     )
     add("--samples", type=int, default=40, metavar="N", help="equilibria that check the posterior (default: 40)")
-    add("--seed", type=int, default=0, metavar="S", help="of these draws (default: 0)")
-    add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
-    warp.add_arguments(parser)
-    output.add_arguments(parser, "warpbrain-estimate-CASE-TISSUE")
+    add("--seed", default=0, help="of these draws (default: 0)")
+    add("--device", *WARPED)
+    add_results(parser, "warpbrain-estimate-CASE-TISSUE")
     parser.set_defaults(call=_run)
 
 
@@ -110,7 +105,7 @@ def _run(options: argparse.Namespace) -> None:
     # a sweep goes on where it was left, and draws the estimate that lies beside it
     allowed = ("estimate.json", "sweep.csv") if options.method == "grid" else ("sweep.csv",)
     out = choose_folder(options.out, usual, options.overwrite, allowed)
-    output.note_case(record, case, device)
+    note_case(record, case, device)
     say(case.title)
     if case.origin == "stand-in":
         say("  a stand-in, not a patient: what is estimated is the tissue of a model")
@@ -150,11 +145,7 @@ def _options(options: argparse.Namespace) -> EstimationOptions:
 
 
 def _estimate(
-    options: argparse.Namespace,
-    settings: EstimationOptions,
-    case: Case,
-    images: Asked | None,
-    out: Path,
+    options: argparse.Namespace, settings: EstimationOptions, case: Case, images: Asked | None, out: Path
 ) -> None:
     from warpbrain.estimation.estimate import Estimation, Listener
     from warpbrain.estimation.fit import GaussNewtonStep
@@ -170,7 +161,6 @@ def _estimate(
 
     record: Record = options.record
     say = record.say
-    progress = Progress("equilibria", options.quiet)
 
     def on_stage(text: str) -> None:
         progress.clear()
@@ -183,11 +173,9 @@ def _estimate(
         )
 
     model = find_model(options.gp or "hierarchical")
-    listener = Listener(on_stage, on_step, progress.show)
-    try:
+    with Progress("equilibria", options.quiet) as progress:
+        listener = Listener(on_stage, on_step, progress.show)
         posterior = Estimation(case, model, settings, options.device, listener).run()
-    finally:
-        progress.clear()
     averaged = where = None
     if options.causes or (options.causes is None and len(case.mesh.points) <= _LARGEST):
         averaged, where = _what_else(posterior, options.device, on_stage)
@@ -207,7 +195,6 @@ def _estimate(
         record.files += _illustrate(out, posterior, described, say)
         if images is not None:
             record.files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
-        say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
 
 
 def _illustrate(out: Path, posterior: Posterior, said: dict[str, Any], say: Callable[..., None]) -> list[str]:
@@ -277,7 +264,6 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
     say(f"sweep of {total} equilibria" + (f", {len(known)} of which are there already" if known else ""))
     if damaged:
         say(f"  damaged   {damaged} of the lines of {path.name}: nothing of them is used")
-    progress = Progress("sweep", options.quiet)
     points = dict(known)
 
     def on_point(point: SweepPoint) -> None:
@@ -286,13 +272,10 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
         write_sweep(path, header, points.values())
         progress.show(len(points) / total, ", ".join(f"k = {k:+.2f}" for k in point.k))
 
-    try:
+    with Progress("sweep", options.quiet) as progress:
         finished = sweep(case, model, VALUES, known, options.device, on_point)
-    finally:
-        progress.clear()
     say(*sweep_lines(finished), sep="\n")
     # beside an estimate, and of points that were there before
     with results_in(out, record, replace=False):
         write_sweep_picture(out / "sweep.png", finished, case.title, estimated)
         record.files += [TABLE, "sweep.png"]
-        say("", f"written to {out}: {TABLE}, sweep.png", sep="\n")

@@ -8,10 +8,21 @@ import textwrap
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli import output, warp
+from warpbrain.cli import warp
+from warpbrain.cli.options import (
+    WARPED,
+    add_results,
+    add_to,
+    note_case,
+    require_poisson,
+    require_positive,
+    require_tolerance,
+    require_whole,
+)
 from warpbrain.cli.run_progress import ending_lines, watching
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
@@ -38,26 +49,19 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         description="Simulates a case and writes result.vtu, summary.json, deformation.png, report.html and "
         "comparison.csv. Without --steps, --to-rest or --until it finds the static equilibrium.",
     )
-    add = parser.add_argument
-    add(
-        "--case",
-        required=True,
-        metavar="NAME",
-        help="0529, phantom, ... (see warpbrain cases), or the path of a case folder",
-    )
-    add("--tissue", choices=("single", "multi"), default="multi", help="one tissue, or grey and white (default)")
+    add = partial(add_to, parser)
+    add("--case", help="0529, phantom, ... (see warpbrain cases), or the path of a case folder")
+    add("--tissue")
     add(
         "--model",
-        metavar="LAW",
         help="neo-hookean, mooney-rivlin or ogden for every tissue, at the shear modulus that the case gives "
         "(default: the case's own law)",
     )
     add("--mu", nargs="+", metavar="PA", default=[], help="shear modulus [Pa] of every tissue, or LABEL=PA for one")
     add("--sample", type=int, metavar="N", help="draw number N (from 0) of the tissues' joint prior gives every law")
-    add("--seed", type=int, metavar="S", help="another sequence of draws for --sample (default: 0)")
+    add("--seed", help="another sequence of draws for --sample (default: 0)")
     add(
         "--gp",
-        metavar="MODEL",
         help='generative model of --sample and of mu = "prior": hierarchical (default), coregionalised or a folder',
     )
     add(
@@ -68,7 +72,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         metavar="MECHANISM",
         help="assume one more mechanism, such as gravity:level=60 (see docs/mechanisms); can be given several times",
     )
-    add("--poisson", type=float, metavar="NU", help="Poisson ratio of every tissue, in (-1, 0.5)")
+    add("--poisson")
     add(
         "--elements",
         choices=("tet4", "tet4-averaged", "tet10", "tet10-mixed"),
@@ -84,11 +88,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="estimate the error of the mesh: 'elements', what locks, at about twice the cost of the run, or 'size' "
         "(if nothing is said), with elements of half the size too, at ten times or more",
     )
-    add("--device", metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one, else cpu)")
-    add("--precision", choices=("double", "single"), default="double", help="default: double")
-    motion = parser.add_mutually_exclusive_group()
-    motion.add_argument("--steps", type=int, metavar="N", help="follow the motion for N time steps of 1 ms")
-    motion.add_argument("--to-rest", action="store_true", help="follow the damped motion until it is at rest")
+    add("--device", "--precision")
+    add_to(parser.add_mutually_exclusive_group(), "--steps", "--to-rest")
     add(
         "--until",
         type=float,
@@ -96,21 +97,15 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         help="follow slow change without inertia until then, in --steps steps that grow (default: 20): for drainage "
         "and viscoelasticity",
     )
-    add(
-        "--tolerance",
-        type=float,
-        default=1e-8,
-        metavar="TOL",
-        help="out-of-balance force at equilibrium, relative to all nodal forces (default: 1e-8)",
-    )
+    add("--tolerance", help="out-of-balance force at equilibrium, relative to all nodal forces (default: 1e-8)")
     add(
         "--legacy-rmse",
         action="store_true",
         help="print also what the paper's own code calls rmse, the root of the mean distance in sqrt(mm)",
     )
     add("--allow-unstable", action="store_true", help="accept a law that breaks the paper's stability conditions")
-    warp.add_arguments(parser)
-    output.add_arguments(parser, "warpbrain-CASE-TISSUE")
+    add(*WARPED)
+    add_results(parser, "warpbrain-CASE-TISSUE")
     parser.set_defaults(call=_run)
 
 
@@ -124,7 +119,6 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.report import summary as tables
     from warpbrain.report.comparison import comparison_lines, describe_comparisons, write_comparisons
     from warpbrain.report.files import write_result, write_summary
-    from warpbrain.report.fingerprints import fingerprints
     from warpbrain.report.mesh_error import mesh_error_lines
     from warpbrain.report.prior_text import describe_prior, prior_lines
     from warpbrain.simulation.courses import Course
@@ -159,13 +153,11 @@ def _run(options: argparse.Namespace) -> None:
     chosen = "--mesh-error elements is about them" if about_elements else running.chosen
     described = tables.describe_case(case, model, chosen)
     say(*tables.case_lines(described), *prior_lines(prior), sep="\n")
-    output.note_case(record, case, f"{system.device.name} ({system.device.alias}), {options.precision} precision")
-    say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
+    note_device(options, case, system)
 
-    loading = Progress("kernels", options.quiet)
-    loading.show(0.0, "the first run on a machine compiles them")
-    loaded = system.load_kernels()
-    loading.clear()
+    with Progress("kernels", options.quiet) as loading:
+        loading.show(0.0, "the first run on a machine compiles them")
+        loaded = system.load_kernels()
     with watching(options, say) as watched:
         done = running.run(watched)
     for line in ending_lines(done.followed.solution):
@@ -185,10 +177,7 @@ def _run(options: argparse.Namespace) -> None:
     say("", *tables.timing_lines(seconds, counts), sep="\n")
 
     summary = {
-        "case": described,
-        "inputs_sha256": fingerprints(case),
-        **({} if prior is None else {"prior": prior}),
-        "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
+        **head_of_summary(options, case, described, prior, system),
         "solution": outcome,
         "result": said,
         "recordings": compared,
@@ -208,44 +197,51 @@ def _run(options: argparse.Namespace) -> None:
         write_summary(out / "summary.json", summary)
         if asked is not None:
             record.files += warp.warp(out / "result.vtu", out, asked, say, options.quiet)
-        say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
+
+
+def note_device(options: argparse.Namespace, case: Case, system: System) -> None:
+    """Say in the log and in print where is computed."""
+    where = f"{system.device.name} ({system.device.alias}), {options.precision} precision"
+    note_case(options.record, case, where)
+    options.record.say(f"  device    {where}")
+
+
+def head_of_summary(
+    options: argparse.Namespace, case: Case, described: Mapping[str, Any], prior: dict[str, Any] | None, system: System
+) -> dict[str, Any]:
+    """How every summary of a run begins: what was computed, of which files, and where."""
+    from warpbrain.report.fingerprints import fingerprints
+
+    return {
+        "case": described,
+        "inputs_sha256": fingerprints(case),
+        **({} if prior is None else {"prior": prior}),
+        "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
+    }
 
 
 def _check(options: argparse.Namespace) -> None:
     """Refuse bad numbers before anything heavy is imported; reads the moduli."""
-    if options.steps is not None and options.steps < 1:
-        raise InputError(f"--steps {options.steps}: expected a whole number of at least 1")
-    if options.poisson is not None and not -1.0 < options.poisson < 0.5:
-        raise InputError(f"--poisson {options.poisson:g}: expected a number in the open interval (-1, 0.5)")
-    if not 0.0 < options.tolerance < 1.0:
-        raise InputError(f"--tolerance {options.tolerance:g}: expected a number between 0 and 1")
+    require_whole(options, steps=1)
+    require_poisson(options.poisson)
+    require_tolerance(options.tolerance)
     if options.mesh_error is not None and options.elements in ("tet10", "tet10-mixed"):
         raise InputError(f"--mesh-error: is not known of --elements {options.elements}: expected tet4 or tet4-averaged")
     if options.mesh_error == "elements" and options.elements == "tet4-averaged":
         raise InputError("--mesh-error elements: compares with tet4-averaged: --mesh-error size says what is left")
-    _check_until(options)
+    require_positive("until", options.until, "a positive number of seconds")
+    if options.until is not None and options.to_rest:
+        raise InputError(f"--until {options.until:g}: means nothing with --to-rest")
+    if options.until is not None and options.mesh_error is not None:
+        raise InputError(f"--until {options.until:g}: the error of the mesh is not estimated for slow change yet")
     options.moduli = parse_moduli(options.mu)
-    for name, value in (("--sample", options.sample), ("--seed", options.seed)):
-        if value is not None and value < 0:
-            raise InputError(f"{name} {value}: expected a whole number of at least 0")
+    require_whole(options, sample=0, seed=0)
     if options.sample is not None and options.mu:
         raise InputError(
             f"--sample {options.sample}: gives every law; --mu {' '.join(options.mu)} means nothing with it"
         )
     if options.sample is None and options.seed is not None:
         raise InputError(f"--seed {options.seed}: means nothing without --sample")
-
-
-def _check_until(options: argparse.Namespace) -> None:
-    """Refuse a time that is none, or that nothing can be followed to."""
-    if options.until is None:
-        return
-    if not (math.isfinite(options.until) and options.until > 0.0):
-        raise InputError(f"--until {options.until:g}: expected a positive number of seconds")
-    if options.to_rest:
-        raise InputError(f"--until {options.until:g}: means nothing with --to-rest")
-    if options.mesh_error is not None:
-        raise InputError(f"--until {options.until:g}: the error of the mesh is not estimated for slow change yet")
 
 
 def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
@@ -340,25 +336,23 @@ def _mesh_error(
     from warpbrain.report.mesh_error import describe_mesh_error
     from warpbrain.simulation.mesh_error import mesh_error, observe_without
 
-    progress = Progress("mesh error", options.quiet)
-    elements = system.model.elements
+    smaller = options.mesh_error == "size"
     try:
-        found = mesh_error(
-            case,
-            system.model,
-            result,
-            smaller=options.mesh_error == "size",
-            steps=options.steps,
-            device=options.device,
-            on_share=progress.show,
-        )
+        with Progress("mesh error", options.quiet) as progress:
+            found = mesh_error(
+                case,
+                system.model,
+                result,
+                smaller=smaller,
+                steps=options.steps,
+                device=options.device,
+                on_share=progress.show,
+            )
     except SolveError as error:
         # the run itself is sound
         return None, {"unknown": str(error)}
-    finally:
-        progress.clear()
     without = observe_without(case, result, found, outcome.get("time_s"))
-    return found, describe_mesh_error(found, elements, observed, without)
+    return found, describe_mesh_error(found, system.model.elements, observed, without)
 
 
 def _illustrate(

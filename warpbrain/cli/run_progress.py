@@ -17,28 +17,70 @@ if TYPE_CHECKING:
 
 #: Newton iterations that are printed one by one.
 _LONG_HISTORY = 16
-
-Say = Callable[..., None]
+_INDENT = 12 * " "
 
 
 @contextmanager
-def watching(options: argparse.Namespace, say: Say) -> Iterator[Watching]:
+def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[Watching]:
     """Who is told of the steps, after the head of their table is printed."""
-    make: Callable[[argparse.Namespace, Say, Progress], Watching]
+    from warpbrain.simulation.courses import Watching
+
     if options.until is not None:
-        name, head, make = "slow change", "slow change     time [s]   Newton    CG   min J   largest [mm]", _slow
+        name, columns = "slow change", "     time [s]   Newton    CG   min J   largest [mm]"
     elif options.steps is not None:
-        name, head, make = "motion", "motion        time [ms]     CG   min J   kinetic energy [mJ]", _motion
+        name, columns = "motion", "        time [ms]     CG   min J   kinetic energy [mJ]"
     elif options.to_rest:
-        name, head, make = "to rest", "to rest        time [s]  step [s]   residual    CG   min J", _relaxation
+        name, columns = "to rest", "        time [s]  step [s]   residual    CG   min J"
     else:
-        name, head, make = "equilibrium", "equilibrium   load   Newton   residual    CG   step   min J", _newton
-    say("", head, sep="\n")
-    progress = Progress(name, options.quiet)
-    try:
-        yield make(options, say, progress)
-    finally:
+        name, columns = "equilibrium", "   load   Newton   residual    CG   step   min J"
+    say("", name + columns, sep="\n")
+    count = 0
+
+    def on_newton(step: NewtonStep) -> None:
+        nonlocal count
+        count += 1
+        # a long history is told by its load steps, not by every iteration
+        if count <= _LONG_HISTORY or step.iteration == 1:
+            row(
+                f"{100 * step.load:>5.1f} % {step.iteration:>6}   {step.residual:>8.1e} "
+                f"{step.cg_iterations:>5}  {step.step:>5.3g}   {step.min_J:>5.3f}"
+                + ("   indefinite tangent" if step.indefinite else "")
+            )
+        if count == _LONG_HISTORY:
+            say(_INDENT + "(from here on, the first iteration of each load step)")
+        progress.show(step.load, f"Newton {step.iteration}")
+
+    def on_relaxation(step: RelaxationStep) -> None:
+        row(
+            f"{step.time:>11.3g} {step.time_step:>9.3g}   {step.residual:>8.1e} {step.cg_iterations:>5}   "
+            f"{step.min_J:>5.3f}"
+        )
+        decades = math.log10(max(step.residual, 1e-300)) / math.log10(options.tolerance)
+        progress.show(min(1.0, max(0.0, decades)), f"{step.time:.3g} s")
+
+    def on_motion(number: int, time: float, noted: dict[str, Any] | None) -> None:
+        if noted is not None:
+            energy = f"{1000 * noted['kinetic_J']:.4g}"
+            row(f"{1000 * time:>11.4g} {noted['cg_iterations']:>6}   {noted['min_J']:>5.3f}   {energy}")
+        progress.show(number / options.steps, f"{1000 * time:.0f} ms")
+
+    def on_moment(number: int, moments: int, noted: dict[str, Any]) -> None:
+        if number % max(1, moments // 10) == 0 or number == moments:
+            row(
+                f"{noted['time_s']:>12.4g} {noted['newton_iterations']:>8} {noted['cg_iterations']:>5}"
+                f"   {noted['min_J']:>5.3f}   {noted['largest_displacement_mm']:>9.3f}"
+            )
+        progress.show(number / moments, f"{noted['time_s']:.3g} s")
+
+    def on_slow_newton(part: float, step: NewtonStep) -> None:
+        progress.show(part, f"Newton {step.iteration}")
+
+    def row(text: str) -> None:
         progress.clear()
+        say(_INDENT + text)
+
+    with Progress(name, options.quiet) as progress:
+        yield Watching(on_newton, on_relaxation, on_motion, on_slow_newton, on_moment)
 
 
 def ending_lines(solution: Mapping[str, Any]) -> list[str]:
@@ -58,74 +100,3 @@ def ending_lines(solution: Mapping[str, Any]) -> list[str]:
             "equilibrium than the one that a slowly growing load reaches first"
         )
     return lines
-
-
-def _newton(_options: argparse.Namespace, say: Say, progress: Progress) -> Watching:
-    from warpbrain.simulation.courses import Watching
-
-    count = 0
-
-    def on_step(step: NewtonStep) -> None:
-        nonlocal count
-        count += 1
-        # a long history is told by its load steps, not by every iteration
-        if count <= _LONG_HISTORY or step.iteration == 1:
-            progress.clear()
-            say(
-                f"            {100 * step.load:>5.1f} % {step.iteration:>6}   {step.residual:>8.1e} "
-                f"{step.cg_iterations:>5}  {step.step:>5.3g}   {step.min_J:>5.3f}"
-                + ("   indefinite tangent" if step.indefinite else "")
-            )
-        if count == _LONG_HISTORY:
-            say("            (from here on, the first iteration of each load step)")
-        progress.show(step.load, f"Newton {step.iteration}")
-
-    return Watching(newton=on_step)
-
-
-def _relaxation(options: argparse.Namespace, say: Say, progress: Progress) -> Watching:
-    from warpbrain.simulation.courses import Watching
-
-    def on_step(step: RelaxationStep) -> None:
-        progress.clear()
-        say(
-            f"            {step.time:>11.3g} {step.time_step:>9.3g}   {step.residual:>8.1e} {step.cg_iterations:>5}"
-            f"   {step.min_J:>5.3f}"
-        )
-        decades = math.log10(max(step.residual, 1e-300)) / math.log10(options.tolerance)
-        progress.show(min(1.0, max(0.0, decades)), f"{step.time:.3g} s")
-
-    return Watching(relaxation=on_step)
-
-
-def _motion(options: argparse.Namespace, say: Say, progress: Progress) -> Watching:
-    from warpbrain.simulation.courses import Watching
-
-    def on_step(number: int, time: float, noted: dict[str, Any] | None) -> None:
-        if noted is not None:
-            progress.clear()
-            say(
-                f"            {1000 * time:>11.4g} {noted['cg_iterations']:>6}   {noted['min_J']:>5.3f}"
-                f"   {1000 * noted['kinetic_J']:.4g}"
-            )
-        progress.show(number / options.steps, f"{1000 * time:.0f} ms")
-
-    return Watching(motion=on_step)
-
-
-def _slow(_options: argparse.Namespace, say: Say, progress: Progress) -> Watching:
-    from warpbrain.simulation.courses import Watching
-
-    def on_moment(number: int, count: int, noted: dict[str, Any]) -> None:
-        if number % max(1, count // 10) == 0 or number == count:
-            progress.clear()
-            say(
-                f"            {noted['time_s']:>12.4g} {noted['newton_iterations']:>8} {noted['cg_iterations']:>5}"
-                f"   {noted['min_J']:>5.3f}   {noted['largest_displacement_mm']:>9.3f}"
-            )
-        progress.show(number / count, f"{noted['time_s']:.3g} s")
-
-    def on_newton(part: float, step: NewtonStep) -> None:
-        progress.show(part, f"Newton {step.iteration}")
-
-    return Watching(slow=on_moment, slow_newton=on_newton)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli import output
+from warpbrain.cli.run import head_of_summary, note_device
 from warpbrain.errors import InputError
 from warpbrain.terminal.progress import Progress
 
@@ -16,32 +16,13 @@ if TYPE_CHECKING:
 
 
 def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any] | None = None) -> None:
-    """Simulate every test of a case.
-
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Of `warpbrain run`, checked.
-    case : Case
-        With a specimen, as the options change it.
-    out : Path
-        Folder for the results.
-    prior : dict, optional
-        What is to be said of laws that the generative model gave.
-
-    Raises
-    ------
-    InputError
-        If the options ask for motion, nothing was tested, or a test is not possible.
-    SolveError
-        If a state of a test is not found.
-    """
+    """Simulate every test of a case with a specimen, as the options of `warpbrain run` change it; `prior` is what is to
+    be said of laws that the generative model gave."""
     _check(options, case)
 
     from warpbrain.report import specimen_text as text
     from warpbrain.report.comparison import describe_comparisons
     from warpbrain.report.files import write_summary
-    from warpbrain.report.fingerprints import fingerprints
     from warpbrain.report.prior_text import prior_lines
     from warpbrain.report.specimen_page import write_specimen_page
     from warpbrain.report.specimen_picture import write_tests_picture
@@ -58,15 +39,11 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     in_time = any(rig.follows_time(recording) for recording in running.tests)
     described = text.describe_specimen(case, rig.specimen, system.model, in_time, rig.chosen)
     say(*text.specimen_lines(described), *prior_lines(prior), sep="\n")
-    output.note_case(record, case, f"{system.device.name} ({system.device.alias}), {options.precision} precision")
-    say(f"  device    {system.device.name} ({system.device.alias}), {options.precision} precision")
+    note_device(options, case, system)
 
     seconds = {"pre-processing": system.seconds, "loading kernels": system.load_kernels()}
-    progress = Progress("tests", options.quiet)
-    try:
+    with Progress("tests", options.quiet) as progress:
         done = running.run(progress.show).tests
-    finally:
-        progress.clear()
     seconds |= rig.solver.clock.seconds
     say("", *text.tested_lines(done), sep="\n")
     say("", *timing_lines(seconds, rig.solver.clock.counts), sep="\n")
@@ -78,10 +55,7 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
         f"nu = {material.poisson:g}; {acting}"
     )
     summary = {
-        "case": described,
-        "inputs_sha256": fingerprints(case),
-        **({} if prior is None else {"prior": prior}),
-        "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
+        **head_of_summary(options, case, described, prior, system),
         "solution": {"kind": "tests", "tolerance": rig.solver.tolerance, "tests": text.describe_tests(done)},
         "recordings": describe_comparisons(Observed(tuple(test.comparison for test in done), ())),
         "seconds_by_phase": seconds,
@@ -94,7 +68,6 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
         write_summary(out / "summary.json", summary)
         write_specimen_page(out / "report.html", summary, done)
         record.files += ["summary.json", "comparison.csv", "tests.png", "report.html"]
-        say("", f"written to {out}: {', '.join(record.files)}", sep="\n")
 
 
 def _check(options: argparse.Namespace, case: Case) -> None:

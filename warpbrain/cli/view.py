@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from warpbrain.cli.options import add_to
 from warpbrain.errors import InputError
 
 
@@ -19,13 +21,8 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         description="Opens the deformed body of a result in a window: drag to turn it, wheel to zoom, a slider for how "
         "far it moves, q to close. Without a display, --html FILE writes it as a page for any browser.",
     )
-    add = parser.add_argument
-    add(
-        "result",
-        type=Path,
-        metavar="RESULT",
-        help="folder that run, estimate, diagnose or ensemble has written, or its .vtu file",
-    )
+    add = partial(add_to, parser)
+    add("result")
     add("--html", type=Path, metavar="FILE", help="write one file that any browser shows without a network instead")
     add("--exaggeration", type=float, metavar="N", help="draw motion N times as large (default: so that it is seen)")
     parser.set_defaults(call=_run)

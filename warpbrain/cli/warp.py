@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from warpbrain.cli.options import WARPED, add_to
 from warpbrain.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,33 +27,12 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
         "image and labels, moved points, displacement_sd.nii.gz and trust.nii.gz where the result knows them, and a "
         "script that loads all of it in 3D Slicer (see docs/images.md).",
     )
-    parser.add_argument(
-        "result",
-        type=Path,
-        metavar="RESULT",
-        help="folder that run, estimate, diagnose or ensemble has written, or its .vtu file",
-    )
-    add_arguments(parser)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the files (default: that of the result)")
-    parser.add_argument("--overwrite", action="store_true", help="replace what was warped by this result before")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    add = partial(add_to, parser)
+    add("result", *WARPED)
+    add("--out", help="folder for the files (default: that of the result)")
+    add("--overwrite", help="replace what was warped by this result before")
+    add("--quiet")
     parser.set_defaults(call=_run)
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what is to be warped, for commands that make a result."""
-    parser.add_argument(
-        "--image", type=Path, metavar="FILE", help="image to warp, on whose grid all is written: .nii.gz, .nrrd, .mgz"
-    )
-    parser.add_argument("--labels", type=Path, metavar="FILE", help="label volume to warp")
-    parser.add_argument(
-        "--points",
-        type=Path,
-        nargs="+",
-        metavar="FILE",
-        default=[],
-        help="points to move: .mrk.json and .fcsv of 3D Slicer, BIDS electrodes.tsv",
-    )
 
 
 def asked_for(options: argparse.Namespace) -> Asked | None:
@@ -85,11 +66,8 @@ def _write(state: SavedState, out: Path, asked: Asked, say: Callable[..., None],
     from warpbrain.report.warped import write_warped
     from warpbrain.terminal.progress import Progress
 
-    progress = Progress("warping", quiet)
-    try:
+    with Progress("warping", quiet) as progress:
         lines, files = write_warped(out, state, asked, progress.show)
-    finally:
-        progress.clear()
     say("", *lines, sep="\n")
     return files
 
@@ -115,4 +93,3 @@ def _run(options: argparse.Namespace) -> None:
     # beside the result and what else was made of it
     with results_in(out, record, replace=False):
         record.files += _write(state, out, asked, record.say, options.quiet)
-        record.say("", f"written to {out}: {', '.join(record.files)}", sep="\n")

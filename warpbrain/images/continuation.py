@@ -8,11 +8,8 @@ front of a plane it is `exp(-distance / length)` of what is there, in a narrow g
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats
-
-Singles = NDArray[np.float32]
+from warpbrain.arrays import Bools, Floats, Singles
 
 #: Over which the continued displacement falls to 1/e [mm]. A choice and no measurement: shorter than the largest
 #: displacements that there are, about 10 to 20 mm, the map would fold where tissue moves outwards.
@@ -26,23 +23,8 @@ _COARSEST = 12
 
 
 def continued(values: Singles, known: Bools, voxel: Floats, length: float = LENGTH) -> Singles:
-    """Continue a field beyond where it is known.
-
-    Parameters
-    ----------
-    values : (i, j, k, c) array
-    known : (i, j, k) bool array
-        Where they are given.
-    voxel : (3,) array
-        Edges of a voxel [mm].
-    length : float
-        See `LENGTH` [mm].
-
-    Returns
-    -------
-    (i, j, k, c) float32 array
-        The values where known, and the continuation elsewhere.
-    """
+    """Continue values (i, j, k, c) beyond where they are known (i, j, k), on voxels with edges (3,) [mm]; what is known
+    stays as it is."""
     start = np.where(known[..., None], values, np.float32(0.0)).astype(np.float32)
     return _solved(start, known, np.asarray(voxel, dtype=np.float64), length, _ITERATIONS)
 

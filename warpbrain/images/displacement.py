@@ -1,4 +1,4 @@
-"""Displacement fields on grids: of a mesh's state, and their inverse."""
+"""Displacement fields on grids: of a mesh's state, their inverse, and images as these deform them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.arrays import Bools, Floats, Ints, Singles
 from warpbrain.images.continuation import continued
 from warpbrain.images.grid import MILLIMETRES, Grid
 from warpbrain.images.inside import VoxelsInside
-
-Singles = NDArray[np.float32]
 
 #: Error of the inverse at a voxel's centre [mm] that is small enough, and iterations after which it stays as it is.
 _TOLERANCE, _ITERATIONS = 1e-3, 60
@@ -90,16 +88,8 @@ class Inverse:
 
 
 def displacement_field(inside: VoxelsInside, u: Floats, middles: Floats | None = None) -> DisplacementField:
-    """The displacement of a body on a grid, continued outside (see `continued`).
-
-    Parameters
-    ----------
-    inside : VoxelsInside
-    u : (n, 3) array
-        At the nodes [m].
-    middles : (m, 6, 3) array, optional
-        At the midside nodes of each tetrahedron [m]; see `VoxelsInside.interpolate`.
-    """
+    """The displacement [m] of a body, at nodes (n, 3) and perhaps at the midside nodes (m, 6, 3) of each tetrahedron,
+    on a grid, continued outside (see `continued`)."""
     values = MILLIMETRES * inside.interpolate(u, middles)
     return DisplacementField(inside.grid, continued(inside.image(values), inside.mask, inside.grid.voxel))
 
@@ -108,13 +98,8 @@ def inverse(field: DisplacementField, tissue: Bools) -> Inverse:
     """Invert a displacement field by fixed-point iteration.
 
     The inverse `v` of `u` has `v(x) = -u(x + v(x))`, which is iterated from `-u(x)`. It contracts where no strain is
-    above one; where a step makes the error larger the step is halved.
-
-    Parameters
-    ----------
-    field : DisplacementField
-    tissue : (i, j, k) bool array
-        Where there is tissue before it is moved: what the error is told of.
+    above one; where a step makes the error larger the step is halved. The error is told of `tissue` (i, j, k), where
+    there is some before it is moved.
     """
     grid = field.grid
     vectors = -field.vectors.reshape(-1, 3)
@@ -178,3 +163,52 @@ def _errors(field: DisplacementField, back: DisplacementField, tissue: Bools) ->
         return np.zeros(1)
     left = leads[inside] + field.at_indices(origins[inside])
     return np.asarray(np.linalg.norm(left, axis=1))
+
+
+#: Slices that are worked on at a time, to bound the memory.
+_SLICES = 16
+
+
+def resampled(
+    values: NDArray[np.generic], grid: Grid, back: DisplacementField, *, nearest: bool
+) -> NDArray[np.generic]:
+    """Values of an image on a grid (i, j, k), at `x + back(x)` for each voxel `x` of the field's own grid.
+
+    `back` leads from where things are after to where they were before, as `inverse` makes
+    it. `nearest` takes the nearest voxel, as labels need it; else values are interpolated linearly. They keep their
+    type: whole numbers are rounded. They are zero where there was no image, and not a number where most of what is
+    interpolated was none: it does not spread.
+    """
+    from scipy.ndimage import map_coordinates
+
+    after = back.grid
+    moved = np.zeros(after.shape, dtype=values.dtype)
+    # single precision only where it holds every value
+    single = np.result_type(values.dtype, np.float32) == np.float32
+    source = values if nearest else values.astype(np.float32 if single else np.float64)
+    known: Singles | None = None
+    if not nearest and values.dtype.kind == "f" and not np.isfinite(source).all():
+        known = np.isfinite(source).astype(np.float32)
+        source = np.where(known > 0, source, 0)
+    last = np.array(grid.shape) - 1
+    for first in range(0, after.shape[0], _SLICES):
+        part = slice(first, min(first + _SLICES, after.shape[0]))
+        axes = [np.arange(part.start, part.stop), np.arange(after.shape[1]), np.arange(after.shape[2])]
+        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        was: Floats = after.positions(places) + back.vectors[part].reshape(-1, 3)
+        at = grid.indices(was)
+        inside = ((at >= -0.5) & (at <= last + 0.5)).all(axis=1)
+        at = np.clip(at, 0, last)
+        if nearest:
+            index = np.floor(at + 0.5).astype(np.int64)
+            sampled = source[tuple(np.minimum(index, last).T)]
+        else:
+            sampled = map_coordinates(source, at.T, order=1, mode="nearest")
+            if known is not None:
+                share = map_coordinates(known, at.T, order=1, mode="nearest")
+                sampled = np.where(share >= 0.5, sampled / np.maximum(share, 0.5), np.nan)
+            if np.issubdtype(values.dtype, np.integer):
+                sampled = np.rint(sampled)
+        shape = (part.stop - part.start, *after.shape[1:])
+        moved[part] = np.where(inside, sampled, 0).astype(values.dtype).reshape(shape)
+    return moved

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats
 from warpbrain.mesh import TetMesh
 
 #: Millimetres of one metre.
@@ -64,6 +65,11 @@ class Grid:
         return np.asarray(np.linalg.norm(self.affine[:3, :3], axis=0))
 
     @property
+    def voxel_volume(self) -> float:
+        """Volume of a voxel [mm3]."""
+        return float(abs(np.linalg.det(self.affine[:3, :3])))
+
+    @property
     def is_skew(self) -> bool:
         """Whether its axes are not at right angles: ITK has no such images."""
         axes = self.affine[:3, :3] / self.voxel
@@ -87,7 +93,15 @@ class Grid:
         """Vectors (n, 3) [mm, RAS] in voxels along the grid's axes."""
         return np.asarray(vectors, dtype=np.float64) @ np.linalg.inv(self.affine[:3, :3]).T
 
-    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+    def sampled(self, values: NDArray[Any], points: Floats) -> Floats:
+        """Values (n,) of a field (i, j, k) on this grid at positions (n, 3) [mm, RAS], linear between voxels."""
+        from scipy.ndimage import map_coordinates
+
+        back = np.linalg.inv(self.affine)
+        at = back[:3, :3] @ points.T + back[:3, 3:]
+        return np.asarray(map_coordinates(values, at, order=1, mode="nearest", output=np.float64))
+
+    def contains(self, points: ArrayLike) -> Bools:
         """Which positions (n, 3) [mm, RAS] are in a voxel: (n,) bool."""
         at = self.indices(points)
         return np.asarray(((at >= -0.5) & (at <= np.array(self.shape) - 0.5)).all(axis=-1))

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats, Ints, Singles
 from warpbrain.images.grid import MILLIMETRES, Grid
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.quadratic import quadratic_interpolant
-
-Indices = NDArray[np.int64]
 
 #: How far outside a tetrahedron a voxel's centre is still inside, as a weight: rounding puts one that lies on a common
 #: face outside both of its tetrahedra.
@@ -41,38 +39,26 @@ class VoxelsInside:
 
     grid: Grid
     mesh: TetMesh
-    voxels: Indices
-    elements: Indices
+    voxels: Ints
+    elements: Ints
     weights: Floats
 
     @property
-    def mask(self) -> NDArray[np.bool_]:
+    def mask(self) -> Bools:
         """True for voxels inside, an array of the grid's shape."""
         mask = np.zeros(self.grid.count, dtype=bool)
         mask[self.voxels] = True
         return mask.reshape(self.grid.shape)
 
     def interpolate(self, values: Floats, middles: Floats | None = None) -> Floats:
-        """A field of the mesh at these voxels.
-
-        Parameters
-        ----------
-        values : (n, c) array
-            At the nodes.
-        middles : (m, 6, c) array, optional
-            In the middle of the edges of each tetrahedron, in the order of `warpbrain.mesh.quality.EDGES`: those of
-            quadratic elements. Without them the field is linear in each tetrahedron.
-
-        Returns
-        -------
-        (k, c) array
-        """
+        """A field of the mesh at these voxels (k, c), given at the nodes (n, c) and for quadratic elements in the
+        middle of the edges of each tetrahedron (m, 6, c), in the order of `warpbrain.mesh.quality.EDGES`."""
         corners = self.mesh.tetrahedra[self.elements]
         if middles is None:
             return np.asarray(np.einsum("ka,kac->kc", self.weights, values[corners]))
         return quadratic_interpolant(self.weights, values[corners], middles[self.elements])
 
-    def image(self, values: NDArray[Any]) -> NDArray[np.float32]:
+    def image(self, values: NDArray[Any]) -> Singles:
         """Real or whole values (k, ...) of these voxels as an image, zero elsewhere."""
         image = np.zeros((self.grid.count, *values.shape[1:]), dtype=np.float32)
         image[self.voxels] = values
@@ -92,7 +78,7 @@ def voxels_inside(mesh: TetMesh, grid: Grid) -> VoxelsInside:
     return VoxelsInside(grid, mesh, voxels, elements, weights)
 
 
-def _batches(corners: Floats, gradients: Floats, shape: Indices) -> Iterator[tuple[Indices, Indices, Floats]]:
+def _batches(corners: Floats, gradients: Floats, shape: Ints) -> Iterator[tuple[Ints, Ints, Floats]]:
     """Voxels in the boxes around tetrahedra (m, 4, 3) that are in these, a batch of tetrahedra at a time."""
     low = np.maximum(np.ceil(corners.min(axis=1) - _WEIGHT), 0).astype(np.int64)
     high = np.minimum(np.floor(corners.max(axis=1) + _WEIGHT), shape - 1).astype(np.int64)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -93,45 +94,29 @@ def read_point_file(path: Path) -> PointFile:
         Naming the file, what was found and what was expected.
     """
     problems = Problems()
+    moved_text: Callable[[Floats], str]
     if is_electrodes(path):
         electrodes = read_electrodes(path, problems)
         problems.stop()
         assert electrodes is not None
-        return PointFile(
-            path,
-            electrodes.names,
-            MILLIMETRES * electrodes.points,
-            lambda points: electrodes.moved_text(points / MILLIMETRES),
-            tuple(problems.remarks),
-        )
-    if not is_markup(path):
+        labels, points, moved_text = electrodes.names, electrodes.points, electrodes.moved_text
+    elif is_markup(path):
+        markup = read_markup(path, problems)
+        problems.stop()
+        assert markup is not None
+        labels, points = markup.labels, markup.points
+        moved_text = partial(moved_markup, path, path.read_text(encoding="utf-8-sig"))
+    else:
         raise InputError(f"{path}: found ending '{path.suffix}', expected .mrk.json, .fcsv or a BIDS electrodes.tsv")
-    markup = read_markup(path, problems)
-    problems.stop()
-    assert markup is not None
-    text = path.read_text(encoding="utf-8-sig")
-    return PointFile(
-        path,
-        markup.labels,
-        MILLIMETRES * markup.points,
-        lambda points: moved_markup(path, text, points / MILLIMETRES),
-        tuple(problems.remarks),
-    )
+    remarks = tuple(problems.remarks)
+    return PointFile(path, labels, MILLIMETRES * points, lambda after: moved_text(after / MILLIMETRES), remarks)
 
 
 def move_points(
     file: PointFile, mesh: TetMesh, u: Floats, middles: Floats | None, field: DisplacementField
 ) -> MovedPoints:
-    """Move points along: inside the mesh as its elements do, outside as the field that continues it.
-
-    Parameters
-    ----------
-    file : PointFile
-    mesh : TetMesh
-    u, middles
-        Displacement [m], as of `warpbrain.images.displacement.displacement_field`.
-    field : DisplacementField
-    """
+    """Move points along: inside the mesh as its elements do (`u` and `middles` as of `displacement_field`), outside as
+    the field that continues it."""
     points = file.points / MILLIMETRES
     place = locate(mesh.points, mesh.tetrahedra, points)
     displacement = MILLIMETRES * place.interpolate(u)

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Singles
 from warpbrain.atomic import whole_file
 from warpbrain.frame import AXES
-from warpbrain.images.displacement import DisplacementField, Singles
+from warpbrain.images.displacement import DisplacementField
 from warpbrain.images.grid import Grid
 
 #: NIfTI's codes of vectors that are displacements, in the axes of the header (RAS), and of vectors that are none of its

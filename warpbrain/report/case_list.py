@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from warpbrain.cases.catalogue import Entry
+from warpbrain.cases.shipped import Entry
 
 _ROW = "{:<14} {:<7} {:<10} {:>7} {:>9} {:>9}   {}"
 

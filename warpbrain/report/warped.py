@@ -11,13 +11,11 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.images.continuation import LENGTH
-from warpbrain.images.displacement import DisplacementField, Inverse, displacement_field, inverse
+from warpbrain.images.displacement import DisplacementField, Inverse, displacement_field, inverse, resampled
 from warpbrain.images.grid import Grid
 from warpbrain.images.inside import VoxelsInside, voxels_inside
-from warpbrain.images.labels import labels_of
 from warpbrain.images.moving_points import MovedPoints, PointFile, move_points, read_point_file, write_moved
-from warpbrain.images.reading import Image, read_image, require
-from warpbrain.images.resampling import resampled
+from warpbrain.images.reading import Image, labels_of, read_image, require
 from warpbrain.images.writing import write_displacement, write_transform, write_volume
 from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from warpbrain.errors import InputError, SolveError
-from warpbrain.terminal.claim import release
 from warpbrain.terminal.crash import SOFTWARE, where, write_report
 from warpbrain.terminal.interrupt import clear_up, leave_compiler, stop_promptly
 from warpbrain.terminal.quiet import reason_of
 from warpbrain.terminal.record import Record
+from warpbrain.terminal.result_folder import release
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -26,22 +26,11 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 def exit_status(program: str, call: Callable[[], None], record: Record | None = None, debug: bool = False) -> int:
-    """Run a command.
+    """Run a command: 0 done, 1 no answer found or no place to write it, 2 bad input, 70 a defect, 130 interrupted, 141
+    nobody reads the output.
 
-    Parameters
-    ----------
-    program : str
-    call : callable
-    record : Record, optional
-        Of the command: what it was asked for and what it said last stand in the report of a defect.
-    debug : bool
-        Show the traceback of whatever went wrong.
-
-    Returns
-    -------
-    int
-        0 done, 1 no answer found or no place to write it, 2 bad input, 70 a defect, 130 interrupted, 141 nobody reads
-        the output.
+    What the record was asked for and said last stand in the report of a defect; `debug` shows the traceback of whatever
+    went wrong.
     """
     try:
         with stop_promptly():

@@ -22,22 +22,8 @@ _PACKAGES = ("warp-lang", "numpy", "scipy", "meshio", "h5py", "matplotlib", "nib
 
 
 def write_report(error: BaseException, arguments: Sequence[str], doing: str) -> Path | None:
-    """Write what happened to the working folder, or where it cannot be written to that for temporary files.
-
-    Parameters
-    ----------
-    error : BaseException
-        Not one of ours.
-    arguments : sequence of str
-        Of the command line.
-    doing : str
-        What was said last of what is done.
-
-    Returns
-    -------
-    Path or None
-        None if it can be written nowhere.
-    """
+    """Write what happened to the working folder, or where it cannot be written to that for temporary files; None if it
+    can be written nowhere. `doing` is what was said last of what is done."""
     text = report_of(error, arguments, doing)
     name = f"warpbrain-crash-{datetime.now(UTC):%Y%m%d-%H%M%S}-{os.getpid()}.txt"
     for folder in (Path.cwd, lambda: Path(tempfile.gettempdir())):

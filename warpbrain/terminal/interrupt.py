@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from warpbrain.atomic import remove_unfinished
-from warpbrain.terminal.claim import release
+from warpbrain.terminal.result_folder import release
 
 #: Seconds that Python is given to stop by itself.
 _GRACE = 0.6

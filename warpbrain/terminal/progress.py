@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import sys
 import time
+from types import TracebackType
+from typing import Self
 
 #: Seconds between two lines where there is no terminal: what is done sooner is not worth one.
 EVERY = 30.0
 
 
 class Progress:
-    """Shows how far long work has come."""
+    """Shows how far long work has come; as a context it takes its bar away at the end, however that comes."""
 
     def __init__(self, label: str, quiet: bool = False) -> None:
         self._label = label
         self._quiet = quiet
         self._bar = not quiet and sys.stderr.isatty()
         self._said = time.monotonic()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.clear()
 
     def show(self, fraction: float, note: str = "") -> None:
         """Draw the bar at a fraction in [0, 1]."""

@@ -18,15 +18,7 @@ LOG = "warpbrain.log"
 
 
 class Record:
-    """Prints lines, and keeps them with what was asked for.
-
-    Parameters
-    ----------
-    arguments : sequence of str
-        Of the command line, from the command on.
-    quiet : bool
-        Print nothing; the log has the lines all the same.
-    """
+    """Prints lines, unless it is quiet, and keeps them with the arguments of the command line."""
 
     def __init__(self, arguments: Sequence[str] = (), quiet: bool = False) -> None:
         self.arguments = tuple(arguments)
@@ -71,16 +63,8 @@ class Record:
             yield
 
     def write(self, folder: Path, ending: str, replace: bool = True) -> None:
-        """Write the log, whole.
-
-        Parameters
-        ----------
-        folder : Path
-        ending : str
-            "done", or why the command ended before it was.
-        replace : bool
-            Whether it takes the place of the log that is there, or is written after it.
-        """
+        """Write the log, whole, in the place of the one that is there or after it; `ending` is "done", or why the
+        command ended before it was."""
         head = {
             "command": shlex.join(["warpbrain", *self.arguments]),
             "in": str(Path.cwd()),

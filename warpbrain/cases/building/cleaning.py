@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.building.errors import BuildError
-from warpbrain.cases.building.optimising import open_angles
-from warpbrain.cases.building.remeshing import Cells, remesh
+from warpbrain.cases.building.mmg import Cells, remesh
 from warpbrain.mesh import boundary_faces, pinched_nodes, split_boundary
-from warpbrain.mesh.quality import components, measure_arrays
+from warpbrain.mesh.quality import components, dihedral_angles, measure_arrays
+from warpbrain.mesh.surface import FACES, face_vectors, interface_faces, paired_faces
 from warpbrain.mesh.tet_mesh import signed_volumes
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 # pieces of a tissue smaller than this [mm3, template] go to their neighbour
 SMALLEST_PIECE = 2000.0
@@ -27,7 +25,7 @@ WANTED_DIHEDRAL = 22.0
 
 
 def small_pieces(
-    points: Floats, tetrahedra: Integers, region: Bools, keep_largest: bool = False, smallest: float = SMALLEST_PIECE
+    points: Floats, tetrahedra: Ints, region: Bools, keep_largest: bool = False, smallest: float = SMALLEST_PIECE
 ) -> Bools:
     """The tetrahedra of a region (m,) in its face-connected pieces smaller than `smallest` [mm3]: (m,) bool.
 
@@ -44,7 +42,7 @@ def small_pieces(
     return result
 
 
-def opened_out(tetrahedra: Integers, inside: Bools) -> Bools:
+def opened_out(tetrahedra: Ints, inside: Bools) -> Bools:
     """Fill around the nodes where the surface touches itself, until it does so nowhere: (m,) bool."""
     for _ in range(20):
         touching = pinched_nodes(boundary_faces(tetrahedra[inside]))
@@ -55,7 +53,7 @@ def opened_out(tetrahedra: Integers, inside: Bools) -> Bools:
 
 
 def first_pass(cells: Cells, edge: float = FIRST_EDGE) -> Cells:
-    """Take out the needles that the cutting left; `edge` is the largest one [mm]."""
+    """Take out the needles that the cutting left, with a largest edge [mm]."""
     made = remesh(cells, edge)
     if made is None:
         raise BuildError("MMG could not mesh the cut lattice")
@@ -63,16 +61,8 @@ def first_pass(cells: Cells, edge: float = FIRST_EDGE) -> Cells:
 
 
 def finished(cells: Cells, cavities: int | None = 1, easier: float = 0.0) -> Cells | None:
-    """Open the sharp angles; None if the mesh is not good enough to ship.
-
-    Parameters
-    ----------
-    cells : Cells
-    cavities : int or None
-        How many closed surfaces inside there must be; None: any number.
-    easier : float
-        How much lower [degrees] the bars for the angles are.
-    """
+    """Open the sharp angles; None if the mesh is not good enough to ship, with bars that are `easier` by some degrees
+    and a number of closed surfaces inside (None: any)."""
     better = open_angles(cells, WANTED_DIHEDRAL)
     quality = measure_arrays(better.points * 1e-3, better.tetrahedra.astype(np.int32), better.labels.astype(np.int32))
     sound = (
@@ -84,3 +74,120 @@ def finished(cells: Cells, cavities: int | None = 1, easier: float = 0.0) -> Cel
         and len(pinched_nodes(boundary_faces(better.tetrahedra))) == 0
     )
     return better if sound else None
+
+
+def crumbs_given_away(points: Floats, tetrahedra: Ints, labels: Ints, smallest: float) -> Ints:
+    """Labels (m,) without face-connected pieces of one label below a volume [mm3], of a mesh in one piece [mm]: these
+    have the label of the larger piece with which they share the most area, starting with those that touch one."""
+    labels = labels.copy()
+    volumes = signed_volumes(points, tetrahedra)
+    pairs, _ = paired_faces(tetrahedra)
+    owner = pairs // 4
+    triangles = tetrahedra[owner[:, :1], FACES[pairs[:, 0] % 4]]
+    area = np.linalg.norm(face_vectors(points, triangles), axis=1)
+    while True:
+        piece = components(tetrahedra, labels)
+        volume = np.bincount(piece, weights=volumes)
+        small = volume < smallest
+        side = piece[owner]
+        # faces between a small piece and one that stays, the small one first
+        side, weight = np.concatenate([side, side[:, ::-1]]), np.concatenate([area, area])
+        at = small[side[:, 0]] & ~small[side[:, 1]]
+        if not at.any():
+            return labels
+        label_of = np.zeros(len(volume), dtype=np.int64)
+        label_of[piece] = labels
+        touched, shared = np.unique(np.stack([side[at, 0], label_of[side[at, 1]]], axis=1), axis=0, return_inverse=True)
+        total = np.bincount(shared.ravel(), weights=weight[at])
+        # the last of each piece in this order has the most area
+        for number in np.argsort(total, kind="stable"):
+            label_of[touched[number, 0]] = touched[number, 1]
+        labels = label_of[piece]
+
+
+SWEEPS = 12
+# steps tried, as shares of the mean length of the edges at the node
+STEPS = (0.3, 0.15, 0.07, 0.03)
+# how far from its surface [share of that length] a boundary or interface node may end, so that surfaces stay smooth
+LIFT = 0.1
+
+
+def open_angles(cells: Cells, wanted: float) -> Cells:
+    """Improve every tetrahedron whose smallest dihedral angle is below a bar [degrees], as far as its nodes allow:
+    worst first, one node after the other.
+
+    A move is made only if the smallest angle of all tetrahedra around the node grows, so no tetrahedron can turn over.
+    Nodes on surfaces move along them.
+    """
+    points = cells.points.copy()
+    tets = cells.tetrahedra
+    owners = _stars(tets, len(points))
+    normals = _normals(cells)
+    lifted = np.zeros(len(points))
+    for _ in range(SWEEPS):
+        worst = dihedral_angles(points, tets).min(axis=1)
+        bad = np.flatnonzero(worst < wanted)
+        nodes = dict.fromkeys(tets[bad[np.argsort(worst[bad], kind="stable")]].ravel().tolist())
+        moved = sum(_improve(int(node), points, tets[owners[node]], normals[node], lifted) for node in nodes)
+        if not moved:
+            break
+    return Cells(points, tets, cells.labels)
+
+
+def _stars(tets: Ints, count: int) -> list[Ints]:
+    order = np.argsort(tets.ravel(), kind="stable")
+    ends = np.cumsum(np.bincount(tets.ravel(), minlength=count))
+    return np.split(order // 4, ends[:-1])
+
+
+def _normals(cells: Cells) -> list[Floats]:
+    """Directions each node must not move in: none inside, the normal of its surface, two where surfaces meet."""
+    rows: list[list[Floats]] = [[] for _ in cells.points]
+    for faces in (
+        boundary_faces(cells.tetrahedra),
+        interface_faces(cells.tetrahedra, cells.labels % 10),
+        interface_faces(cells.tetrahedra, cells.labels // 10),
+    ):
+        total = np.zeros_like(cells.points)
+        np.add.at(total, faces.ravel(), np.repeat(face_vectors(cells.points, faces), 3, axis=0))
+        for node in np.unique(faces):
+            length = np.linalg.norm(total[node])
+            if length > 0:
+                rows[node].append(total[node] / length)
+    return [np.array(normal).reshape(-1, 3) for normal in rows]
+
+
+_CORNERS = np.array([ijk for ijk in product((-1.0, 0.0, 1.0), repeat=3) if any(ijk)])
+_DIRECTIONS = _CORNERS / np.linalg.norm(_CORNERS, axis=1, keepdims=True)
+
+
+def _improve(node: int, points: Floats, star: Ints, normals: Floats, lifted: Floats) -> bool:
+    """Move one node to the best of the positions tried; true if it moved."""
+    start = points[node].copy()
+    around = points[np.unique(star[star != node])]
+    length = float(np.linalg.norm(around - start, axis=1).mean())
+    free = _DIRECTIONS
+    if len(normals):
+        basis = np.linalg.svd(normals, full_matrices=True)[2]
+        tangent = basis[np.linalg.matrix_rank(normals, tol=0.2) :]
+        free = _DIRECTIONS @ (tangent.T @ tangent)
+    candidates = start + length * np.concatenate([step * free for step in STEPS])
+    if len(normals):
+        # off the surface by no more than the lift, over all sweeps together
+        room = max(LIFT * length - lifted[node], 0.0)
+        candidates = np.concatenate([candidates, start + room * np.concatenate([_DIRECTIONS, 0.4 * _DIRECTIONS])])
+    corners = np.repeat(points[star][None], len(candidates) + 1, axis=0)
+    corners[1:][:, star == node] = candidates[:, None]
+    flat = corners.reshape(-1, 4, 3)
+    cell = np.arange(len(flat) * 4).reshape(-1, 4)
+    angles = dihedral_angles(flat.reshape(-1, 3), cell).min(axis=1)
+    a, b, c = (flat[:, i] - flat[:, 0] for i in (1, 2, 3))
+    angles[np.einsum("ij,ij->i", np.cross(a, b), c) <= 0] = -1
+    score = angles.reshape(len(candidates) + 1, -1).min(axis=1)
+    best = int(score.argmax())
+    if score[best] <= score[0] + 1e-3:
+        return False
+    points[node] = candidates[best - 1]
+    if len(normals):
+        lifted[node] += float(np.abs(normals @ (points[node] - start)).max())
+    return True

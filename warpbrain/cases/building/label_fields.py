@@ -1,21 +1,132 @@
-"""Smooth fields whose zero levels are the surfaces of a segmentation.
+"""From labels to smooth fields whose zero levels are the surfaces of a segmentation.
 
-The indicator of each region is smoothed to what elements of the wanted size can show. Smoothing alone would shrink
-whatever is curved or thin, so levels and weights are set such that every region keeps the volume that its labels have.
+Labels become regions that can be meshed: cropped, in one piece, without voids. The indicator of each region is smoothed
+to what elements of the wanted size can show. Smoothing alone would shrink whatever is curved or thin, so levels and
+weights are set such that every region keeps the volume that its labels have.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.cases.building.label_regions import CAVITY, Regions
+from warpbrain.arrays import Bools, Ints, Singles
+from warpbrain.cases.building.errors import check_volume
+from warpbrain.cases.building.tissue_names import Assignment
+from warpbrain.errors import InputError
+from warpbrain.images.grid import Grid
+from warpbrain.images.reading import Image, labels_of, read_image
 
-Floats = NDArray[np.float64]
-Field = NDArray[np.float32]
-Bools = NDArray[np.bool_]
+Codes = NDArray[np.uint8]
+
+OUTSIDE = 0
+#: Tissues are 1, 2, ... in the order of the assignment.
+CAVITY = 255
+
+
+def read_labels(path: Path) -> Image:
+    """Read a label volume of any format of `read_image`; `InputError` says what is wrong with it."""
+    image = read_image(path)
+    labels = labels_of(image)
+    if not labels.any():
+        raise InputError(f"{path}: all {labels.size} voxels are 0: there is nothing to mesh")
+    return replace(image, values=labels)
+
+
+def label_volumes(image: Image) -> dict[int, float]:
+    """Volume of each label but the background [mm3], in the order of the labels."""
+    values, counts = np.unique(image.values, return_counts=True)
+    pairs = zip(values.tolist(), counts.tolist(), strict=True)
+    return {label: count * image.grid.voxel_volume for label, count in pairs if label != 0}
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """What every voxel is.
+
+    Attributes
+    ----------
+    codes : (i, j, k) uint8 array
+        `OUTSIDE`, a tissue from 1 on, or `CAVITY`; the voxels at the edge of the grid are outside.
+    grid : Grid
+    tissues : int
+        How many there are.
+    labelled : dict of int to float
+        Volume [mm3] that the user's labels give to each tissue and to `CAVITY`, before anything was mended.
+    notes : tuple of str
+        What was mended.
+    """
+
+    codes: Codes
+    grid: Grid
+    tissues: int
+    labelled: dict[int, float]
+    notes: tuple[str, ...]
+
+
+def make_regions(image: Image, assignment: Assignment) -> Regions:
+    """Sort the voxels of a volume into tissues, cavities and outside.
+
+    Pieces apart from the largest are left out, and unlabelled voids inside get the nearest label: both are noted.
+
+    Raises
+    ------
+    InputError
+        If the volume is none that a brain can have.
+    """
+    from scipy import ndimage
+
+    codes, grid = _cropped(image, assignment)
+    unit = image.grid.voxel_volume
+    counts = np.bincount(codes.ravel(), minlength=256)
+    labelled = {int(code): float(counts[code]) * unit for code in np.flatnonzero(counts) if code != OUTSIDE}
+    check_volume(f"{image.path}: what is labelled", sum(labelled.values()) * 1e-9)
+    notes = []
+    piece, count = ndimage.label(codes != OUTSIDE)
+    if count > 1:
+        sizes = np.bincount(piece.ravel())[1:]
+        dropped = int(sizes.sum() - sizes.max())
+        notes.append(
+            f"the labels are {count} pieces that do not touch: the largest is meshed, {dropped * unit / 1000:.3g} cm3 "
+            f"({100 * dropped / sizes.sum():.2g} %) are left out"
+        )
+        codes[piece != 1 + sizes.argmax()] = OUTSIDE
+    inside = codes != OUTSIDE
+    void = ndimage.binary_fill_holes(inside) & ~inside
+    if void.any():
+        nearest = ndimage.distance_transform_edt(
+            ~inside, sampling=image.grid.voxel, return_distances=False, return_indices=True
+        )
+        codes[void] = codes[tuple(nearest[:, void])]
+        notes.append(
+            f"{ndimage.label(void)[1]} unlabelled voids inside ({np.count_nonzero(void) * unit / 1000:.3g} cm3) are "
+            "filled with the nearest label"
+        )
+    return Regions(codes, grid, len(assignment.tissues), labelled, tuple(notes))
+
+
+def _cropped(image: Image, assignment: Assignment) -> tuple[Codes, Grid]:
+    """Codes of the smallest box that holds everything labelled and a voxel around it, and the grid of that box."""
+    code = {number: 1 + at for at, number in enumerate(assignment.tissues)}
+    codes_of = {label: code[number] for label, number in assignment.number.items()}
+    codes_of |= dict.fromkeys(assignment.cavity, CAVITY)
+    used = np.isin(image.values, list(codes_of))
+    box = []
+    for axis in range(3):
+        along = np.flatnonzero(used.any(axis=tuple(a for a in range(3) if a != axis)))
+        box.append(slice(int(along[0]), int(along[-1]) + 1))
+    labels = image.values[tuple(box)]
+    codes = np.zeros(labels.shape, dtype=np.uint8)
+    for label, value in codes_of.items():
+        codes[labels == label] = value
+    affine = image.grid.affine.copy()
+    affine[:3, 3] += affine[:3, :3] @ np.array([side.start - 1 for side in box])
+    i, j, k = (n + 2 for n in labels.shape)
+    return np.pad(codes, 1), Grid((i, j, k), affine)
+
 
 # standard deviation of the smoothing: share of the element size, and at least this many voxels along each axis of the
 # image, without which slices would show as steps
@@ -40,49 +151,35 @@ class LabelFields:
         Positive inside the body with its cavities, and inside the cavities.
     tissues : list of (i, j, k) float32 arrays
         Presence of each tissue, favours included: the largest one rules.
-    affine : (4, 4) array
-        From grid numbers to positions [mm, RAS].
+    grid : Grid
     in_place : dict of int to float
         Share of the voxels of each tissue, and of `CAVITY`, that the fields give to it.
     """
 
-    body: Field
-    cavity: Field
-    tissues: list[Field]
-    affine: Floats
+    body: Singles
+    cavity: Singles
+    tissues: list[Singles]
+    grid: Grid
     in_place: dict[int, float]
-
-    def sample(self, field: Field, points: Floats) -> Floats:
-        """Values (n,) of a field at points (n, 3) [mm, RAS], trilinear."""
-        from scipy.ndimage import map_coordinates
-
-        back = np.linalg.inv(self.affine)
-        at = back[:3, :3] @ points.T + back[:3, 3:]
-        return np.asarray(map_coordinates(field, at, order=1, mode="nearest", output=np.float64))
-
-    def box(self) -> tuple[Floats, Floats]:
-        """Corners (3,) and (3,) [mm, RAS] of a box along the world's axes around the body."""
-        grid = np.argwhere(self.body > 0)
-        world = grid @ self.affine[:3, :3].T + self.affine[:3, 3]
-        return world.min(axis=0), world.max(axis=0)
 
 
 def make_fields(regions: Regions, size: float) -> LabelFields:
     """Fields for elements of a size [mm]."""
-    blocks = np.maximum(np.floor(FINEST * size / regions.voxel), 1).astype(int)
-    splits = np.maximum(np.ceil(regions.voxel / (COARSEST * size)), 1).astype(int)
+    voxel = regions.grid.voxel
+    blocks = np.maximum(np.floor(FINEST * size / voxel), 1).astype(int)
+    splits = np.maximum(np.ceil(voxel / (COARSEST * size)), 1).astype(int)
     # grid steps in voxels of the image
     step = blocks / splits
-    sigma = np.maximum(SMOOTHING * size / regions.voxel, FEWEST_VOXELS) / step
+    sigma = np.maximum(SMOOTHING * size / voxel, FEWEST_VOXELS) / step
     margin = np.ceil(4 * sigma).astype(int) + 1
-    affine = regions.affine.copy()
+    affine = regions.grid.affine.copy()
     affine[:3, 3] += affine[:3, :3] @ ((step - 1) / 2 - step * margin)
     affine[:3, :3] *= step
 
-    def shares(code: int) -> Field:
+    def shares(code: int) -> Singles:
         return np.pad(_resampled(regions.codes == code, blocks, splits), [(m, m) for m in margin])
 
-    def smooth(share: Field) -> Field:
+    def smooth(share: Singles) -> Singles:
         from scipy.ndimage import gaussian_filter
 
         return np.asarray(gaussian_filter(share, sigma, truncate=4.0))
@@ -112,10 +209,10 @@ def make_fields(regions: Regions, size: float) -> LabelFields:
         ruled = inside & (cavity > 0) if code == CAVITY else tissue & (ruling == code - 1)
         if (total := float(share.sum(dtype=np.float64))) > 0:
             in_place[code] = float(share[ruled].sum(dtype=np.float64)) / total
-    return LabelFields(body, cavity, tissues, affine, in_place)
+    return LabelFields(body, cavity, tissues, Grid(body.shape, affine), in_place)
 
 
-def _resampled(region: Bools, blocks: NDArray[np.int64], splits: NDArray[np.int64]) -> Field:
+def _resampled(region: Bools, blocks: Ints, splits: Ints) -> Singles:
     """Share of a region in blocks of voxels, or in parts of voxels, along each axis."""
     for axis, parts in enumerate(splits.tolist()):
         region = np.repeat(region, parts, axis=axis)
@@ -126,7 +223,7 @@ def _resampled(region: Bools, blocks: NDArray[np.int64], splits: NDArray[np.int6
     return np.asarray(region, dtype=np.float32)
 
 
-def _levelled(field: Field, where: Bools, count: float) -> Field:
+def _levelled(field: Singles, where: Bools, count: float) -> Singles:
     """The field less the level that `count` of the grid points `where` exceed, if it is near one half."""
     values = field[where]
     rank = len(values) - min(max(round(count), 1), len(values))
@@ -136,16 +233,9 @@ def _levelled(field: Field, where: Bools, count: float) -> Field:
     return np.asarray(field - np.float32(level))
 
 
-def _balanced(tissues: list[Field], volumes: list[float]) -> list[float]:
-    """Weights with which each tissue rules as much of the points as it should, as far as `FAVOUR` allows.
-
-    Parameters
-    ----------
-    tissues : list of (n,) float32 arrays
-        Presence of each tissue at the points.
-    volumes : list of float
-        Wanted numbers of points, up to a common factor.
-    """
+def _balanced(tissues: list[Singles], volumes: list[float]) -> list[float]:
+    """Weights with which each tissue, present at points (n,), rules as many of them as its volume asks for, as far as
+    `FAVOUR` allows."""
     weights = np.ones(len(tissues))
     wanted = np.array(volumes) / sum(volumes) * len(tissues[0])
     for _ in range(BALANCING):

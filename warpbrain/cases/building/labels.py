@@ -7,24 +7,17 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.cases.building.cleaning import finished, opened_out, small_pieces
-from warpbrain.cases.building.crumbs import crumbs_given_away
-from warpbrain.cases.building.cutting import compact, cut
+from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.cases.building.cleaning import crumbs_given_away, finished, opened_out, small_pieces
 from warpbrain.cases.building.errors import BuildError
-from warpbrain.cases.building.label_fields import LabelFields, make_fields
-from warpbrain.cases.building.label_image import LabelImage
-from warpbrain.cases.building.label_regions import CAVITY, make_regions
-from warpbrain.cases.building.lattice import bcc_lattice
-from warpbrain.cases.building.remeshing import Cells, remesh
+from warpbrain.cases.building.label_fields import CAVITY, LabelFields, make_fields, make_regions
+from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
+from warpbrain.cases.building.mmg import Cells, remesh
 from warpbrain.cases.building.tissue_names import Assignment
+from warpbrain.images.reading import Image
 from warpbrain.mesh.quality import EDGES
 from warpbrain.mesh.tet_mesh import signed_volumes
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 # nodes of a mesh whose size is not given: about what the shipped cases have
 NODES = 5000
@@ -59,17 +52,12 @@ class LabelMesh:
 
     Attributes
     ----------
-    points : (n, 3) array
-        [mm, RAS]
-    tetrahedra : (m, 4) int64 array
-    tissue : (m,) int64 array
-        Numbers of the assignment.
+    points, tetrahedra, tissue : (n, 3), (m, 4) and (m,) arrays
+        [mm, RAS]; tissues have the numbers of the assignment.
     size : float
         Wanted mean edge [mm].
-    labelled : dict of int to float
-        Volume [mm3] of the labels of each tissue.
-    labelled_cavity : float
-        The same of the cavities.
+    labelled, labelled_cavity
+        Volume [mm3] of the labels of each tissue, by number, and of the cavities.
     in_place : dict of int to float
         Share of the voxels of each tissue that lie in that tissue of the mesh, before the cutting.
     fields : LabelFields
@@ -78,8 +66,8 @@ class LabelMesh:
     """
 
     points: Floats
-    tetrahedra: Integers
-    tissue: Integers
+    tetrahedra: Ints
+    tissue: Ints
     size: float
     labelled: dict[int, float]
     labelled_cavity: float
@@ -90,35 +78,22 @@ class LabelMesh:
     def opens(self, centres: Floats, normals: Floats) -> Bools:
         """Whether outer faces, of centres (b, 3) [mm] and outward normals (b, 3), are walls of a cavity that opens."""
         beyond = centres + BEYOND * self.size * normals
-        cavity, body = (self.fields.sample(field, beyond) for field in (self.fields.cavity, self.fields.body))
+        cavity, body = (self.fields.grid.sampled(field, beyond) for field in (self.fields.cavity, self.fields.body))
         return (cavity > 0) & (body > 0)
 
 
 def mesh_labels(
-    image: LabelImage,
+    image: Image,
     assignment: Assignment,
     size: float | None = None,
     progress: Callable[[str], None] = lambda line: None,
 ) -> LabelMesh:
-    """Mesh a segmentation.
+    """Mesh a segmentation with a wanted mean edge [mm], by default one that gives about 5,000 nodes.
 
-    Parameters
-    ----------
-    image : LabelImage
-    assignment : Assignment
-        What each label is.
-    size : float, optional
-        Wanted mean edge [mm]; by default what gives about 5,000 nodes.
-    progress : callable
-        Called with one line of text whenever something is begun.
-
-    Raises
-    ------
-    InputError
-        If the labels cannot be those of a brain, the size does not suit them, or no good mesh is found.
+    `InputError` if the labels cannot be those of a brain, the size does not suit them, or no good mesh is found.
     """
     regions = make_regions(image, assignment)
-    tissue_volume = regions.voxel_volume * float(((regions.codes != 0) & (regions.codes != CAVITY)).sum())
+    tissue_volume = regions.grid.voxel_volume * float(((regions.codes != 0) & (regions.codes != CAVITY)).sum())
     if tissue_volume == 0:
         raise BuildError(f"{image.path}: no tissue is left in the largest piece of the labels")
     chosen = _size_of(tissue_volume, NODES) if size is None else size
@@ -176,14 +151,16 @@ def _without_needles(fields: LabelFields, assignment: Assignment, size: float) -
 def _discretised(fields: LabelFields, assignment: Assignment, size: float, spacing: float, notes: list[str]) -> Cells:
     """The lattice cut along every surface; labels are 1, 2, ... in the order of the assignment."""
     crumb = CRUMB * size**3
-    lower, upper = fields.box()
+    sampled = fields.grid.sampled
+    body_voxels = fields.grid.positions(np.argwhere(fields.body > 0))
+    lower, upper = body_voxels.min(axis=0), body_voxels.max(axis=0)
     points, tetrahedra = bcc_lattice(lower - 1.5 * spacing, upper + 1.5 * spacing, spacing)
     # its least value is that of the far outside
-    near = fields.sample(fields.body, points) > 0.8 * float(fields.body.min())
+    near = sampled(fields.body, points) > 0.8 * float(fields.body.min())
     points, tetrahedra = compact(points, tetrahedra[near[tetrahedra].any(axis=1)])
     labels = np.zeros(len(tetrahedra), dtype=np.int64)
 
-    points, tetrahedra, labels, body = cut(points, tetrahedra, labels, partial(fields.sample, fields.body))
+    points, tetrahedra, labels, body = cut(points, tetrahedra, labels, partial(sampled, fields.body))
     pockets = small_pieces(points, tetrahedra, ~body, keep_largest=True)
     if (filled := float(signed_volumes(points, tetrahedra[pockets]).sum())) > crumb / 2:
         notes.append(f"clefts narrower than an element close: {filled / 1000:.3g} cm3 of outside become tissue")
@@ -192,7 +169,7 @@ def _discretised(fields: LabelFields, assignment: Assignment, size: float, spaci
     body = opened_out(tetrahedra, body)
     tetrahedra, labels = tetrahedra[body], labels[body]
 
-    points, tetrahedra, labels, fluid = cut(points, tetrahedra, labels, partial(fields.sample, fields.cavity))
+    points, tetrahedra, labels, fluid = cut(points, tetrahedra, labels, partial(sampled, fields.cavity))
     fluid &= ~small_pieces(points, tetrahedra, fluid, smallest=crumb)
     tissue = _in_one_piece(points, tetrahedra, ~fluid, notes, "pieces of tissue that float in a cavity")
     tissue = opened_out(tetrahedra, tissue)
@@ -201,7 +178,7 @@ def _discretised(fields: LabelFields, assignment: Assignment, size: float, spaci
     for code in range(1, len(fields.tissues)):
         rest = np.max(fields.tissues[code:], axis=0)
         ahead = fields.tissues[code - 1] - rest
-        points, tetrahedra, labels, first = cut(points, tetrahedra, labels, partial(fields.sample, ahead))
+        points, tetrahedra, labels, first = cut(points, tetrahedra, labels, partial(sampled, ahead))
         labels[first & (labels == 0)] = code
     labels[labels == 0] = len(fields.tissues)
     labels = crumbs_given_away(points, tetrahedra, labels, crumb)
@@ -214,7 +191,7 @@ def _discretised(fields: LabelFields, assignment: Assignment, size: float, spaci
     return Cells(*compact(points, tetrahedra), labels)
 
 
-def _in_one_piece(points: Floats, tetrahedra: Integers, region: Bools, notes: list[str], what: str) -> Bools:
+def _in_one_piece(points: Floats, tetrahedra: Ints, region: Bools, notes: list[str], what: str) -> Bools:
     """The largest piece of a region; what is dropped is noted if it can be seen."""
     dropped = small_pieces(points, tetrahedra, region, keep_largest=True)
     lost = float(signed_volumes(points, tetrahedra[dropped]).sum())

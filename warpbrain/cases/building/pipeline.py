@@ -7,24 +7,22 @@ import os
 import platform
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from warpbrain.arrays import Floats, Singles
 from warpbrain.atomic import whole_file
-from warpbrain.cases.building.anatomy import Anatomy, template_anatomy
 from warpbrain.cases.building.cleaning import finished, first_pass, opened_out, small_pieces
-from warpbrain.cases.building.cutting import compact, cut
 from warpbrain.cases.building.errors import BuildError, require_extra
-from warpbrain.cases.building.example_sets import with_example_sets
-from warpbrain.cases.building.individual import individual_warp
-from warpbrain.cases.building.lattice import bcc_lattice
+from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
+from warpbrain.cases.building.mmg import Cells, fit_size
+from warpbrain.cases.building.node_sets import margin, node_sets, with_example_sets
 from warpbrain.cases.building.recipes import INDIVIDUAL_AMPLITUDE, RECIPES, CaseRecipe
-from warpbrain.cases.building.remeshing import Cells, fit_size
-from warpbrain.cases.building.resection import anterior_temporal_lobe
-from warpbrain.cases.building.tags import margin, node_sets
+from warpbrain.cases.building.template import Anatomy, IndividualWarp, anterior_temporal_lobe, template_anatomy
 from warpbrain.mesh import Quality, TetMesh, measure, ordered, split_boundary, write_mesh
 from warpbrain.mesh.tet_mesh import signed_volumes
 
@@ -118,48 +116,43 @@ def _rounded(value: Any) -> Any:
 
 
 def discretise(anatomy: Anatomy, recipe: CaseRecipe, multi: bool, spacing: float = LATTICE) -> Cells:
-    """The lattice cut along every surface; labels are grey 1 and white 2, plus 10 in resected tissue.
+    """The lattice, with cubes of a spacing [mm, template], cut along every surface, `multi`: along the interface of
+    grey and white matter, too. Labels are grey 1 and white 2, plus 10 in resected tissue."""
 
-    Parameters
-    ----------
-    anatomy : Anatomy
-    recipe : CaseRecipe
-    multi : bool
-        Cut along the interface of grey and white matter too.
-    spacing : float
-        Of the lattice [mm, template].
-    """
-    inside = np.argwhere(anatomy.brain > 0)
-    lower, upper = (anatomy.origin + end for end in (inside.min(axis=0) - spacing, inside.max(axis=0) + spacing))
+    def sampled(field: Singles) -> Callable[[Floats], Floats]:
+        return partial(anatomy.grid.sampled, field)
+
+    inside, origin = np.argwhere(anatomy.brain > 0), anatomy.grid.affine[:3, 3]
+    lower, upper = (origin + end for end in (inside.min(axis=0) - spacing, inside.max(axis=0) + spacing))
     points, tetrahedra = bcc_lattice(lower, upper, spacing)
-    tetrahedra = tetrahedra[(anatomy.sample(anatomy.brain, points)[tetrahedra] > -0.3).any(axis=1)]
+    tetrahedra = tetrahedra[(sampled(anatomy.brain)(points)[tetrahedra] > -0.3).any(axis=1)]
     points, tetrahedra = compact(points, tetrahedra)
     labels = np.full(len(tetrahedra), GREY, dtype=np.int64)
 
-    points, tetrahedra, labels, brain = cut(points, tetrahedra, labels, lambda x: anatomy.sample(anatomy.brain, x))
+    points, tetrahedra, labels, brain = cut(points, tetrahedra, labels, sampled(anatomy.brain))
     # pockets of air that the lattice pinched off are filled, crumbs of tissue are dropped
     brain = brain | small_pieces(points, tetrahedra, ~brain, keep_largest=True)
     brain &= ~small_pieces(points, tetrahedra, brain, keep_largest=True)
     brain = opened_out(tetrahedra, brain)
     tetrahedra, labels = tetrahedra[brain], labels[brain]
 
-    points, tetrahedra, labels, fluid = cut(points, tetrahedra, labels, lambda x: anatomy.sample(anatomy.ventricle, x))
+    points, tetrahedra, labels, fluid = cut(points, tetrahedra, labels, sampled(anatomy.ventricle))
     fluid &= ~small_pieces(points, tetrahedra, fluid)
     tissue = opened_out(tetrahedra, ~fluid)
     tetrahedra, labels = tetrahedra[tissue], labels[tissue]
 
     if multi:
-        points, tetrahedra, labels, white = cut(points, tetrahedra, labels, lambda x: anatomy.sample(anatomy.white, x))
+        points, tetrahedra, labels, white = cut(points, tetrahedra, labels, sampled(anatomy.white))
         white = white & ~small_pieces(points, tetrahedra, white)
         white |= small_pieces(points, tetrahedra, ~white)
         labels[white] = WHITE
     if recipe.resection is not None:
-        side = recipe.resection
-        points, tetrahedra, labels, taken = cut(points, tetrahedra, labels, lambda x: anterior_temporal_lobe(x, side))
+        lobe = partial(anterior_temporal_lobe, side=recipe.resection)
+        points, tetrahedra, labels, taken = cut(points, tetrahedra, labels, lobe)
         labels[taken & ~small_pieces(points, tetrahedra, taken)] += RESECTED
     points, tetrahedra = compact(points, tetrahedra)
     if recipe.seed is not None:
-        points = individual_warp(recipe.seed, INDIVIDUAL_AMPLITUDE)(points)
+        points = IndividualWarp(recipe.seed, INDIVIDUAL_AMPLITUDE)(points)
     return Cells(points, tetrahedra, labels)
 
 

@@ -4,26 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from warpbrain.cases.building.remeshing import Size
+from warpbrain.cases.building.mmg import Size
 
 
 @dataclass(frozen=True)
 class MeshRecipe:
-    """One mesh of a case.
-
-    Attributes
-    ----------
-    file : str
-        Name of the file, without its ending.
-    multi : bool
-        Grey and white matter with a conforming interface, instead of one tissue.
-    nodes : (int, int) or None
-        Wanted number of nodes, from - to.
-    finer_than : (str, float) or None
-        Instead: wanted number of tetrahedra as a multiple of another mesh of the case.
-    with_examples : str
-        Name of a second file, of the same mesh with the sets that examples of mechanisms act on; empty: none.
-    """
+    """One mesh of a case: its file without ending, whether it has grey and white matter with a conforming interface,
+    the wanted number of nodes (from, to) or of tetrahedra as a multiple of another mesh of the case, and the name of a
+    second file of it with the sets that examples of mechanisms act on."""
 
     file: str
     multi: bool
@@ -42,19 +30,9 @@ class MeshRecipe:
 
 @dataclass(frozen=True)
 class CaseRecipe:
-    """A case: one anatomy and its meshes.
-
-    Attributes
-    ----------
-    volume : float
-        Volume of the whole brain without its ventricles [m3]; meshes are scaled to it.
-    meshes : tuple of MeshRecipe
-        In the order of making.
-    seed : int or None
-        Seed of the individual deformation; None for the template itself.
-    resection : {"left", "right"} or None
-        Side of the anterior temporal lobe resection.
-    """
+    """A case: the volume [m3] of the whole brain without its ventricles, to which meshes are scaled, these in the order
+    of making, the seed of the individual deformation (None: the template itself), and the side of the resection of an
+    anterior temporal lobe."""
 
     volume: float
     meshes: tuple[MeshRecipe, ...]
@@ -75,40 +53,24 @@ def _about(nodes: int) -> tuple[int, int]:
     return int(nodes * 0.98) + 1, int(nodes * 1.02)
 
 
-@dataclass(frozen=True)
-class _Clinical:
-    """What the paper publishes of a clinical case (Tables 4 and 5)."""
-
-    volume: float
-    side: str
-    single: int
-    multi: int
-
-
-# volume [m3], side of the temporal lobe, nodes of the mesh of one tissue and of two
-CLINICAL: dict[str, _Clinical] = {
-    "0529": _Clinical(1.1654e-3, "left", 3619, 5060),
-    "0614": _Clinical(1.0617e-3, "left", 2692, 4112),
-    "0660": _Clinical(1.1344e-3, "left", 2795, 4308),
-    "0685": _Clinical(1.0899e-3, "left", 2425, 4093),
-    "0535": _Clinical(1.2388e-3, "right", 2662, 4225),
-    "0555": _Clinical(1.1706e-3, "right", 2221, 3932),
-    "0603": _Clinical(1.0601e-3, "right", 2742, 4348),
-    "0684": _Clinical(1.1865e-3, "right", 2250, 3930),
+# What the paper publishes of the clinical cases (Tables 4 and 5): volume [m3], side of the temporal lobe, nodes of the
+# mesh of one tissue and of two.
+_CLINICAL = {
+    "0529": (1.1654e-3, "left", 3619, 5060),
+    "0614": (1.0617e-3, "left", 2692, 4112),
+    "0660": (1.1344e-3, "left", 2795, 4308),
+    "0685": (1.0899e-3, "left", 2425, 4093),
+    "0535": (1.2388e-3, "right", 2662, 4225),
+    "0555": (1.1706e-3, "right", 2221, 3932),
+    "0603": (1.0601e-3, "right", 2742, 4348),
+    "0684": (1.1865e-3, "right", 2250, 3930),
 }
 
 
-def _stand_in(name: str, published: _Clinical) -> CaseRecipe:
-    return CaseRecipe(
-        volume=published.volume,
-        meshes=(
-            MeshRecipe("single", multi=False, nodes=_about(published.single)),
-            MeshRecipe("multi", multi=True, nodes=_about(published.multi)),
-        ),
-        # an individual of its own for every case, the same at every build
-        seed=int(name),
-        resection=published.side,
-    )
+def _stand_in(name: str, volume: float, side: str, single: int, multi: int) -> CaseRecipe:
+    meshes = MeshRecipe("single", False, _about(single)), MeshRecipe("multi", True, _about(multi))
+    # an individual of its own for every case, the same at every build
+    return CaseRecipe(volume, meshes, seed=int(name), resection=side)
 
 
 # Volumes: the published values for the phantom and for the clinical cases. The fine meshes have as many more
@@ -123,5 +85,5 @@ RECIPES: dict[str, CaseRecipe] = {
             MeshRecipe("multi-fine", multi=True, finer_than=("multi-coarse", 136.8 / 55.43)),
         ),
     ),
-    **{name: _stand_in(name, published) for name, published in CLINICAL.items()},
+    **{name: _stand_in(name, *published) for name, published in _CLINICAL.items()},
 }

@@ -1,11 +1,16 @@
-"""Which label is which tissue: what the user says with `--tissue`, and what is done with what was not said."""
+"""Which label is which tissue: what the user says with `--tissue`, what a program is known to write (`presets.toml`),
+and what is done with what was not said.
+"""
 
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cache
+from importlib.resources import files
 
 from warpbrain.errors import InputError
 
@@ -50,19 +55,8 @@ _NAME = re.compile(r"[^\W_](?:[\w ().+/-]{0,58}[\w)])?")
 
 @dataclass(frozen=True)
 class Assignment:
-    """Names of labels.
-
-    Attributes
-    ----------
-    tissues : mapping of int to str
-        Tissues of the mesh by their number, which is the first label that was given their name.
-    number : mapping of int to int
-        From every label of the volume that is tissue to the number of its tissue.
-    cavity : tuple of int
-        Labels that are open cavities.
-    outside : tuple of int
-        Labels that lie outside the body.
-    """
+    """What labels are: names of tissues by their number, which is the first label that was given the name; the number
+    of its tissue for every label that is tissue; labels of open cavities; labels outside the body."""
 
     tissues: Mapping[int, str]
     number: Mapping[int, int]
@@ -73,18 +67,9 @@ class Assignment:
 def parse_names(arguments: Sequence[str], there: Collection[int] | None = None) -> dict[int, str]:
     """Names by label, from arguments such as ``"2=grey,1000-2035=grey"``, in the order given.
 
-    Parameters
-    ----------
-    arguments : sequence of str
-    there : collection of int, optional
-        Labels that there are: a range names those of them that are in it. Not known yet without it, and ranges are
-        checked only.
-
-    Raises
-    ------
-    InputError
-        For anything that is not LABEL=NAME or FIRST-LAST=NAME, a label named twice, a range in which there is no label,
-        and a name that could be meant in two ways.
+    A range names the labels in it that are `there`; without these it is checked only. `InputError` for anything that is
+    not LABEL=NAME or FIRST-LAST=NAME, a label named twice, a range in which there is no label, and a name that could be
+    meant in two ways.
     """
     names: dict[int, str] = {}
     for pair in (piece.strip() for argument in arguments for piece in argument.split(",")):
@@ -129,21 +114,10 @@ def usual_name(name: str) -> str:
 
 
 def assign(volumes: Mapping[int, float], names: Mapping[int, str], others: str | None) -> Assignment:
-    """Decide what every label is.
+    """Decide what every label is, by the volume [mm3] of each there is.
 
-    Parameters
-    ----------
-    volumes : mapping of int to float
-        Volume [mm3] of each label there is.
-    names : mapping of int to str
-        What the user named; if empty, every label becomes a tissue of its own.
-    others : str or None
-        Name of every label that `names` leaves out.
-
-    Raises
-    ------
-    InputError
-        If a name was given to a label that is not there, a label is left without one, or there is no tissue.
+    Without names every label becomes a tissue of its own; `others` is the name of every label that `names` leaves out.
+    `InputError` if a name was given to a label that is not there, a label is left without one, or there is no tissue.
     """
     if absent := [label for label in names if label not in volumes]:
         raise InputError(f"--tissue: the volume has no label {_listed(absent)}; it has {_listed(sorted(volumes))}")
@@ -191,3 +165,35 @@ def _with_volumes(volumes: Mapping[int, float], labels: Sequence[int], most: int
 def _example(volumes: Mapping[int, float], labels: Sequence[int]) -> str:
     largest = sorted(labels, key=lambda label: -volumes[label])
     return ",".join(f"{label}={name}" for label, name in zip(largest, ("grey", "white", VENTRICLE), strict=False))
+
+
+@dataclass(frozen=True)
+class Preset:
+    """What the labels of a program are, by number, and which can mean something else: that the user must say."""
+
+    names: dict[int, str]
+    unsure: dict[int, str]
+
+
+@cache
+def presets() -> dict[str, Preset]:
+    """What labels are by the names of the programs that write them: the tables of `presets.toml`."""
+    text = (files("warpbrain.cases.building") / "presets.toml").read_text(encoding="utf-8")
+    made: dict[str, Preset] = {}
+    for program, table in tomllib.loads(text).items():
+        unsure = {int(label): meaning for label, meaning in table.pop("unsure", {}).items()}
+        del table["source"]
+        names: dict[int, str] = {}
+        for tissue, labels in table.items():
+            for label in labels:
+                first, _, last = str(label).partition("-")
+                names |= dict.fromkeys(range(int(first), int(last or first) + 1), tissue)
+        made[program] = Preset(names, unsure)
+    return made
+
+
+def preset(name: str) -> Preset:
+    """The labels of a program; `InputError` if there is no preset of that name."""
+    if name not in presets():
+        raise InputError(f"--preset: found '{name}', expected one of {', '.join(presets())}")
+    return presets()[name]

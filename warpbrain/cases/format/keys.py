@@ -1,4 +1,4 @@
-"""A key of `case.toml`: its type, unit, limits and meaning."""
+"""A key of `case.toml`: its type, unit, limits, default and meaning, and how its value is read and written."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from warpbrain.frame import Frame
 from warpbrain.values import finite, short
 
 #: Characters of a name, which stands in tables and names files.
@@ -30,10 +33,10 @@ class Key:
     Attributes
     ----------
     name : str
-    kinds : tuple of str
-        What the value can be, of `KINDS`.
+    kind : str
+        What the value can be, of `KINDS`; several are joined by ``|``.
     doc : str
-        One sentence.
+        One sentence; its full stop is left out where the default completes it.
     unit : str
         Of a number: a unit of SI, or ``"units"`` for the length that ``[case] units`` names.
     needed : bool
@@ -46,10 +49,14 @@ class Key:
         What to do where it is missing or out of its limits.
     keys : tuple of Key
         Of a table.
+    default : str or float, optional
+        What it is where it is absent.
+    si : float
+        How many of its SI unit one of these is.
     """
 
     name: str
-    kinds: tuple[str, ...]
+    kind: str
     doc: str
     unit: str = ""
     needed: bool = False
@@ -58,19 +65,32 @@ class Key:
     below: float = math.inf
     hint: str = ""
     keys: tuple[Key, ...] = ()
+    default: str | float | None = None
+    si: float = 1.0
+
+    @property
+    def kinds(self) -> list[str]:
+        """What the value can be, of `KINDS`."""
+        return self.kind.split("|")
+
+    def described(self) -> str:
+        """What it is, where it is absent, too, and its unit."""
+        absent = "" if self.doc.endswith(".") else f"; {self.default} if absent."
+        return self.doc + absent + self._in_unit
+
+    @property
+    def _in_unit(self) -> str:
+        return f" [{self.unit}]" if self.unit else ""
 
     def expected(self) -> str:
         """What the value should be, in words."""
-        unit = f" [{self.unit}]" if self.unit else ""
-        if self.choices:
-            texts = f"one of {', '.join(self.choices)}"
-            others = [KINDS[kind] for kind in self.kinds if kind != "text"]
-            return " or ".join([*others, texts]) + unit
-        return " or ".join(KINDS[kind] for kind in self.kinds) + unit
+        kinds = [KINDS[kind] for kind in self.kinds if not (self.choices and kind == "text")]
+        texts = [f"one of {', '.join(self.choices)}"] if self.choices else []
+        return " or ".join(kinds + texts) + self._in_unit
 
     def fault(self, value: Any) -> str:
         """What is wrong with a value, in words; empty if nothing is."""
-        kind = kind_of(value)
+        kind = _kind_of(value)
         if kind is None or not any(kind == k or (k, kind) in _ALSO for k in self.kinds):
             return f"expected {self.expected()}, found {short(value)}"
         if isinstance(value, str):
@@ -97,17 +117,38 @@ class Key:
         return f"{missing[0]}: missing, found {short(value)}" if missing else ""
 
     def _limits(self) -> str:
-        unit = f" [{self.unit}]" if self.unit else ""
         if math.isinf(self.below):
-            return f"a number above {self.above:g}{unit}" if self.above else f"a positive number{unit}"
-        return f"a number in the open interval ({self.above:g}, {self.below:g}){unit}"
+            return ("a positive number" if self.above == 0.0 else f"a number above {self.above:g}") + self._in_unit
+        return f"a number in the open interval ({self.above:g}, {self.below:g}){self._in_unit}"
+
+    def in_si(self, value: Any, frame: Frame) -> Any:
+        """A value of a file in SI units and RAS axes: a float or a tuple of them; a text as it is."""
+        if isinstance(value, str):
+            return value
+        if isinstance(value, int | float):
+            return (frame.metres if self.unit == "units" else self.si) * float(value)
+        if "vector" not in self.kinds:
+            return tuple((self.si * np.asarray(value, dtype=float)).tolist())
+        vector = frame.lengths(value) if self.unit == "units" else self.si * frame.directions(value)
+        return tuple(vector.tolist())
+
+    def in_file(self, value: Any, frame: Frame) -> Any:
+        """The same back: what a file says."""
+        if isinstance(value, str):
+            return value
+        if isinstance(value, int | float):
+            return float(value) / (frame.metres if self.unit == "units" else self.si)
+        if "vector" not in self.kinds:
+            return (np.asarray(value, dtype=float) / self.si).tolist()
+        vector = frame.file_lengths(value) if self.unit == "units" else frame.directions(value) / self.si
+        return vector.tolist()
 
 
 #: (wanted, found) pairs that fit as well: three numbers are a list of numbers, a file's name is text.
 _ALSO = {("file", "text"), ("numbers", "vector"), ("pairs", "empty"), ("numbers", "empty")}
 
 
-def kind_of(value: Any) -> str | None:
+def _kind_of(value: Any) -> str | None:
     """The kind of `KINDS` that a value of TOML is, ``"empty"`` for a list of nothing, None if it is none."""
     if isinstance(value, dict):
         return "table"
@@ -138,9 +179,7 @@ class Table:
     keys : tuple of Key
         That it may have whatever it is.
     by : Key or None
-        The key that says which variant it is.
-    default : str
-        The variant where that key is absent.
+        The key that says which variant it is; its default is the variant where it is absent.
     variants : mapping of str to tuple of Key
         What each variant may have besides.
     several : bool
@@ -151,7 +190,6 @@ class Table:
     doc: str
     keys: tuple[Key, ...] = ()
     by: Key | None = None
-    default: str = ""
     variants: Mapping[str, tuple[Key, ...]] = field(default_factory=dict)
     several: bool = False
 

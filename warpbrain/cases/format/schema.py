@@ -1,22 +1,20 @@
 """The JSON Schema of `case.toml`, made from the tables that it is read by.
 
-Editors complete and check with it what a person types (``#:schema case.schema.json`` on the first line, in those that
-know Taplo). It says what a file may say; what its words mean together with the mesh, only reading the case can tell.
+Editors that know Taplo complete and check with it what a person types: ``warpbrain cases schema > case.schema.json``,
+and ``#:schema case.schema.json`` on the first line of a case. It says what a file may say; what its words mean together
+with the mesh, only reading the case can tell.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Collection
 from typing import Any
 
 from warpbrain.cases.format.keys import Key, Table
-from warpbrain.cases.format.tables import PRIOR, TABLES
+from warpbrain.cases.format.tables import PRIOR, TABLES, TISSUE
 from warpbrain.physics.laws import LAWS
-
-#: Where the schema ships, relative to `warpbrain.cases`.
-FILE = "case.schema.json"
 
 _NUMBER = {"type": "number"}
 _KINDS: dict[str, dict[str, Any]] = {
@@ -32,11 +30,11 @@ _KINDS: dict[str, dict[str, Any]] = {
 def case_schema() -> dict[str, Any]:
     """The schema (JSON Schema, draft 2020-12)."""
     properties = {table.name: _table(table) for table in TABLES}
-    for variant in properties["tissue"]["oneOf"]:
-        variant["anyOf"] = _laws(variant["properties"]["model"]["enum"][0])
+    for law, variant in zip(TISSUE.variants, properties["tissue"]["oneOf"], strict=True):
+        variant["anyOf"] = _laws(law)
     properties["tissue"] = {
         "type": "object",
-        "description": next(t.doc for t in TABLES if t.name == "tissue"),
+        "description": TISSUE.doc,
         "patternProperties": {"^(0|[1-9][0-9]{0,9})$": properties["tissue"]},
         "additionalProperties": False,
     }
@@ -54,7 +52,7 @@ def case_schema() -> dict[str, Any]:
 
 
 def schema_text() -> str:
-    """The schema as it ships."""
+    """The schema as `warpbrain cases schema` prints it."""
     return json.dumps(case_schema(), indent=2) + "\n"
 
 
@@ -73,10 +71,9 @@ def _table(table: Table) -> dict[str, Any]:
     return {"type": "array", "items": schema, "description": table.doc} if table.several else schema
 
 
-def _object(keys: Iterable[Key]) -> dict[str, Any]:
-    listed = tuple(keys)
-    properties = {key.name: _key(key) for key in listed}
-    required = [key.name for key in listed if key.needed]
+def _object(keys: Collection[Key]) -> dict[str, Any]:
+    properties = {key.name: _key(key) for key in keys}
+    required = [key.name for key in keys if key.needed]
     return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
 
 
@@ -85,7 +82,7 @@ def _variant(table: Table, name: str) -> dict[str, Any]:
     properties, required = schema["properties"], schema["required"]
     if table.by is not None:
         properties[table.by.name]["enum"] = [name]
-        if name != table.default and table.by.name not in required:
+        if name != table.by.default and table.by.name not in required:
             required.append(table.by.name)
     return schema
 
@@ -101,5 +98,5 @@ def _key(key: Key) -> dict[str, Any]:
             if math.isfinite(key.below):
                 kind["exclusiveMaximum"] = key.below
     schema: dict[str, Any] = kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
-    schema["description"] = key.doc + (f" [{key.unit}]" if key.unit else "")
+    schema["description"] = key.described()
     return schema

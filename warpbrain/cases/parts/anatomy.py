@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from warpbrain.cases.format.reading import Context
 from warpbrain.cases.format.tables import MESH, SPECIMEN
-from warpbrain.cases.parts.context import Context
 from warpbrain.cases.specimen import Specimen
 from warpbrain.frame import METRES
 from warpbrain.mesh import MeshError, MeshInFile, pinched_nodes, read_mesh_file
@@ -31,29 +31,27 @@ def read_anatomy(context: Context) -> tuple[str, MeshInFile | None, Specimen | N
         mesh = specimen.mesh()
         return "", MeshInFile(mesh, np.arange(len(mesh.points)), len(mesh.points)), specimen
     table = context.table(MESH)
-    path = context.path(table, "file")
+    path = table.path("file")
     found = None if path is None else _read_mesh(context, path, table.get("tissue"))
-    return table.get("file", ""), found, None
+    return table.get("file") or "", found, None
 
 
 def _read_specimen(context: Context) -> Specimen | None:
     table = context.table(SPECIMEN)
-    metres = context.frame.metres
-    if table.variant == "block" and table.has("size"):
-        size = table.get("size")
-        if min(size) <= 0.0:
-            table.problem("size", f"found {size}, expected 3 positive numbers [{context.frame.unit}]")
-            return None
-    elif table.variant == "cylinder" and table.has("radius") and table.has("height"):
+    size = table.get("size")
+    if table.has("radius") and table.has("height"):
         size = (2.0 * table.get("radius"), 2.0 * table.get("radius"), table.get("height"))
-    else:
+    if size is None:
+        return None
+    if min(size) <= 0.0:
+        table.problem("size", f"found {size}, expected 3 positive numbers [{context.frame.unit}]")
         return None
     if not table.has("grips"):
         return None
     if max(size) > 100.0 * min(size):
         table.problem("shape", f"{max(size):g} long and {min(size):g} thick: too slender to be meshed as it is")
         return None
-    x, y, z = (metres * float(length) for length in size)
+    x, y, z = (context.frame.metres * float(length) for length in size)
     return Specimen(str(table.variant), (x, y, z), table.get("grips"))
 
 

@@ -3,113 +3,83 @@
 from __future__ import annotations
 
 import itertools
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from warpbrain.cases.boundary import Boundary, Contact, Displaced, Fixed, Forced, Pressed, Sliding
-from warpbrain.cases.format.table import Reading
+from warpbrain.cases.format.reading import Context, Reading
 from warpbrain.cases.format.tables import BOUNDARY
-from warpbrain.cases.parts.closed_surfaces import read_closed_surface
-from warpbrain.cases.parts.context import Context
-from warpbrain.cases.parts.node_sets import NodeSets
-from warpbrain.cases.parts.ramps import read_ramp
-from warpbrain.mesh import TetMesh, components, faces_of
+from warpbrain.cases.parts.named import Named, read_closed_surface
+from warpbrain.mesh import MeshInFile, TetMesh, components, faces_of
 from warpbrain.recordings.tables import read_table
 from warpbrain.recordings.text import collected
 
 
-def read_boundaries(context: Context, sets: NodeSets | None) -> tuple[Boundary, ...]:
+def read_boundaries(context: Context, named: Named | None, found: MeshInFile | None) -> tuple[Boundary, ...]:
     """Boundaries in the order of the file, as far as they are right."""
     boundaries: list[Boundary] = []
     names: set[str] = set()
     for table in context.lists(BOUNDARY):
-        nodes = None if sets is None else sets.look_up(table)
-        name = table.get("name", table.get("nodes", ""))
+        nodes = None if named is None or found is None else named.nodes(table, found)
+        name = table.get("name") or table.get("nodes") or ""
         if name in names:
             table.problem("name", f"a second boundary '{name}'", "recordings name boundaries: give each its own")
         names.add(name)
         if table.variant is None:
             continue
-        boundary = _READERS[table.variant](context, table, {"name": name, "nodes": nodes or ""})
-        if boundary is not None and nodes is not None:
-            boundaries.append(boundary)
+        values = _values(table)
+        if values is not None and nodes is not None:
+            boundaries.append(_CLASSES[table.variant](name=name, nodes=nodes, **values))
     return tuple(boundaries)
 
 
-def _fixed(context: Context, table: Reading, common: dict[str, str]) -> Boundary:
-    return Fixed(**common)
+_CLASSES: dict[str, type[Boundary]] = {
+    known.kind: known for known in (Fixed, Sliding, Displaced, Forced, Pressed, Contact)
+}
 
 
-def _sliding(context: Context, table: Reading, common: dict[str, str]) -> Boundary:
-    return Sliding(**common)
-
-
-def _displaced(context: Context, table: Reading, common: dict[str, str]) -> Boundary | None:
-    value = table.get("value")
-    if isinstance(value, str):
+def _values(table: Reading) -> dict[str, Any] | None:
+    """What a boundary has besides name and nodes; None if something of it is wrong."""
+    own = [key for key in BOUNDARY.variants[str(table.variant)] if key.name != "ramp"]
+    if table.variant == Displaced.kind and isinstance(table.get("value"), str):
         if table.has("ramp"):
             table.problem("ramp", "means nothing with a file, which has the times itself")
-        path = context.path(table, "value")
-        history = None if path is None else _history(path, context)
-        if history is None:
-            return None
-        return Displaced(**common, times=history[0], values=_triples(history[1]), file=value)
-    ramp = read_ramp(table)
-    if value is None or ramp is None:
+        return _history(table)
+    ramp = table.ramp() if "ramp" in table.keys else ()
+    if ramp is None or any(key.needed and not table.has(key.name) for key in own):
         return None
-    final = context.frame.lengths(value)
-    times, factors = zip(*ramp, strict=True) if ramp else ((0.0,), (1.0,))
-    return Displaced(**common, times=tuple(times), values=_triples(np.outer(factors, final)))
-
-
-def _history(path: Path, context: Context) -> tuple[tuple[float, ...], Any] | None:
-    """Times [s] and displacements (k, 3) [m] of a file with the columns t, ux, uy, uz."""
-    columns = ("ux", "uy", "uz")
-    with collected(path, context.problems) as found:
-        table = read_table(path, found, ("t", *columns))
-        if table is None or not table.require("t", *columns):
+    if table.variant == Displaced.kind:
+        times, factors = zip(*ramp, strict=True) if ramp else ((0.0,), (1.0,))
+        return {"times": tuple(times), "values": _triples(np.outer(factors, table.si("value")))}
+    values = {key.name: table.si(key.name) for key in own}
+    if "surface" in values:
+        path, frame = table.path("surface"), table.context.frame
+        surface = None if path is None else read_closed_surface(path, values["surface"], frame, table.problems)
+        values["surface"] = surface
+        if values["surface"] is None:
             return None
-        times, values = table.times(strictly=True), table.vectors(*columns)
-    return None if found else (tuple(times.tolist()), context.frame.lengths(values))
+    return values | ({"ramp": ramp} if "ramp" in table.keys else {})
+
+
+def _history(table: Reading) -> dict[str, Any] | None:
+    """Times [s] and displacements [m] of a file with the columns t, ux, uy, uz."""
+    path, problems, columns = table.path("value"), table.context.problems, ("ux", "uy", "uz")
+    if path is None:
+        return None
+    with collected(path, problems) as found:
+        rows = read_table(path, found, ("t", *columns))
+        if rows is None or not rows.require("t", *columns):
+            return None
+        times, values = rows.times(strictly=True), rows.vectors(*columns)
+    if found:
+        return None
+    displacements = _triples(table.context.frame.lengths(values))
+    return {"times": tuple(times.tolist()), "values": displacements, "file": table.get("value")}
 
 
 def _triples(values: Any) -> tuple[tuple[float, float, float], ...]:
     return tuple((float(x), float(y), float(z)) for x, y, z in values)
-
-
-def _forced(context: Context, table: Reading, common: dict[str, str]) -> Boundary | None:
-    ramp = read_ramp(table)
-    if not table.has("total") or ramp is None:
-        return None
-    x, y, z = context.frame.directions(table.get("total")).tolist()
-    return Forced(**common, total=(x, y, z), ramp=ramp)
-
-
-def _pressed(context: Context, table: Reading, common: dict[str, str]) -> Boundary | None:
-    ramp = read_ramp(table)
-    if not table.has("value") or ramp is None:
-        return None
-    return Pressed(**common, value=float(table.get("value")), ramp=ramp)
-
-
-def _contact(context: Context, table: Reading, common: dict[str, str]) -> Boundary | None:
-    path = context.path(table, "surface")
-    if path is None:
-        return None
-    surface = read_closed_surface(path, table.get("surface"), context.frame, context.problems)
-    return None if surface is None else Contact(**common, surface=surface, friction=float(table.get("friction", 0.0)))
-
-
-_READERS = {
-    "fixed": _fixed,
-    "sliding": _sliding,
-    "displacement": _displaced,
-    "force": _forced,
-    "pressure": _pressed,
-    "contact": _contact,
-}
 
 
 def check_faces(context: Context, left: TetMesh, boundaries: tuple[Boundary, ...]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Tissue
 from warpbrain.cases.case_template import OTHER_MU
-from warpbrain.cases.parts.context import Context
+from warpbrain.cases.format.reading import Context
 from warpbrain.cases.specimen import Specimen
 from warpbrain.recordings.recording import Recording, TestRecording
 

@@ -5,17 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
-from warpbrain.cases.format.table import Reading
+from warpbrain.cases.format.reading import Context, Reading
 from warpbrain.cases.format.tables import MECHANISM
-from warpbrain.cases.parts.context import Context
 from warpbrain.cases.parts.named import Named
-from warpbrain.cases.parts.ramps import read_ramp
 from warpbrain.errors import InputError
-from warpbrain.frame import Frame
 from warpbrain.physics.load import Load, take_turns
-from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing, Says
+from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing
 from warpbrain.physics.mechanisms import mechanisms
 
 #: What to do where something of the case itself is missing.
@@ -46,16 +41,11 @@ def read_mechanisms(
         if kind in kinds and not mechanism.several and not issubclass(mechanism, Load):
             table.problem("kind", f"a second '{kind}': it would act twice")
         kinds.add(kind)
-        ramp = read_ramp(table)
+        ramp = table.ramp()
         if named is None or ramp is None or not all(table.has(name) for name in mechanism.required()):
             continue
-        values = {
-            name: _value(context, table, named, name, says)
-            for name, says in mechanism.parameters().items()
-            if table.has(name)
-        }
-        wrong = [name for name in mechanism.parameters() if table.named(name) and not table.has(name)]
-        if wrong or any(value is None for value in values.values()):
+        values = {name: _value(table, named, name) for name in mechanism.parameters() if table.has(name)}
+        if any(map(table.wrong, mechanism.parameters())) or any(value is None for value in values.values()):
             continue
         try:
             facts = Facts(named.mesh, axis, density, tuple(m for m in found.values() if isinstance(m, Removing)))
@@ -73,44 +63,19 @@ def _require_turns(tables: Sequence[tuple[int, str, Reading]], found: Mapping[in
     for kind in dict.fromkeys(kind for _, kind, _ in tables):
         of_kind = [(place, table) for place, name, table in tables if name == kind]
         loads = [found[place] for place, _ in of_kind if place in found]
-        if (
-            len(loads) > 1
-            and not mechanisms()[kind].several
-            and issubclass(mechanisms()[kind], Load)
-            and not take_turns(loads)
-        ):
+        one_at_a_time = issubclass(mechanisms()[kind], Load) and not mechanisms()[kind].several
+        if one_at_a_time and len(loads) > 1 and not take_turns(loads):
             cure = "give each a ramp, so that their factors add up to no more than 1 at any time"
             of_kind[-1][1].problem("kind", f"a second '{kind}': it would act twice", cure)
 
 
-def _value(context: Context, table: Reading, named: Named, name: str, says: Says) -> Any:
+def _value(table: Reading, named: Named, name: str) -> Any:
     """A value as a mechanism takes it; None, and a problem noted, if a file that it names is wrong."""
-    value = table.get(name)
-    if isinstance(value, str):
-        return named.look_up(says.kind, value, lambda: context.path(table, name))
-    return in_si(says, value, context.frame)
-
-
-def in_si(says: Says, value: Any, frame: Frame) -> Any:
-    """A number or numbers of a file in SI units and RAS axes."""
-    if says.kind == "position":
-        return tuple(frame.lengths(value).tolist())
-    if says.kind == "vector":
-        return tuple((says.si * frame.directions(value)).tolist())
-    if says.kind == "numbers":
-        return tuple((says.si * np.asarray(value, dtype=float)).tolist())
-    return says.si * float(value)
-
-
-def in_file(says: Says, value: Any, frame: Frame) -> Any:
-    """The same back: what a file says."""
-    if says.kind == "position":
-        return frame.file_lengths(value).tolist()
-    if says.kind == "vector":
-        return (frame.directions(value) / says.si).tolist()
-    if says.kind == "numbers":
-        return (np.asarray(value, dtype=float) / says.si).tolist()
-    return value if isinstance(value, str) else value / says.si
+    value = table.si(name)
+    if not isinstance(value, str):
+        return value
+    kind = mechanisms()[str(table.variant)].parameters()[name].kind
+    return named.look_up(kind, value, lambda: table.path(name))
 
 
 def _note(context: Context, table: Reading, error: ParameterError) -> None:

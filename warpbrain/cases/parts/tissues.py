@@ -6,17 +6,14 @@ import re
 
 from warpbrain.cases.case import Tissue
 from warpbrain.cases.case_template import DENSITY
-from warpbrain.cases.format.table import Reading
+from warpbrain.cases.format.reading import Context, Reading
 from warpbrain.cases.format.tables import BODY, PRIOR, PRIOR_GROUPS, TISSUE
-from warpbrain.cases.parts.context import Context
 from warpbrain.errors import InputError
 from warpbrain.physics.laws import LAWS, Law
 from warpbrain.values import short
 
 #: Densities [kg/m3] that a tissue, gel or foam can have: wide, and too narrow for g/cm3.
 LIGHTEST, HEAVIEST = 20.0, 30000.0
-#: Of a case that says none [kg/m3].
-_PAPERS_DENSITY = 1211.5
 
 
 def read_tissues(context: Context) -> dict[int, Tissue]:
@@ -36,22 +33,24 @@ def read_tissues(context: Context) -> dict[int, Tissue]:
             context.problems.add(context.file, f"[tissue.{key}]", " ".join(found.split()), "[tissue.1]")
             continue
         labels.add(int(key))
-        tissue = _read_tissue(Reading(TISSUE, value, context.file, f"tissue.{key}", context.problems), key)
+        tissue = _read_tissue(Reading(TISSUE, value, context, f"tissue.{key}", context.problems), key)
         if tissue is not None:
             tissues[int(key)] = tissue
     if context.mesh is not None:
         there = set(context.mesh.labels)
-        for label in sorted(label for label in there if label < 0):
-            found = f"the mesh has tissue {label}, expected labels from 0"
-            context.problems.add(context.file, "[tissue]", found, "number the labels of the mesh anew")
-        for label in sorted(label for label in there - labels if label >= 0):
-            count = int((context.mesh.tissue == label).sum())
-            found = f"missing, but the mesh has tissue {label} ({count} tetrahedra)"
-            context.problems.add(context.file, f"[tissue.{label}]", found, "add the table")
+        for label in sorted(there - labels):
+            place, cure = f"[tissue.{label}]", "add the table"
+            message = (
+                f"missing, but the mesh has tissue {label} ({int((context.mesh.tissue == label).sum())} tetrahedra)"
+            )
+            if label < 0:
+                place, cure = "[tissue]", "number the labels of the mesh anew"
+                message = f"the mesh has tissue {label}, expected labels from 0"
+            context.problems.add(context.file, place, message, cure)
         for label in sorted(labels - there):
-            found = f"the mesh has no tissue {label}"
             known = ", ".join(map(str, sorted(there)))
-            context.problems.add(context.file, f"[tissue.{label}]", found, f"it has {known}")
+            message = f"the mesh has no tissue {label}"
+            context.problems.add(context.file, f"[tissue.{label}]", message, f"it has {known}")
     return tissues
 
 
@@ -65,12 +64,12 @@ def _read_tissue(table: Reading, label: str) -> Tissue | None:
     if not good:
         return None
     return Tissue(
-        name=table.get("name", f"tissue {label}"),
+        name=table.get("name") or f"tissue {label}",
         law=law,
-        formulation=table.get("formulation", "coupled"),
-        prior=table.get("prior", ""),
+        formulation=table.get("formulation"),
+        prior=table.get("prior") or "",
         model=table.variant,
-        accuracy=float(table.get("accuracy")) if table.has("accuracy") else None,
+        accuracy=table.si("accuracy"),
     )
 
 
@@ -91,26 +90,24 @@ def _law(table: Reading) -> tuple[Law | None, bool]:
             table.problem(key, "missing", 'a modulus in Pa, or mu = "prior"' if key == "mu" else "")
     if missing:
         return None, False
-    given = {key: table.get(key) for key in law.keys}
-    values = {key: tuple(map(float, v)) if isinstance(v, list) else float(v) for key, v in given.items()}
     try:
-        return law(**values), True
+        return law(**{key: table.si(key) for key in law.keys}), True
     except InputError as error:
-        table.problems.add(table.file, f"[{table.where}]", str(error))
+        table.problems.add(table.context.file, f"[{table.where}]", str(error))
         return None, False
 
 
 def read_body(context: Context) -> tuple[float, float]:
     """Density [kg/m3] and Poisson ratio."""
     table = context.table(BODY, needed=False)
-    density = float(table.get("density", _PAPERS_DENSITY))
+    density = table.si("density")
     if not table.has("density") and "specimen" not in context.tables:
         context.problems.remark(
-            table.file,
-            f"[body] density: not given: the {_PAPERS_DENSITY:g} kg/m3 of the paper's Table 4 are taken; brain has "
+            context.file,
+            f"[body] density: not given: the {density:g} kg/m3 of the paper's Table 4 are taken; brain has "
             f"{DENSITY:g} (ICRU Report 44, 1989)",
         )
     if not LIGHTEST < density < HEAVIEST:
         cure = f"{density:g} g/cm3 is {1000.0 * density:g} kg/m3" if density < LIGHTEST else "is it in kg/m3?"
         table.problem("density", f"found {density:g} kg/m3, which no tissue or gel has", cure)
-    return density, float(table.get("poisson", 0.45))
+    return density, table.si("poisson")

@@ -1,0 +1,35 @@
+"""Writes what the shipped cases are, so that a list of them reads no mesh: `python -m concealed.catalogue`.
+
+A test holds every number against the case that is read.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+from warpbrain.atomic import whole_file
+from warpbrain.cases.shipped import CATALOGUE, SHIPPED, Entry, find_case
+from warpbrain.recordings.recording import count_of
+
+
+def read_entry(name: str, tissue: str) -> Entry:
+    """An entry from the case itself."""
+    case = find_case(name, tissue)
+    return Entry(
+        name,
+        tissue,
+        case.title,
+        case.origin,
+        len(case.mesh.points),
+        len(case.mesh.tetrahedra),
+        round(1e6 * case.mesh.volume, 1),
+        {recording.name: count_of(recording) for recording in case.recordings},
+    )
+
+
+if __name__ == "__main__":
+    entries = [asdict(read_entry(name, tissue)) for name, variants in SHIPPED.items() for tissue in variants]
+    lines = ",\n".join(json.dumps(entry, ensure_ascii=False) for entry in entries)
+    with whole_file(CATALOGUE) as scratch:
+        scratch.write_text(f"[\n{lines}\n]\n", encoding="utf-8")

@@ -1,0 +1,120 @@
+"""Node sets of new meshes: surfaces, where a brain is held, pressed and cut, and what examples act on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.cases.building.errors import BuildError
+from warpbrain.mesh import TetMesh
+from warpbrain.mesh.surface import face_vectors, interface_faces, nodes_of, split_boundary
+
+# superior cap: depth under the highest point, and how much the surface there faces up (not the walls of the fissure)
+CAP_DEPTH = 15.0
+CAP_FACING = 0.5
+# skull base: what faces down this much ...
+BASE_FACING = -0.35
+# ... below the roof of the Sylvian fissure, which faces down but not on bone; farther back, below the tentorium, on
+# which the occipital lobes lie
+ANTERIOR_FLOOR = -10.0
+TENTORIUM = -30.0
+BEHIND = -45.0
+
+
+def node_sets(points: Floats, tetrahedra: Ints) -> dict[str, Bools]:
+    """Sets (n,) ``surface``, ``ventricle``, ``superior`` and ``fixed`` of a template brain, held, pressed and open.
+
+    All rules are in template millimetres, on positions and outward normals, so that they mean the same for every size
+    of mesh and every individual.
+    """
+    outer, cavities = split_boundary(points, tetrahedra)
+    if len(cavities) != 1:
+        raise BuildError(f"expected one cavity, the lateral ventricles; found {len(cavities)} cavities")
+    count = len(points)
+    surface = nodes_of(outer, count)
+    up = _facing_up(points, outer)
+    y, z = points[:, 1], points[:, 2]
+    below = z < np.where(y < BEHIND, TENTORIUM, ANTERIOR_FLOOR)
+    return {
+        "ventricle": nodes_of(cavities[0], count),
+        "surface": surface,
+        "superior": surface & (z > z[surface].max() - CAP_DEPTH) & (up > CAP_FACING),
+        "fixed": surface & below & (up < BASE_FACING),
+    }
+
+
+def margin(tetrahedra: Ints, resected: Bools, count: int) -> tuple[Bools, Bools]:
+    """Nodes (count,) of the wall a resection leaves, and nodes (count,) that only resected tissue has."""
+    wall = nodes_of(interface_faces(tetrahedra, resected), count)
+    gone = nodes_of(tetrahedra[resected], count) & ~nodes_of(tetrahedra[~resected], count)
+    return wall, gone
+
+
+# the base: what faces down this much, in this lower share of the height
+FACING = -0.35
+LOWER = 0.35
+
+
+def first_sets(
+    points: ArrayLike, tetrahedra: ArrayLike, is_cavity: Callable[[Floats, Floats], Bools] | None = None
+) -> dict[str, Bools]:
+    """Sets (n,) of a user's mesh: ``surface``, ``base``, a first guess of where it is held, and ``ventricle`` if there
+    are cavities.
+
+    Parameters
+    ----------
+    points, tetrahedra : (n, 3) and (m, 4) arrays
+        RAS, any unit, positively oriented.
+    is_cavity : callable, optional
+        From centres (b, 3) and outward unit normals (b, 3) of outer faces to whether they are the wall of a cavity that
+        opens to the outside (b,).
+    """
+    xyz = np.asarray(points, dtype=np.float64)
+    outer, cavities = split_boundary(xyz, tetrahedra)
+    vectors = face_vectors(xyz, outer)
+    opened = np.zeros(len(outer), dtype=bool)
+    if is_cavity is not None:
+        opened = is_cavity(xyz[outer].mean(axis=1), vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+    walls = np.concatenate([outer[opened], *cavities])
+    surface = nodes_of(outer[~opened], len(xyz))
+    height = xyz[:, 2] - xyz[:, 2].min()
+    low = (_facing_up(xyz, outer) < FACING) & (height < LOWER * height.max())
+    sets = {"surface": surface, "base": surface & low}
+    if len(walls):
+        sets["ventricle"] = nodes_of(walls, len(xyz))
+    return sets
+
+
+def _facing_up(points: Floats, faces: NDArray[np.integer[Any]]) -> Floats:
+    """How much the surface faces up at each node (n,): 1 up, -1 down, 0 where there are no faces."""
+    total = np.zeros_like(points)
+    np.add.at(total, faces.ravel(), np.repeat(face_vectors(points, faces), 3, axis=0))
+    return np.asarray(total[:, 2] / np.maximum(np.linalg.norm(total, axis=1), np.finfo(float).tiny))
+
+
+#: Centre and radius of the ball [m], in the right hemisphere.
+CENTRE, RADIUS = (0.035, -0.015, 0.030), 0.018
+#: Height above which there is a membrane, and how far to the right the side begins [m].
+MEMBRANE_ABOVE, SIDE_BEYOND = 0.020, 0.060
+
+
+def with_example_sets(mesh: TetMesh) -> TetMesh:
+    """The phantom's mesh with the element set ``ball`` and the node sets ``falx`` and ``side``.
+
+    The mesh knows of no midline: the membrane goes along the faces nearest to it.
+    """
+    middles = mesh.points[mesh.tetrahedra].mean(axis=1)
+    right = middles[:, 0] > 0.0
+    shared = np.zeros((2, len(mesh.points)), dtype=bool)
+    shared[0, mesh.tetrahedra[right]] = True
+    shared[1, mesh.tetrahedra[~right]] = True
+    nodes = {
+        "falx": shared.all(axis=0) & (mesh.points[:, 2] > MEMBRANE_ABOVE),
+        "side": mesh.node_sets["surface"] & ~mesh.node_sets["fixed"] & (mesh.points[:, 0] > SIDE_BEYOND),
+    }
+    ball = np.linalg.norm(middles - CENTRE, axis=1) < RADIUS
+    return TetMesh(mesh.points, mesh.tetrahedra, mesh.tissue, {**mesh.node_sets, **nodes}, {"ball": ball})

@@ -1,0 +1,213 @@
+"""Reads `case.toml`: its bytes into tables, each against what it may say, and the files of its folder that it names."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from warpbrain.cases.format.keys import Table
+from warpbrain.frame import Frame
+from warpbrain.mesh import TetMesh
+from warpbrain.problems import Problems
+from warpbrain.values import short
+
+#: No case.toml is as large as this [bytes]; a file that is must be something else.
+LARGEST_TOML = 4 << 20
+
+
+def parse_toml(file: Path, problems: Problems) -> dict[str, Any] | None:
+    """The tables of a file; None if it cannot be read, which is then a problem."""
+    try:
+        size = file.stat().st_size
+        if file.is_file() and size > LARGEST_TOML:
+            problems.add(file, "", f"found {size / 1e6:.0f} MB, expected a text of at most {LARGEST_TOML / 1e6:.0f} MB")
+            return None
+        content = file.read_bytes()
+        if not content.strip():
+            problems.add(file, "", "the file is empty", "`warpbrain cases new` writes one to start from")
+            return None
+        # some editors begin UTF-8 text with a byte order mark
+        return tomllib.loads(content.decode("utf-8").lstrip("\ufeff"))
+    except FileNotFoundError:
+        problems.add(file, "", "no such file")
+    except OSError as error:
+        problems.add(file, "", f"cannot be read: {error.strerror}")
+    except UnicodeDecodeError as error:
+        problems.add(file, "", f"not UTF-8 text (byte {error.start})", "save it as UTF-8")
+    except (ValueError, RecursionError) as error:  # numbers of thousands of digits, thousands of brackets
+        problems.add(file, "", f"not valid TOML: {error}")
+    return None
+
+
+class Reading:
+    """A table of a file: the values that are right, with every fault noted as a problem.
+
+    Parameters
+    ----------
+    table : Table
+        What it may say.
+    values : Any
+        What the file has there.
+    context : Context
+    where : str
+        How a message calls it: ``"tissue.1"``, ``"boundary 2"``.
+    problems : Problems
+        Where faults go.
+
+    Attributes
+    ----------
+    variant : str or None
+        Which of the table's variants it is; None if that cannot be told.
+    """
+
+    def __init__(self, table: Table, values: Any, context: Context, where: str, problems: Problems) -> None:
+        self.context, self.where, self.problems = context, where, problems
+        self._good: dict[str, Any] = {}
+        self._named: set[str] = set(values) if isinstance(values, dict) else set()
+        self.variant: str | None = None
+        self.keys = table.keys_of("")
+        if not isinstance(values, dict):
+            problems.add(context.file, f"[{where}]", f"expected a table, found {short(values)}")
+            return
+        if table.by is None:
+            self.variant = ""
+        else:
+            chosen = values.get(table.by.name, table.by.default)
+            if isinstance(chosen, str) and chosen in table.by.choices:
+                self.variant = chosen
+        self.keys = table.keys_of(self.variant or "")
+        for name, value in values.items():
+            if name not in self.keys:
+                self._refuse(table, name)
+            elif fault := self.keys[name].fault(value):
+                # a unit or axes that look alike are others all the same
+                guess = isinstance(value, str) and name not in ("units", "axes")
+                near = difflib.get_close_matches(value, self.keys[name].choices, 1) if guess else []
+                self.problem(name, fault, f"did you mean '{near[0]}'?" if near else self.keys[name].hint)
+            else:
+                self._good[name] = value
+        for name, key in self.keys.items():
+            if key.needed and name not in values:
+                self.problem(name, "missing", key.hint or f"expected {key.expected()}")
+
+    def _refuse(self, table: Table, name: str) -> None:
+        if self.variant is None and name in table.all_keys():
+            return  # what it belongs to is not known: that is the problem, and it is said
+        if self.variant and name in table.all_keys():
+            assert table.by is not None
+            takes = ", ".join(key.name for key in table.variants[self.variant]) or "no key of its own"
+            self.problem(name, f"means nothing with {table.by.name} '{self.variant}'", f"it takes {takes}")
+            return
+        near = difflib.get_close_matches(name, list(self.keys), 1)
+        cure = f"did you mean '{near[0]}'?" if near else f"expected one of {', '.join(self.keys)}"
+        self.problem(name, "unknown key", cure)
+
+    def problem(self, key: str, message: str, cure: str = "") -> None:
+        """Note what is wrong with a key."""
+        self.problems.add(self.context.file, f"[{self.where}] {key}", message, cure)
+
+    def named(self, key: str) -> bool:
+        """Whether the file has the key, right or wrong."""
+        return key in self._named
+
+    def has(self, key: str) -> bool:
+        """Whether the key is there and right."""
+        return key in self._good
+
+    def wrong(self, key: str) -> bool:
+        """Whether the key is there and not right."""
+        return key in self._named and key not in self._good
+
+    def get(self, key: str) -> Any:
+        """The value of a key that is there and right as the file has it, else its default."""
+        return self._good.get(key, self.keys[key].default if key in self.keys else None)
+
+    def si(self, key: str) -> Any:
+        """The same in SI units and RAS axes; None if there is none."""
+        value = self.get(key)
+        return None if value is None else self.keys[key].in_si(value, self.context.frame)
+
+    def path(self, key: str) -> Path | None:
+        """The file of the folder that a key names; None, and a problem noted, if there is no such file."""
+        if not self.has(key):
+            return None
+        path, fault = _file_of(self.context.file.parent, self.get(key))
+        if fault:
+            self.problem(key, fault)
+        return path
+
+    def ramp(self) -> tuple[tuple[float, float], ...] | None:
+        """Pairs of time and factor, none if it says nothing; None if they are wrong."""
+        if self.wrong("ramp"):
+            return None
+        ramp = tuple((float(t), float(f)) for t, f in self.get("ramp") or ())
+        for (a, _), (b, _) in itertools.pairwise(ramp):
+            if b <= a:
+                self.problem("ramp", f"times must increase, found {b:g} s after {a:g} s")
+                return None
+        return ramp
+
+
+def _file_of(folder: Path, name: str) -> tuple[Path | None, str]:
+    """The file that a case names: its path and no fault, or no path and what is wrong."""
+    path = folder / name
+    try:
+        if not path.resolve().is_relative_to(folder.resolve()):
+            return None, f"'{name}' leaves the case folder"
+        if not path.exists():
+            return None, f"no such file: {path}"
+        if not path.is_file():
+            return None, f"no such file: {path} is {'a folder' if path.is_dir() else 'not a plain file'}"
+    except (OSError, ValueError, RuntimeError) as error:  # a name too long, a link to itself
+        return None, f"no such file: {path} ({error})"
+    return path, ""
+
+
+@dataclass
+class Context:
+    """Where a case is being read from, and what was found wrong so far.
+
+    Attributes
+    ----------
+    file : Path
+        The `case.toml`.
+    tables : dict
+        Its top level.
+    problems : Problems
+    frame : Frame
+        Of every file in the folder.
+    mesh : TetMesh or None
+        The whole anatomy; None if it could not be read.
+    """
+
+    file: Path
+    tables: dict[str, Any]
+    problems: Problems
+    frame: Frame = field(default_factory=Frame)
+    mesh: TetMesh | None = None
+
+    def table(self, table: Table, needed: bool = True) -> Reading:
+        """Read ``[name]``; one that may be left out is read as an empty table."""
+        problems = self.problems
+        if needed and table.name not in self.tables:
+            keys = ", ".join(key.name for key in table.keys if key.needed)
+            problems.add(self.file, f"[{table.name}]", "missing", f"a table with {keys}")
+            problems = Problems()
+        return Reading(table, self.tables.get(table.name, {}), self, table.name, problems)
+
+    def lists(self, table: Table) -> list[Reading]:
+        """Read every ``[[name]]``."""
+        values = self.tables.get(table.name, [])
+        if not isinstance(values, list):
+            self.problems.add(
+                self.file, f"[[{table.name}]]", f"expected a list of tables, found {short(values)}", "two brackets"
+            )
+            return []
+        return [
+            Reading(table, value, self, f"{table.name} {number}", self.problems)
+            for number, value in enumerate(values, 1)
+        ]
