@@ -17,7 +17,7 @@ import warp as wp
 
 import warpbrain as wb
 from warpbrain.physics.laws.device import InvariantLaw
-from warpbrain.physics.laws.law import Law
+from warpbrain.physics.laws.law import Law, LawKey
 
 
 @wp.func
@@ -45,7 +45,7 @@ class Demiray(Law):
     mu: float
     b: float
     name: ClassVar[str] = "demiray"
-    keys: ClassVar[dict[str, type]] = {"mu": float, "b": float}
+    keys: ClassVar[dict[str, LawKey]] = {"mu": LawKey("Shear modulus."), "b": LawKey("How it stiffens.", unit="")}
 
     @property
     def shear_modulus(self) -> float:

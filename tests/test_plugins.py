@@ -36,6 +36,7 @@ RUN = """
 import numpy as np
 import warpbrain as wb
 case = wb.read_case("case")
+assert type(case.tissues[1].law) is wb.laws["gel"]
 recording = case.recordings[-1]
 np.savetxt("recorded.txt", np.hstack([recording.points, recording.displacement]))
 loaded = wb.model_of(case).external_forces().sum(axis=0)
@@ -44,14 +45,24 @@ np.savetxt("force.txt", loaded - wb.model_of(case).external_forces().sum(axis=0)
 """
 
 
+#: A law that differs from what is here in its name and key alone.
+LAW = """
+from warpbrain.physics.laws import LawKey, NeoHookean
+class Gel(NeoHookean):
+    name = "gel"
+    keys = {"mu": LawKey("Shear modulus of the gel.")}
+"""
+
+
 def install(folder: Path) -> None:
-    """The example as `pip install --target` lays it out."""
+    """The example as `pip install --target` lays it out, and a law beside it."""
+    (folder / "gel.py").write_text(LAW)
     shutil.copy(PACKAGE / "turning_heads.py", folder)
     project = tomllib.loads((PACKAGE / "pyproject.toml").read_text())["project"]
     info = folder / f"turning_heads-{project['version']}.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
-    groups = project["entry-points"].items()
+    groups = [*project["entry-points"].items(), ("warpbrain.laws", {"gel": "gel:Gel"})]
     lines = [
         f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in names.items()) for group, names in groups
     ]
@@ -62,12 +73,12 @@ def test_the_example_is_of_sixty_lines():
     assert sum(len(file.read_text().splitlines()) for file in PACKAGE.iterdir() if file.is_file()) <= 60
 
 
-def test_a_mechanism_and_a_reader_of_another_package(tmp_path):
+def test_a_mechanism_a_law_and_a_reader_of_another_package(tmp_path):
     installed = tmp_path / "site"
     installed.mkdir()
     install(installed)
     write_folder(tmp_path / "still")
-    case = write_folder(tmp_path / "case")
+    case = write_folder(tmp_path / "case", ('model = "neo-hookean"', 'model = "gel"'))
     (case / "case.toml").write_text((case / "case.toml").read_text() + ADDED)
     before = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
     np.savez(case / "saved.npz", before=before, after=before + MOVED)

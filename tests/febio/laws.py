@@ -13,7 +13,7 @@ import warp as wp
 
 from warpbrain.kernels.invariants import cofactor
 from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
-from warpbrain.physics.laws import Law, MooneyRivlin, NeoHookean, Ogden
+from warpbrain.physics.laws import Law, LawKey, MooneyRivlin, NeoHookean, Ogden
 from warpbrain.physics.laws.device import InvariantLaw
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.term import Body
@@ -92,7 +92,7 @@ class HolmesMow(Law):
     lam: float
     beta: float
     name: ClassVar[str] = "holmes-mow"
-    keys: ClassVar[Mapping[str, type]] = {"mu": float, "lam": float, "beta": float}
+    keys: ClassVar[Mapping[str, LawKey]] = {"mu": LawKey(""), "lam": LawKey(""), "beta": LawKey("")}
 
     @property
     def shear_modulus(self) -> float:
@@ -166,7 +166,7 @@ class IsochoricHolmesMow(_WithoutVolume, Law):
     mu: float
     beta: float
     name: ClassVar[str] = "uncoupled holmes-mow"
-    keys: ClassVar[Mapping[str, type]] = {"mu": float, "beta": float}
+    keys: ClassVar[Mapping[str, LawKey]] = {"mu": LawKey(""), "beta": LawKey("")}
 
     @property
     def shear_modulus(self) -> float:
@@ -248,7 +248,7 @@ class IsochoricArrudaBoyce(_WithoutVolume, Law):
     mu: float
     links: float
     name: ClassVar[str] = "arruda-boyce"
-    keys: ClassVar[Mapping[str, type]] = {"mu": float, "links": float}
+    keys: ClassVar[Mapping[str, LawKey]] = {"mu": LawKey(""), "links": LawKey("")}
 
     def _terms(self) -> list[float]:
         factors = (1 / 2, 1 / 10, 11 / 350, 19 / 1750, 519 / 134750)
@@ -316,7 +316,7 @@ class PorousNeoHookean(_WithoutVolume, Law):
     mu: float
     solid: float
     name: ClassVar[str] = "porous neo-hookean"
-    keys: ClassVar[Mapping[str, type]] = {"mu": float, "solid": float}
+    keys: ClassVar[Mapping[str, LawKey]] = {"mu": LawKey(""), "solid": LawKey("")}
 
     @property
     def shear_modulus(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from warpbrain.cases.format.keys import Key, Table
 from warpbrain.frame import AXES, METRES, PASCALS
-from warpbrain.physics.laws import FORMULATIONS, LAWS
+from warpbrain.physics.laws import FORMULATIONS, LAWS, Law
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 
@@ -56,26 +56,18 @@ MESH = Table(
     ),
 )
 
-# one key may mean several things: a law's mu is a number, a list of numbers or "prior"
-_LAW_KEYS = {
-    "mu": 'Shear modulus (a list for Ogden\'s terms), or "prior": the generative model gives it.',
-    "C1": "First Mooney-Rivlin modulus.",
-    "C2": "Second Mooney-Rivlin modulus.",
-    "alpha": "Exponents of Ogden's terms.",
-}
 
-
-def _law_keys(name: str) -> tuple[Key, ...]:
+def _law_keys(law: type[Law]) -> tuple[Key, ...]:
     """Keys of a law; mu = "prior" has a meaning for every law."""
-    takes, keys = LAWS[name].keys, []
-    for key in dict.fromkeys(("mu", *takes)):
-        kinds = [{float: "number", list: "numbers"}[takes[key]]] if key in takes else []
-        doc = _LAW_KEYS[key] if key in takes else 'Only "prior": the generative model gives the law.'
-        hint = "" if key in takes else f"{name} takes {', '.join(takes)}"
-        unit, choices = "" if key == "alpha" or not kinds else "Pa", (PRIOR,) if key == "mu" else ()
-        kinds += ["text"] if choices else []
-        keys.append(Key(key, "|".join(kinds), doc, unit, choices=choices, hint=hint))
-    return tuple(keys)
+    by_model = f'"{PRIOR}": the generative model gives the law.'
+    mu = Key("mu", "text", f"Only {by_model}", choices=(PRIOR,), hint=f"{law.name} takes {', '.join(law.keys)}")
+    keys = {"mu": mu} if "mu" not in law.keys else {}
+    for name, key in law.keys.items():
+        kind, prior = "numbers" if key.several else "number", name == "mu"
+        text = f"{key.text} Or {by_model}" if prior else key.text
+        kinds, choices = (f"{kind}|text", (PRIOR,)) if prior else (kind, ())
+        keys[name] = Key(name, kinds, text, key.unit, choices=choices)
+    return tuple(keys.values())
 
 
 TISSUE = Table(
@@ -94,7 +86,7 @@ TISSUE = Table(
         ),
     ),
     by=Key("model", "text", "Law", choices=tuple(LAWS), default="neo-hookean"),
-    variants={name: _law_keys(name) for name in LAWS},
+    variants={name: _law_keys(law) for name, law in LAWS.items()},
 )
 
 BODY = Table(

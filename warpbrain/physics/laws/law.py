@@ -46,13 +46,22 @@ MODULUS = Coordinate("ln(mu0 / Pa)", "shear modulus", 1.0, "tissue.declared_modu
 
 
 @dataclass(frozen=True)
+class LawKey:
+    """A parameter of a law as a tissue's table of `case.toml` has it: what it is, its unit, whether it is a list."""
+
+    text: str
+    unit: str = "Pa"
+    several: bool = False
+
+
+@dataclass(frozen=True)
 class Law(abc.ABC):
     """A hyperelastic law with its parameters [Pa; exponents without unit]."""
 
     #: Name in `case.toml` and on the command line.
     name: ClassVar[str]
-    #: Its keys in a tissue's table of `case.toml`, the fields of the class: one number, or a list of numbers.
-    keys: ClassVar[Mapping[str, type]]
+    #: Its keys in a tissue's table of `case.toml`, the fields of the class.
+    keys: ClassVar[Mapping[str, LawKey]]
     #: Its coordinates: the modulus, and those of its shape; none if it has no prior.
     coordinates: ClassVar[tuple[Coordinate, ...]] = ()
 

@@ -17,7 +17,7 @@ import warp as wp
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.laws.device import InvariantLaw
-from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, require_finite
+from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, LawKey, require_finite
 
 
 @wp.func
@@ -94,7 +94,10 @@ class MooneyRivlin(Law):
     C1: float
     C2: float
     name: ClassVar[str] = "mooney-rivlin"
-    keys: ClassVar[Mapping[str, type]] = {"C1": float, "C2": float}
+    keys: ClassVar[Mapping[str, LawKey]] = {
+        "C1": LawKey("First Mooney-Rivlin modulus."),
+        "C2": LawKey("Second Mooney-Rivlin modulus."),
+    }
     coordinates: ClassVar[tuple[Coordinate, ...]] = (
         MODULUS,
         Coordinate("C2 / (C1 + C2)", "ratio C2 / (C1 + C2)", 0.5, "tissue.declared_share", 0.0, 1.0),

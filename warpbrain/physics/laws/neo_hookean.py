@@ -14,7 +14,7 @@ import warp as wp
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.laws.device import InvariantLaw
-from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, require_finite
+from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, LawKey, require_finite
 
 
 @wp.func
@@ -86,7 +86,7 @@ class NeoHookean(Law):
 
     mu: float
     name: ClassVar[str] = "neo-hookean"
-    keys: ClassVar[Mapping[str, type]] = {"mu": float}
+    keys: ClassVar[Mapping[str, LawKey]] = {"mu": LawKey("Shear modulus.")}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (MODULUS,)
 
     def __post_init__(self) -> None:

@@ -18,7 +18,7 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.kernels.powers import power_minus_one, power_quotient
 from warpbrain.physics.laws.device import PrincipalLaw
-from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, require_finite
+from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, LawKey, require_finite
 
 #: Exponent of the one term that is the neo-Hookean law.
 NEO_HOOKEAN = 2.0
@@ -167,7 +167,10 @@ class Ogden(Law):
     mu: tuple[float, ...]
     alpha: tuple[float, ...]
     name: ClassVar[str] = "ogden"
-    keys: ClassVar[Mapping[str, type]] = {"mu": list, "alpha": list}
+    keys: ClassVar[Mapping[str, LawKey]] = {
+        "mu": LawKey("Moduli of Ogden's terms.", several=True),
+        "alpha": LawKey("Exponents of Ogden's terms.", unit="", several=True),
+    }
     coordinates: ClassVar[tuple[Coordinate, ...]] = (
         MODULUS,
         Coordinate("alpha", "exponent", 4.0, "tissue.declared_exponent", signed=True),
