@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.result import Confusion, Diagnosis, Fit, Ranked
 from warpbrain.diagnosis.traits import Traits
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.decide import (
@@ -26,6 +26,9 @@ from warpbrain.physics.words import length, measured, number, place
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.not_physics import SENTENCES
 from warpbrain.worlds.body.weighted_set import WeightedSet
+
+if TYPE_CHECKING:
+    from warpbrain.diagnosis.result import Confusion, Diagnosis, Fit, Ranked
 
 
 def sentence_of(diagnosis: Diagnosis) -> str:

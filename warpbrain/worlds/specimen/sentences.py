@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from warpbrain.inference.beliefs import belief
@@ -13,7 +15,9 @@ from warpbrain.simulation.specimen import specimen_of
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.glued_ends import ELEMENTS
 from warpbrain.worlds.specimen.protocol import Protocol
-from warpbrain.worlds.specimen.result import Ranked, SpecimenDiagnosis
+
+if TYPE_CHECKING:
+    from warpbrain.worlds.specimen.result import Ranked, SpecimenDiagnosis
 
 #: Of a cause no more numbers are said in a sentence.
 _VALUES = 6
