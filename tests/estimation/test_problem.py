@@ -11,9 +11,9 @@ from synthetic import GREY, WHITE, beads, block, lid, scale, truth
 from warpbrain.errors import InputError
 from warpbrain.estimation.finer_mesh import NAMES, Discretisation, FinerMesh, discretisation_error
 from warpbrain.estimation.forward import Forward
-from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.likelihood import Likelihood, Noise
 from warpbrain.estimation.observations import Observations, Sensors
+from warpbrain.estimation.parameters import Gaussian
 from warpbrain.estimation.prior import PriorMode
 from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.inference.noise import outliers

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import genpareto
 
-from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.parameters import Gaussian
 from warpbrain.estimation.sampling import (
     Proposal,
     effective_size,

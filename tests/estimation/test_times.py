@@ -12,10 +12,10 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
 from warpbrain.estimation.estimate import Estimation
 from warpbrain.estimation.forward import Forward
-from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.likelihood import Likelihood
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
+from warpbrain.estimation.parameters import Gaussian
 from warpbrain.estimation.prior import PriorMode
 from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.gp.prior import Prior

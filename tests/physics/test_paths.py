@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpbrain.physics.laws.total_energy import Path, derivatives
+from warpbrain.physics.laws.stability import Path, derivatives
 
 
 @pytest.mark.parametrize("exponents", [(1.0, -0.5, -0.5), (1.0, 0.0, 0.0), (1.0, 1.0, 1.0)])

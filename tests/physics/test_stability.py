@@ -11,8 +11,7 @@ from material_point import LAWS, moduli_at
 
 from warpbrain.errors import InputError
 from warpbrain.physics.laws import FORMULATIONS, Law, MooneyRivlin, NeoHookean, Ogden
-from warpbrain.physics.laws.stability import UnstableLawError, require_stable
-from warpbrain.physics.laws.total_energy import Path
+from warpbrain.physics.laws.stability import Path, UnstableLawError, require_stable
 from warpbrain.simulation.model import Material
 
 #: Stretches [1] of the uniaxial path, and those at which the volume is half to twice.

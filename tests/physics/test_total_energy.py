@@ -6,7 +6,7 @@ from material_point import MATERIALS, energy_at, random_rotations
 
 from warpbrain.errors import InputError
 from warpbrain.physics.laws import FORMULATIONS, MooneyRivlin, NeoHookean, Ogden
-from warpbrain.physics.laws.total_energy import total_energy
+from warpbrain.physics.laws.stability import total_energy
 
 STRETCHES = np.random.default_rng(5).uniform(0.7, 1.4, size=(40, 3))
 

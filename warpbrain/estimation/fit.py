@@ -17,9 +17,8 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import State
-from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.likelihood import IndependentNoise
-from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.parameters import Gaussian, Parameters
 from warpbrain.estimation.problem import Linearised, Point, Problem
 from warpbrain.inference.least_squares import minimise
 

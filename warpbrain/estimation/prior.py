@@ -19,8 +19,7 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups
 from warpbrain.errors import InputError
-from warpbrain.estimation.gaussian import Gaussian
-from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.parameters import Gaussian, Parameters
 from warpbrain.gp.coordinates import coordinates
 from warpbrain.gp.literature.study import Study
 from warpbrain.gp.prior import Prior

@@ -16,10 +16,9 @@ from warpbrain.arrays import Floats
 from warpbrain.estimation.finer_mesh import NAMES as DISCRETISATION_NAMES
 from warpbrain.estimation.finer_mesh import Discretisation, DiscretisationError
 from warpbrain.estimation.forward import Forward, State
-from warpbrain.estimation.gaussian import Gaussian
 from warpbrain.estimation.likelihood import IndependentNoise, Likelihood, Noise
 from warpbrain.estimation.observations import Observations, Sensors
-from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.parameters import Gaussian, Parameters
 from warpbrain.estimation.prior import PriorMode
 from warpbrain.estimation.registration import NAMES as REGISTRATION_NAMES
 from warpbrain.inference.least_squares import minimise

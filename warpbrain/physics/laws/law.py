@@ -96,10 +96,13 @@ class Law(abc.ABC):
     def energy(self, stretches: Floats) -> Floats:
         """Incompressible strain energy `w` [Pa] at principal stretches of shape (..., 3)."""
 
+    #: Device code by formulation.
+    device: ClassVar[Mapping[str, InvariantLaw | PrincipalLaw]]
+
     @classmethod
-    @abc.abstractmethod
     def device_law(cls, formulation: str) -> InvariantLaw | PrincipalLaw:
         """Device code of a formulation."""
+        return cls.device[formulation]
 
     @abc.abstractmethod
     def scaled_to(self, shear_modulus: float) -> Law:

@@ -68,14 +68,6 @@ def _uncoupled_derivatives(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any]
     return d1, d2, dJ, zero, zero, d1J, zero, d2J, dJJ
 
 
-_DEVICE = {
-    "coupled": InvariantLaw("mooney_rivlin_coupled", _coupled_energy, _coupled_derivatives, second_invariant=True),
-    "uncoupled": InvariantLaw(
-        "mooney_rivlin_uncoupled", _uncoupled_energy, _uncoupled_derivatives, second_invariant=True
-    ),
-}
-
-
 @dataclass(frozen=True)
 class MooneyRivlin(Law):
     """Mooney-Rivlin law.
@@ -94,6 +86,12 @@ class MooneyRivlin(Law):
     C1: float
     C2: float
     name: ClassVar[str] = "mooney-rivlin"
+    device: ClassVar[Mapping[str, InvariantLaw]] = {
+        "coupled": InvariantLaw("mooney_rivlin_coupled", _coupled_energy, _coupled_derivatives, second_invariant=True),
+        "uncoupled": InvariantLaw(
+            "mooney_rivlin_uncoupled", _uncoupled_energy, _uncoupled_derivatives, second_invariant=True
+        ),
+    }
     keys: ClassVar[Mapping[str, LawKey]] = {
         "C1": LawKey("First Mooney-Rivlin modulus."),
         "C2": LawKey("Second Mooney-Rivlin modulus."),
@@ -135,10 +133,6 @@ class MooneyRivlin(Law):
     def volumetric_modulus(self, poisson: float, formulation: str) -> float:
         modulus = super().volumetric_modulus(poisson, formulation)
         return modulus - 4.0 * self.C2 if formulation == "coupled" else modulus
-
-    @classmethod
-    def device_law(cls, formulation: str) -> InvariantLaw:
-        return _DEVICE[formulation]
 
     def scaled_to(self, shear_modulus: float) -> "MooneyRivlin":
         factor = shear_modulus / self.shear_modulus

@@ -61,14 +61,6 @@ def _uncoupled_derivatives(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any]
     )  # fmt: skip
 
 
-_DEVICE = {
-    "coupled": InvariantLaw("neo_hookean_coupled", _coupled_energy, _coupled_derivatives, second_invariant=False),
-    "uncoupled": InvariantLaw(
-        "neo_hookean_uncoupled", _uncoupled_energy, _uncoupled_derivatives, second_invariant=False
-    ),
-}
-
-
 @dataclass(frozen=True)
 class NeoHookean(Law):
     """Neo-Hookean law.
@@ -86,6 +78,12 @@ class NeoHookean(Law):
 
     mu: float
     name: ClassVar[str] = "neo-hookean"
+    device: ClassVar[Mapping[str, InvariantLaw]] = {
+        "coupled": InvariantLaw("neo_hookean_coupled", _coupled_energy, _coupled_derivatives, second_invariant=False),
+        "uncoupled": InvariantLaw(
+            "neo_hookean_uncoupled", _uncoupled_energy, _uncoupled_derivatives, second_invariant=False
+        ),
+    }
     keys: ClassVar[Mapping[str, LawKey]] = {"mu": LawKey("Shear modulus.")}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (MODULUS,)
 
@@ -107,10 +105,6 @@ class NeoHookean(Law):
 
     def energy(self, stretches: Floats) -> Floats:
         return 0.5 * self.mu * (np.sum(stretches**2, axis=-1) - 3.0)
-
-    @classmethod
-    def device_law(cls, formulation: str) -> InvariantLaw:
-        return _DEVICE[formulation]
 
     def scaled_to(self, shear_modulus: float) -> "NeoHookean":
         return NeoHookean(shear_modulus)

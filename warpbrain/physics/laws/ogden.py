@@ -141,12 +141,6 @@ def _uncoupled_derivatives(l: Any, parameters: wp.array2d[Any], e: int):
     return T, H, m
 
 
-_DEVICE = {
-    "coupled": PrincipalLaw("ogden_coupled", _coupled_energy, _coupled_derivatives),
-    "uncoupled": PrincipalLaw("ogden_uncoupled", _uncoupled_energy, _uncoupled_derivatives),
-}
-
-
 @dataclass(frozen=True)
 class Ogden(Law):
     """Ogden law with N terms.
@@ -167,6 +161,10 @@ class Ogden(Law):
     mu: tuple[float, ...]
     alpha: tuple[float, ...]
     name: ClassVar[str] = "ogden"
+    device: ClassVar[Mapping[str, PrincipalLaw]] = {
+        "coupled": PrincipalLaw("ogden_coupled", _coupled_energy, _coupled_derivatives),
+        "uncoupled": PrincipalLaw("ogden_uncoupled", _uncoupled_energy, _uncoupled_derivatives),
+    }
     keys: ClassVar[Mapping[str, LawKey]] = {
         "mu": LawKey("Moduli of Ogden's terms.", several=True),
         "alpha": LawKey("Exponents of Ogden's terms.", unit="", several=True),
@@ -231,10 +229,6 @@ class Ogden(Law):
         logs = np.log(stretches)
         terms = [m / a * np.sum(np.expm1(a * logs), axis=-1) for m, a in zip(self.mu, self.alpha, strict=True)]
         return np.sum(terms, axis=0)
-
-    @classmethod
-    def device_law(cls, formulation: str) -> PrincipalLaw:
-        return _DEVICE[formulation]
 
     def scaled_to(self, shear_modulus: float) -> "Ogden":
         factor = shear_modulus / self.shear_modulus

@@ -15,7 +15,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.parameters import Gaussian
 from warpbrain.estimation.prior import declared
 from warpbrain.estimation.registration import registration_of
 from warpbrain.inference import GaussianModel

@@ -17,7 +17,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.estimation.finer_mesh import ROUGH, Difference, Discretisation, FinerMesh
-from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.parameters import Gaussian
 from warpbrain.physics.proposal import Proposal
 from warpbrain.simulation.model import Material
 from warpbrain.worlds.body.sensors import Sensors

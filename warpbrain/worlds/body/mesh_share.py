@@ -14,7 +14,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
-from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.parameters import Gaussian
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
 from warpbrain.worlds.body.states import SolvedState

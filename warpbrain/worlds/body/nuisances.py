@@ -14,7 +14,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.estimation.finer_mesh import Discretisation
-from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.parameters import Gaussian
 from warpbrain.estimation.registration import registration_of
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.physics.laws import Law

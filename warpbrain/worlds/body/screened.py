@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from warpbrain.cases.case import Case
-from warpbrain.estimation.gaussian import Gaussian
+from warpbrain.estimation.parameters import Gaussian
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.body.base import BaseFinder
 from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of

@@ -6,8 +6,7 @@ import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.gaussian import Gaussian
-from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.parameters import Gaussian, Parameters
 from warpbrain.estimation.prior import declared, declared_deviations, prior_modes, prior_of
 
 

@@ -20,7 +20,7 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.physics.laws import Law
-from warpbrain.physics.laws.total_energy import total_energy
+from warpbrain.physics.laws.stability import total_energy
 from warpbrain.physics.mechanism import Mechanism, Relaxing, Storing, Substituting
 
 _STEP = 2e-5
