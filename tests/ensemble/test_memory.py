@@ -6,7 +6,7 @@ import warp as wp
 from many_samples import samples_of, shaken_block
 from material_point import LAWS
 
-from warpbrain.ensemble import memory
+from warpbrain.ensemble import workers
 from warpbrain.ensemble.batch import Batch
 from warpbrain.ensemble.workers import ENOUGH, batch_size, bytes_per_slot, free_bytes
 from warpbrain.errors import InputError
@@ -47,11 +47,11 @@ def test_a_batch_is_what_is_asked_for_or_what_pays(device: str, monkeypatch) -> 
     assert batch_size(system) == enough
     assert batch_size(system, 7) == 7
     each = bytes_per_slot(system)
-    monkeypatch.setattr(memory, "free_bytes", lambda system: int(10.5 * each))
+    monkeypatch.setattr(workers, "free_bytes", lambda system: int(10.5 * each))
     assert batch_size(system) == min(enough, 8)
     with pytest.raises(InputError, match=r"--batch 9: a sample takes \d+ MB, and .* has room for 8"):
         batch_size(system, 9)
-    monkeypatch.setattr(memory, "free_bytes", lambda system: each // 2)
+    monkeypatch.setattr(workers, "free_bytes", lambda system: each // 2)
     with pytest.raises(InputError, match=r"--batch auto: a sample takes \d+ MB, and .* has room for 0"):
         batch_size(system)
 
