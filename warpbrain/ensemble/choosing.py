@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -133,10 +134,7 @@ def overloaded(model: Model, samples: Sequence[Sample], device: str | None = Non
         except SolveError:
             return float("nan")
 
-    first, last = 0, len(ordered)
-    while first < last:
-        middle = (first + last) // 2
-        first, last = (first, middle) if stretch_of(ordered[middle]) > 0.0 else (middle + 1, last)
+    first = bisect_left(ordered, True, key=lambda sample: stretch_of(sample) > 0.0)
     # the stretch is one less what grows with the load
     share = 1.0 / (1.0 - stretch_of(ordered[0])) if first else 1.0
     return Overload(tuple(sorted(sample.number for sample in ordered[:first])), share)

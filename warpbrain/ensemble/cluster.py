@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from importlib.util import find_spec
-from types import TracebackType
 from typing import Any
 
 from warpbrain.ensemble.job import Job
@@ -39,7 +38,7 @@ def local_workers(address: str) -> int | None:
     return None
 
 
-class Cluster:
+class Cluster(AbstractContextManager["Cluster"]):
     """A Dask cluster, or one of processes of this machine that lives as long as this object's context.
 
     The address is of a scheduler; ``local:N`` starts processes here, ``local`` so many `workers`. Each has a Warp
@@ -73,12 +72,7 @@ class Cluster:
             # nothing went wrong: it is closed by this object's own context
             self._stack = stack.pop_all()
 
-    def __enter__(self) -> Cluster:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self._stack.close()
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:

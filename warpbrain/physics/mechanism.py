@@ -228,27 +228,23 @@ class Mechanism(Ramped, abc.ABC):
         `ParameterError` if one of them makes no sense in this case.
         """
         made = cls(**values)
-        made.check_in(facts)
+        try:
+            made.check(facts.left)
+        except ParameterError as error:
+            if not facts.removing:
+                raise
+            try:
+                made.check(facts.mesh)
+            except ParameterError:
+                raise error from None
+            both = f"{facts.removing[0].kind} and {made.kind} cannot act together"
+            raise ParameterError(error.key, f"{both}: in the tissue that is left {error}") from None
         return made
 
     def in_case(self, facts: Facts) -> dict[str, Any]:
         """Parameters by name, in SI units and RAS axes, of which `of_case` makes what does the same in a case."""
         values = {name: getattr(self, name) for name in self.parameters()}
         return {name: value for name, value in values.items() if value is not None}
-
-    def check_in(self, facts: Facts) -> None:
-        """Raise `ParameterError` if a parameter makes no sense in what is left of the anatomy of a case."""
-        try:
-            self.check(facts.left)
-        except ParameterError as error:
-            if not facts.removing:
-                raise
-            try:
-                self.check(facts.mesh)
-            except ParameterError:
-                raise error from None
-            both = f"{facts.removing[0].kind} and {self.kind} cannot act together"
-            raise ParameterError(error.key, f"{both}: in the tissue that is left {error}") from None
 
     @property
     def everywhere(self) -> bool:
