@@ -15,16 +15,18 @@ if TYPE_CHECKING:
 
 
 def coordinates(law: str) -> tuple[Coordinate, ...]:
-    """Of a law by its name in `case.toml`; `InputError` if none has that name. Ogden's has one term."""
+    """Of a law by its name in `case.toml`, Ogden's of one term; `InputError` if none that has a prior is called so."""
     from warpbrain.physics.laws import LAWS
 
-    if law not in LAWS:
-        raise InputError(f"law '{law}': expected one of {', '.join(LAWS)}")
-    return LAWS[law].coordinates
+    known = {name: kind.coordinates for name, kind in LAWS.items() if kind.coordinates}
+    if law not in known:
+        raise InputError(f"law '{law}': expected one of {', '.join(known)}")
+    return known[law]
 
 
 def to_coordinates(law: Law) -> tuple[float, ...]:
-    """Coordinates of a law; `InputError` if it has several terms."""
+    """Coordinates of a law; `InputError` if it has none, or several terms."""
+    coordinates(law.name)
     return math.log(law.shear_modulus), *law.shape
 
 
