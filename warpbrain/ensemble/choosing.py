@@ -37,11 +37,11 @@ def drawn_samples(
     samples = []
     for number in range(count):
         try:
-            found = with_prior_draw(case, number, seed, process)
+            drawn = with_prior_draw(case, number, seed, process)
         except SolveError as error:
             samples.append(Sample(number, None, str(error).removeprefix(f"{case.path}: ")))
         else:
-            laws = {label: tissue.known_law for label, tissue in found.case.tissues.items()}
+            laws = {label: tissue.known_law for label, tissue in drawn.case.tissues.items()}
             samples.append(Sample(number, _materials(case, laws)))
         if on_sample is not None:
             on_sample(number)

@@ -277,10 +277,10 @@ def _answers(
     if not slots:
         return []
     model = course.model
-    found = []
+    outcomes = []
     for slot, u, internal in zip(slots, batch.displacements(slots), batch.internal_forces(slots), strict=True):
         time = float(course.time[slot])
-        found.append(
+        outcomes.append(
             Outcome(
                 number=int(number_in[slot]),
                 reason="",
@@ -293,4 +293,4 @@ def _answers(
                 reactions=model.reactions(internal, model.external_forces(time)),
             )
         )
-    return found
+    return outcomes

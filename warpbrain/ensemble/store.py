@@ -70,17 +70,17 @@ class Store:
     def _is_damaged(self, manifest: Path) -> bool:
         """Whether its checksum is another one; `InputError` if it is of another ensemble."""
         try:
-            found = json.loads(manifest.read_text(encoding="utf-8"))
-            checksum, known = found.pop("sha256", None), found["fingerprint"]
+            content = json.loads(manifest.read_text(encoding="utf-8"))
+            checksum, known = content.pop("sha256", None), content["fingerprint"]
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return True
         # one without a checksum is as old as that and may be of another ensemble, too
-        if checksum not in (checksum_of(found), None):
+        if checksum not in (checksum_of(content), None):
             return True
         if known != self._fingerprint:
             about = ", ".join(
                 f"{key}: {value}"
-                for key, value in found.items()
+                for key, value in content.items()
                 if isinstance(value, str | int) and key != "fingerprint"
             )
             raise InputError(

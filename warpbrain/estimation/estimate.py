@@ -155,20 +155,20 @@ class Estimation:
 
         It goes on from `starts`, estimates with other nuisances, if there are any.
         """
-        found, failures = [], []
+        estimates, failures = [], []
         begun: list[tuple[PriorMode, Estimate | None]]
         begun = [(one.problem.mode, one) for one in starts] or [(mode, None) for mode in self.prior_modes]
         for prior_mode, start in begun:
             try:
-                found.append(self._fit_one(prior_mode, nuisances, start))
+                estimates.append(self._fit_one(prior_mode, nuisances, start))
             except SolveError as error:
                 failures.append(error)
                 remark = f"{_where(self.parameters, prior_mode)}: {error}"
                 if remark not in self._remarks:
                     self._remarks.append(remark)
-        if not found:
+        if not estimates:
             raise failures[0]
-        return tuple(sorted(found, key=lambda mode: -mode.log_evidence))
+        return tuple(sorted(estimates, key=lambda mode: -mode.log_evidence))
 
     def _fit_one(self, prior_mode: PriorMode, nuisances: Nuisances, start: Estimate | None) -> Estimate:
         text = "Gauss-Newton" + (f", {_where(self.parameters, prior_mode)}" if len(self.prior_modes) > 1 else "")
@@ -179,14 +179,14 @@ class Estimation:
         tolerance = self.options.tolerance if final else max(self.options.tolerance, _BEFORE)
         search = GaussNewton(problem, tolerance, self.listener.step)
         if start is None:
-            found = search.solve()
+            fitted = search.solve()
         else:
             values = nuisances.prior.mean.copy()
             values[len(values) - len(start.point.nuisances) :] = start.point.nuisances
-            found = search.solve(start.point.state, values)
-        if not found.converged:
+            fitted = search.solve(start.point.state, values)
+        if not fitted.converged:
             self._remarks.append(f"{text}: not converged")
-        return found
+        return fitted
 
     def _corrected_for_mesh(
         self, modes: tuple[Estimate, ...], believed: Discretisation, errors: list[DiscretisationError]
@@ -214,8 +214,8 @@ class Estimation:
         solves = self.options.chain
         self.listener.stage(f"Laplace's approximation fails: a chain of {solves} equilibria instead")
         best = int(np.argmax(importance.log_densities))
-        found = np.isfinite(importance.log_densities[best])
-        start = importance.theta[best] if found else target.modes[0].theta
+        solved = np.isfinite(importance.log_densities[best])
+        start = importance.theta[best] if solved else target.modes[0].theta
         rng = np.random.default_rng([self.options.seed, 1])
         return run_chain(target, proposal, start, solves, rng, lambda n: self.listener.progress(n / solves))
 

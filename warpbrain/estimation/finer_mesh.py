@@ -236,10 +236,13 @@ class FinerMesh:
         """
         assert self._system is not None and self._last is not None
         finer, coarse, u = self._last
-        found = SensitivitySolver(self._system, _DERIVATIVES).solve(
+        sensitivities = SensitivitySolver(self._system, _DERIVATIVES).solve(
             u, lambda at: finer.model(coarse, materials(at)), theta
         )
-        each = [restricted(finer.prolongation, du, dR) for du, dR in zip(found.u, found.reactions, strict=True)]
+        each = [
+            restricted(finer.prolongation, du, dR)
+            for du, dR in zip(sensitivities.u, sensitivities.reactions, strict=True)
+        ]
         return np.array([du for du, _ in each]), np.array([dR for _, dR in each])
 
     def _two_level(self, system: System, coarse: System, u: Floats, prolongation: Any) -> TwoLevelGradient | None:

@@ -74,16 +74,16 @@ class Forward:
         `tolerance` is `EXACT` or `ROUGH`; `SolveError` if one is not found.
         """
         starts = [None] * len(self.states) if start is None else np.split(start, len(self.states))
-        found: list[State] = []
+        solved: list[State] = []
         for state, near in zip(self.states, starts, strict=True):
             self.solves += 1
-            found.append(state.solve(theta, found[-1].u if near is None and found else near, tolerance))
+            solved.append(state.solve(theta, solved[-1].u if near is None and solved else near, tolerance))
         return State(
             theta.copy(),
-            np.concatenate([one.u for one in found]),
-            np.concatenate([one.reactions for one in found]),
-            sum(one.newton_iterations for one in found),
-            any(one.passed_unstable for one in found),
+            np.concatenate([one.u for one in solved]),
+            np.concatenate([one.reactions for one in solved]),
+            sum(one.newton_iterations for one in solved),
+            any(one.passed_unstable for one in solved),
         )
 
     def solve_from(self, theta: Floats, starts: Sequence[Floats | None], tolerance: float = EXACT) -> State:
@@ -121,10 +121,10 @@ class OneState:
     def solve(self, theta: Floats, start: Floats | None, tolerance: float = EXACT) -> State:
         """The equilibrium; `SolveError` if none is found."""
         self.system.set_model(self._model(theta))
-        found = self._solvers[tolerance].solve(self._external, start)
-        reactions = self.system.model.reactions(found.internal, self._external)
-        self._last = found.u
-        return State(theta, found.u, reactions, len(found.history), found.unstable_iterations > 0)
+        equilibrium = self._solvers[tolerance].solve(self._external, start)
+        reactions = self.system.model.reactions(equilibrium.internal, self._external)
+        self._last = equilibrium.u
+        return State(theta, equilibrium.u, reactions, len(equilibrium.history), equilibrium.unstable_iterations > 0)
 
     def differentiate(self, theta: Floats, u: Floats) -> tuple[Floats, Floats]:
         """Derivatives of a state by its parameters; `SolveError` if it is unstable."""
@@ -132,8 +132,8 @@ class OneState:
         if remembers and (self._last is None or not np.array_equal(u, self._last)):
             # what contacts have found is that of the state that was solved for last
             u = self.solve(theta, u).u
-        found = self._sensitivity.solve(u, self._model, theta)
-        return found.u, found.reactions
+        sensitivities = self._sensitivity.solve(u, self._model, theta)
+        return sensitivities.u, sensitivities.reactions
 
     def _model(self, theta: Floats) -> Model:
         plain = replace(self._plain, materials=self._parameters.materials(theta))

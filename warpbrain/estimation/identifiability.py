@@ -48,23 +48,23 @@ class Identifiability:
     @property
     def sentences(self) -> tuple[str, ...]:
         """For people to read."""
-        said = []
+        sentences = []
         if self.nothing:
-            said.append(
+            sentences.append(
                 "Not identifiable: the recordings say nothing of the tissue. What is given is the prior, no finding."
             )
         if self.informed:
-            said.append(f"The recordings inform {enumerated(self.informed)}.")
+            sentences.append(f"The recordings inform {enumerated(self.informed)}.")
         if self.weakly_informed:
-            said.append(f"They inform a little {enumerated(self.weakly_informed)}.")
+            sentences.append(f"They inform a little {enumerated(self.weakly_informed)}.")
         if self.hidden and not self.nothing:
-            said.append(f"They do not see {enumerated(self.hidden)}: there the estimate is the prior.")
+            sentences.append(f"They do not see {enumerated(self.hidden)}: there the estimate is the prior.")
         if self.scale_is_hidden:
-            said.append(
+            sentences.append(
                 "Absolute stiffness cannot be told from displacements that displacements cause: a recorded force, or a "
                 "load that is known, such as weight, would tell it."
             )
-        return tuple(said)
+        return tuple(sentences)
 
 
 def identifiability(estimate: Estimate) -> Identifiability:

@@ -204,12 +204,12 @@ class Likelihood:
         start = Noise(rows, sigma, 1.0, np.ones(len(rows.points)), self.outliers)
         # gross errors first, and all points sound first
         starts = [start] if self.outliers is None else [start, start.with_likely_scale(expected, columns)]
-        found = max((settled(one) for one in starts), key=lambda noise: noise.log_evidence(expected, columns))
+        best = max((settled(one) for one in starts), key=lambda noise: noise.log_evidence(expected, columns))
         if not rows.over_element.any() or self.outliers is None:
-            return found
+            return best
         for part in beliefs("mesh.unresolved")[1:].tolist():
-            other = settled(replace(found, unresolved=part))
-            if other.log_evidence(expected, columns) < found.log_evidence(expected, columns):
+            other = settled(replace(best, unresolved=part))
+            if other.log_evidence(expected, columns) < best.log_evidence(expected, columns):
                 break
-            found = other
-        return found
+            best = other
+        return best

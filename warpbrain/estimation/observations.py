@@ -156,13 +156,13 @@ class Observations:
         if not any(recording.role == "fit" for recording in case.recordings):
             checks = f"; its {len(case.recordings)} have role = 'check'" if case.recordings else ""
             raise InputError(f"{case.path}: no [[recording]] to estimate from{checks}")
-        found = cls._of(case, "fit", moments)
-        if not found.recordings:
-            raise InputError(f"{case.path}: nothing to estimate from: {'; '.join(found.remarks)}")
+        observations = cls._of(case, "fit", moments)
+        if not observations.recordings:
+            raise InputError(f"{case.path}: nothing to estimate from: {'; '.join(observations.remarks)}")
         for recording in case.recordings:
             if recording.role == "fit" and (why := too_few_for_noise(case, recording)):
                 raise InputError(why)
-        return found
+        return observations
 
     @classmethod
     def to_check(cls, case: Case, moments: Moments | None = None) -> Observations:
@@ -220,25 +220,27 @@ class Observations:
     @cached_property
     def _rows(self) -> dict[str, Any]:
         """What of the rows is the same at all states."""
-        found = self.recordings
+        recordings = self.recordings
 
         def each(values: Sequence[Floats | Ints]) -> Any:
-            return np.concatenate([np.repeat(v, one.size, axis=0) for v, one in zip(values, found, strict=True)])
+            return np.concatenate([np.repeat(v, one.size, axis=0) for v, one in zip(values, recordings, strict=True)])
 
-        names = tuple(dict.fromkeys(one.name for one in found))
-        groups = np.split(np.arange(sum(len(one.rows) for one in found)), np.cumsum([len(one.rows) for one in found]))
+        names = tuple(dict.fromkeys(one.name for one in recordings))
+        groups = np.split(
+            np.arange(sum(len(one.rows) for one in recordings)), np.cumsum([len(one.rows) for one in recordings])
+        )
         return {
-            "sigma": each([np.full(len(one.rows), np.nan) if one.sigma is None else one.sigma for one in found]),
-            "positions": each([one.positions for one in found]),
-            "over_element": np.concatenate([one.over_element.reshape(-1, 3) for one in found]),
+            "sigma": each([np.full(len(one.rows), np.nan) if one.sigma is None else one.sigma for one in recordings]),
+            "positions": each([one.positions for one in recordings]),
+            "over_element": np.concatenate([one.over_element.reshape(-1, 3) for one in recordings]),
             "groups": each(groups[:-1]),
-            "recordings": each([np.full(len(one.rows), names.index(one.name)) for one in found]),
-            "times": each([one.times for one in found]),
+            "recordings": each([np.full(len(one.rows), names.index(one.name)) for one in recordings]),
+            "times": each([one.times for one in recordings]),
             "names": names,
-            "after": each([np.full(len(one.rows), one.after) for one in found]),
-            "before": each([np.full(len(one.rows), one.before) for one in found]),
-            "references": each([np.full(len(one.rows), one.reference) for one in found]),
-            "weights": each([one.weights for one in found]),
+            "after": each([np.full(len(one.rows), one.after) for one in recordings]),
+            "before": each([np.full(len(one.rows), one.before) for one in recordings]),
+            "references": each([np.full(len(one.rows), one.reference) for one in recordings]),
+            "weights": each([one.weights for one in recordings]),
         }
 
 
@@ -268,10 +270,10 @@ def _observations(case: Case, recording: Recording, moments: Moments) -> Iterato
     states = np.array([moments.number(time) for time in times[rows].tolist()])
     start = -1 if recording.reference is None else moments.number(recording.reference)
     for number in np.unique(states).tolist():
-        own, weights, size, positions, edges, at = make(case, recording, rows[states == number])
-        sigma, change = _sigma(recording, own, weights), np.zeros((len(own), size, 3))
-        about = sigma, weights, size, positions, edges, change, times[own], recording.reference or 0.0
-        yield Observation(recording.name, recording.kind, unit, own, *about, number, start, at)
+        members, weights, size, positions, edges, at = make(case, recording, rows[states == number])
+        sigma, change = _sigma(recording, members, weights), np.zeros((len(members), size, 3))
+        about = sigma, weights, size, positions, edges, change, times[members], recording.reference or 0.0
+        yield Observation(recording.name, recording.kind, unit, members, *about, number, start, at)
 
 
 def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Made:
@@ -368,9 +370,9 @@ def _with_changes(each: Sequence[tuple[Recording, Observation]]) -> tuple[Observ
     alike: dict[tuple[Any, ...], list[tuple[int, int]]] = {}
     for number, (recording, observation) in enumerate(each):
         if isinstance(recording, PointsRecording):
-            own = number if recording.sigma is None or recording.sigmas is not None else None
+            alone = number if recording.sigma is None or recording.sigmas is not None else None
             for row, time in enumerate(observation.times.tolist()):
-                alike.setdefault((time, recording.reference, recording.sigma, own), []).append((number, row))
+                alike.setdefault((time, recording.reference, recording.sigma, alone), []).append((number, row))
     changes = [observation.over_element.copy() for _, observation in each]
     for members in alike.values():
         rows = [(each[number][0], each[number][1].rows[row]) for number, row in members]
@@ -386,8 +388,8 @@ def _sigma(recording: Recording, rows: Ints, weights: Floats) -> Floats | None:
     sigmas = getattr(recording, "sigmas", None)
     if sigmas is None and recording.sigma is None:
         return None
-    found = np.full(len(rows), recording.sigma, dtype=np.float64) if sigmas is None else np.asarray(sigmas)[rows]
-    for value in found.tolist():
+    sigma = np.full(len(rows), recording.sigma, dtype=np.float64) if sigmas is None else np.asarray(sigmas)[rows]
+    for value in sigma.tolist():
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(f"recording '{recording.name}': sigma = {value:g}: expected a positive number")
-    return found / np.sqrt(weights)
+    return sigma / np.sqrt(weights)

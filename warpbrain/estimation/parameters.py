@@ -120,12 +120,12 @@ class Parameters:
 
     def theta_of(self, laws: Sequence[Law]) -> Floats:
         """The vector (p,) of the law of each tissue; `InputError` if it is not as in the case, or of several terms."""
-        found: list[float] = []
+        theta: list[float] = []
         for law, tissue, name in zip(laws, self.tissues, self.laws_of, strict=True):
             if law.name != name:
                 raise InputError(f"{tissue}: found the law {law.name}, expected {name}")
-            found.extend(to_coordinates(law))
-        return np.array(found)
+            theta.extend(to_coordinates(law))
+        return np.array(theta)
 
     def laws(self, theta: ArrayLike) -> tuple[Law, ...]:
         """The law of each tissue; `InputError` if `theta` is not as long as there are parameters, or not finite."""

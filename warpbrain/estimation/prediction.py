@@ -68,7 +68,7 @@ class OverallErrors:
     @classmethod
     def of(cls, each: Sequence[Prediction]) -> tuple[OverallErrors, ...]:
         """Of each role that has any."""
-        found = []
+        overall = []
         for role in dict.fromkeys(one.role for one in each if one.unit == "m"):
             lengths = [one for one in each if one.role == role and one.unit == "m"]
             residuals = (
@@ -77,8 +77,8 @@ class OverallErrors:
                 [one.run.residuals_after for one in lengths],
             )
             errors = (by_unit(("m", one) for one in values)["m"] for values in residuals)
-            found.append(cls(role, sum(one.fitted.count for one in lengths), *errors))
-        return tuple(found)
+            overall.append(cls(role, sum(one.fitted.count for one in lengths), *errors))
+        return tuple(overall)
 
 
 def predictions(
@@ -100,7 +100,7 @@ def predictions(
     fitted = compared(realigned(case, motion, centre), *seen, moments)
     jacobian = problem.nuisances.jacobian(after, point.state.theta, point.nuisances, derivatives.du, derivatives.dR)
     deviations = np.sqrt(np.einsum("np,pq,nq->n", jacobian, joint, jacobian))
-    found = []
+    results = []
     for number, name in enumerate(after.names):
         members = np.flatnonzero(after.recordings == number)
         parts = [one for one in observations.recordings if one.name == name]
@@ -109,16 +109,20 @@ def predictions(
         seen_rows, noise = after.of_rows(members), point.noise
         if role != "fit":
             noise = _unseen(seen_rows, jacobian[members], joint, noise)
-        own = members if role == "fit" else members - members[0]
+        noise_rows = members if role == "fit" else members - members[0]
         known = role == "fit" or first.sigma is not None
-        gross = noise.gross[[k for k, at in enumerate(noise.rows.points) if own[0] <= at[0] <= own[-1]]]
+        gross = noise.gross[[k for k, at in enumerate(noise.rows.points) if noise_rows[0] <= at[0] <= noise_rows[-1]]]
         gross = gross if len(gross) else np.zeros(len(rows), dtype=bool)
         residual, deviation = seen_rows.residual.reshape(shape), deviations[members].reshape(shape)
-        within = coverage(residual, np.hypot(deviation, noise.deviation[own].reshape(shape)), gross) if known else None
-        sigma = (noise.scale * noise.sigma)[own].reshape(shape)[:, 0] if known else None
+        within = (
+            coverage(residual, np.hypot(deviation, noise.deviation[noise_rows].reshape(shape)), gross)
+            if known
+            else None
+        )
+        sigma = (noise.scale * noise.sigma)[noise_rows].reshape(shape)[:, 0] if known else None
         about = name, first.kind, role, first.unit, rows, before.residual[members].reshape(shape), residual
-        found.append(Prediction(*about, sigma, deviation, gross, within, run[name], fitted[name]))
-    return tuple(found)
+        results.append(Prediction(*about, sigma, deviation, gross, within, run[name], fitted[name]))
+    return tuple(results)
 
 
 def _unseen(rows: Sensors, jacobian: Floats, joint: Floats, fitted: Noise) -> Noise:
@@ -134,9 +138,9 @@ def compared(case: Case, u: Floats, reactions: Floats, moments: Moments) -> Mapp
     """Recordings by name beside displacement and reactions (s N, 3) at moments, as `warpbrain run` compares them."""
     count = len(moments.cases)
     pairs = zip(np.split(u, count), np.split(reactions, count), strict=True)
-    found = [Found(case.remaining[0], *state) for state in pairs]
-    others = {time: found[number] for time, number in zip(moments.times, moments.numbers, strict=True)}
-    return {one.name: one for one in observe(case, found[-1], others=others).comparisons}
+    states = [Found(case.remaining[0], *state) for state in pairs]
+    others = {time: states[number] for time, number in zip(moments.times, moments.numbers, strict=True)}
+    return {one.name: one for one in observe(case, states[-1], others=others).comparisons}
 
 
 def coverage(residuals: Floats, deviation: Floats, gross: Bools) -> tuple[float, ...] | None:

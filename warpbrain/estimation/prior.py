@@ -42,14 +42,14 @@ def declared(case: Case, parameters: Parameters) -> Floats:
 
 def declared_deviations(case: Case, parameters: Parameters) -> Floats:
     """Standard deviation (p,) of each parameter about what a case declares."""
-    found = []
+    deviations = []
     for labels, law in zip(parameters.labels, parameters.laws_of, strict=True):
         accuracy = case.tissues[labels[0]].accuracy
         for coordinate in coordinates(law):
             # of a relative error that is small the logarithm's
             known = accuracy if coordinate == MODULUS else None
-            found.append(belief(coordinate.belief) if known is None else known)
-    return np.array(found)
+            deviations.append(belief(coordinate.belief) if known is None else known)
+    return np.array(deviations)
 
 
 @dataclass(frozen=True)
@@ -74,16 +74,16 @@ def _declared_prior(case: Case, parameters: Parameters, count: int, seed: int) -
     """A normal distribution about the laws that a case declares, within the ends of their parameters."""
     rng, mean = np.random.default_rng([seed, 2]), declared(case, parameters)
     deviations = declared_deviations(case, parameters)
-    found: list[Floats] = []
+    draws: list[Floats] = []
     attempts = 0
-    while len(found) < count:
+    while len(draws) < count:
         attempts += 1
         theta = mean + deviations * rng.normal(size=len(mean))
         if np.all((theta > parameters.low) & (theta < parameters.high)):
-            found.append(theta)
+            draws.append(theta)
     bounds = np.zeros(len(parameters.tissues))
     laws, poisson, formulations = parameters.laws_of, parameters.poisson, parameters.formulations
-    return Prior(_NoStudies(), parameters.tissues, laws, poisson, formulations, seed, np.array(found), attempts, bounds)
+    return Prior(_NoStudies(), parameters.tissues, laws, poisson, formulations, seed, np.array(draws), attempts, bounds)
 
 
 def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed: int = 0) -> Prior:

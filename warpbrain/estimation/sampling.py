@@ -96,19 +96,19 @@ class Proposal:
     @cached_property
     def shares(self) -> Floats:
         """Of each mode in the mixture."""
-        found = np.maximum(probabilities(self.modes), _AT_LEAST)
-        return found / found.sum()
+        shares = np.maximum(probabilities(self.modes), _AT_LEAST)
+        return shares / shares.sum()
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """Draws (count, p)."""
-        found: list[Floats] = []
+        draws: list[Floats] = []
         for index in rng.choice(len(self.modes), size=count, p=self.shares).tolist():
             mode = self.modes[index]
             point = self._t(rng, mode, 1)
             while not self._inside(mode, point)[0]:
                 point = self._t(rng, mode, 1)
-            found.append(point[0])
-        return np.array(found)
+            draws.append(point[0])
+        return np.array(draws)
 
     def log_density(self, theta: Floats) -> Floats:
         """Log density (n,) at points (n, p)."""
@@ -233,9 +233,9 @@ class Importance:
 
     def doubts(self, laplace: Laplace) -> tuple[str, ...]:
         """Why Laplace's approximation is not to be believed; empty if it is."""
-        found = []
+        doubts = []
         if not self.smoothed.k <= RELIABLE:
-            found.append(f"Pareto k is {self.smoothed.k:.2f}, above {RELIABLE}")
+            doubts.append(f"Pareto k is {self.smoothed.k:.2f}, above {RELIABLE}")
         deviations = laplace.standard_deviations
         # what as few draws say of a mean is itself uncertain by this many standard deviations
         error = 2.0 / np.sqrt(self.smoothed.effective)
@@ -243,10 +243,10 @@ class Importance:
         ratio = self.standard_deviations / deviations
         for name, away, times in zip(laplace.parameters.names, shift, ratio, strict=True):
             if away > _SHIFT + error:
-                found.append(f"the mean of {name} is {away:.1f} standard deviations away")
+                doubts.append(f"the mean of {name} is {away:.1f} standard deviations away")
             if not 1.0 / (_RATIO * (1.0 + error)) <= times <= _RATIO * (1.0 + error):
-                found.append(f"the standard deviation of {name} is {times:.2f} times as large")
-        return tuple(found)
+                doubts.append(f"the standard deviation of {name} is {times:.2f} times as large")
+        return tuple(doubts)
 
 
 def importance_sampling(

@@ -85,12 +85,12 @@ def sweep(
         {k: law_of_curve(model, group, k, law).law() for k in values}
         for group, law in zip(parameters.groups, parameters.laws_of, strict=True)
     ]
-    found = dict(known or {})
+    points = dict(known or {})
     forward: Forward | None = None
     near: Floats | None = None
     order = _neighbours(values, len(curves))
     for k in order:
-        if k in found:
+        if k in points:
             continue
         theta = parameters.theta_of([laws[step] for laws, step in zip(curves, k, strict=True)])
         error, reason = None, ""
@@ -100,14 +100,14 @@ def sweep(
             state = forward.solve_from(theta, (near, None))
             if not state.passed_unstable:
                 near = state.u
-            beside = compared(case, state.u, state.reactions, moments)
-            error = by_unit((one.unit, beside[one.name].residuals_after) for one in observations.recordings)[unit]
+            comparisons = compared(case, state.u, state.reactions, moments)
+            error = by_unit((one.unit, comparisons[one.name].residuals_after) for one in observations.recordings)[unit]
         except (InputError, SolveError) as failure:
             reason = str(failure)
-        found[k] = SweepPoint(k, tuple(theta.tolist()), error, reason)
+        points[k] = SweepPoint(k, tuple(theta.tolist()), error, reason)
         if on_point is not None:
-            on_point(found[k])
-    return Sweep(parameters, unit, tuple(found[k] for k in order))
+            on_point(points[k])
+    return Sweep(parameters, unit, tuple(points[k] for k in order))
 
 
 def _neighbours(values: Sequence[float], tissues: int) -> list[Steps]:

@@ -47,8 +47,8 @@ class Continuous:
 
     def value(self, mechanism: Mechanism) -> float:
         """What it is [SI]."""
-        found: Any = getattr(mechanism, self.key)
-        return float(found if self.component is None else found[self.component])
+        number: Any = getattr(mechanism, self.key)
+        return float(number if self.component is None else number[self.component])
 
     def scale(self, mechanism: Mechanism) -> float:
         """By how much it must change to change much [SI]: what a step of a difference is relative to.
@@ -87,16 +87,16 @@ def smooth_parameters(mechanism: type[Mechanism]) -> dict[str, Says]:
 
 def continuous(mechanism: Mechanism) -> tuple[Continuous, ...]:
     """Every number that a mechanism can be differentiated by, in the order of its fields."""
-    found: list[Continuous] = []
+    places: list[Continuous] = []
     for key, says in smooth_parameters(type(mechanism)).items():
         value: Any = getattr(mechanism, key)
         if value is None:
             continue
         if says.kind in _ONE:
-            found.append(Continuous(mechanism.kind, key, None, says))
+            places.append(Continuous(mechanism.kind, key, None, says))
         else:
-            found += [Continuous(mechanism.kind, key, component, says) for component in range(len(value))]
-    return tuple(found)
+            places += [Continuous(mechanism.kind, key, component, says) for component in range(len(value))]
+    return tuple(places)
 
 
 def numbers_of(mechanisms: Sequence[Mechanism]) -> Floats:
@@ -120,15 +120,15 @@ def with_numbers(mechanisms: Sequence[Mechanism], numbers: ArrayLike) -> tuple[M
     if given.shape != (count,):
         raise InputError(f"mechanisms: found {given.size} numbers, expected {count}")
     made, at = [], 0
-    for mechanism, own in zip(mechanisms, places, strict=True):
+    for mechanism, its_places in zip(mechanisms, places, strict=True):
         values: dict[str, Any] = {}
-        for place, number in zip(own, given[at : at + len(own)].tolist(), strict=True):
+        for place, number in zip(its_places, given[at : at + len(its_places)].tolist(), strict=True):
             if place.component is None:
                 values[place.key] = number
             else:
                 values[place.key] = (*values.get(place.key, ()), number)
-        at += len(own)
-        made.append(replace(mechanism, **values) if own else mechanism)
+        at += len(its_places)
+        made.append(replace(mechanism, **values) if its_places else mechanism)
     return tuple(made)
 
 

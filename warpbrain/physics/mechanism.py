@@ -344,19 +344,19 @@ class Mechanism(Ramped, abc.ABC):
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
-        said = []
+        parts = []
         for name, says in self.parameters().items():
             value = getattr(self, name)
             if value is None or value == "" or says.kind == "numbers":
                 continue
             if isinstance(value, str | ClosedSurface):
-                said.append(f"{name} '{value}'")
+                parts.append(f"{name} '{value}'")
             else:
                 # positions are millimetres to people, whatever the case's unit
                 unit, si = ("mm", 1e-3) if says.kind == "position" else (says.unit, says.si)
                 numbers = ", ".join(f"{v / si:g}" for v in np.ravel(value))
-                said.append(f"{name} {numbers}{f' {unit}' if unit else ''}")
-        return f" ({'; '.join(said)})" if said else ""
+                parts.append(f"{name} {numbers}{f' {unit}' if unit else ''}")
+        return f" ({'; '.join(parts)})" if parts else ""
 
 
 @runtime_checkable

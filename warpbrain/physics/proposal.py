@@ -135,11 +135,11 @@ class Varying:
 
     def at(self, c: Floats, time: float) -> Floats:
         """Coefficients (k,) of what acts at a time."""
-        found = self.base.mean.copy()
-        found[list(self.fixed)] = c[: len(self.fixed)]
+        coefficients = self.base.mean.copy()
+        coefficients[list(self.fixed)] = c[: len(self.fixed)]
         courses = c[len(self.fixed) :].reshape(len(self.base.varying), -1)
-        found[list(self.base.varying)] += courses @ self.modes_at(time)
-        return found
+        coefficients[list(self.base.varying)] += courses @ self.modes_at(time)
+        return coefficients
 
     def mechanisms(self, c: Floats) -> tuple[Mechanism, ...]:
         """What acts over time, each with a ramp."""
@@ -149,13 +149,13 @@ class Varying:
             # one after the other, each growing as the one before it goes
             turns = zip(acting, np.eye(len(self.times)), strict=True)
             return tuple(self._ramped(mechanism, hat * mechanism.factor()) for mechanism, hat in turns)
-        found = []
+        ramped = []
         for number, sizes in enumerate(by_time.T):
             largest = float(sizes[np.argmax(np.abs(sizes))])
             if largest != 0.0 or number == 0:
                 alone = self.base.make(largest * np.eye(len(self.base))[number])
-                found.append(self._ramped(alone, sizes / largest if largest else np.zeros_like(sizes)))
-        return tuple(found)
+                ramped.append(self._ramped(alone, sizes / largest if largest else np.zeros_like(sizes)))
+        return tuple(ramped)
 
     def _ramped(self, mechanism: Mechanism, factors: Floats) -> Mechanism:
         return replace(mechanism, ramp=tuple(zip(self.times.tolist(), factors.tolist(), strict=True)))

@@ -61,8 +61,8 @@ def elements_with(mesh: TetMesh, faces: NDArray[np.integer]) -> Bools:
     corners = np.sort(mesh.tetrahedra, axis=1)[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]]
     size = len(mesh.points)
     keys = np.ravel_multi_index(np.moveaxis(corners, -1, 0), (size, size, size))
-    own = np.ravel_multi_index(np.sort(faces, axis=1).T, (size, size, size))
-    return np.asarray(np.isin(keys, own).any(axis=1))
+    of_faces = np.ravel_multi_index(np.sort(faces, axis=1).T, (size, size, size))
+    return np.asarray(np.isin(keys, of_faces).any(axis=1))
 
 
 def unit_vector(key: str, direction: ArrayLike) -> Floats:

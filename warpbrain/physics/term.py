@@ -216,8 +216,8 @@ class Term(abc.ABC):
         """Whether `adopt` can take what another term is: stencils and arrays of the same shapes."""
         if type(self) is not type(other) or not np.array_equal(self.stencils, other.stencils):
             return False
-        own = vars(self)
-        return all(own[name].shape == array.shape for name, array in other._arrays().items())
+        attributes = vars(self)
+        return all(attributes[name].shape == array.shape for name, array in other._arrays().items())
 
     def adopt(self, other: Term) -> None:
         """Become what another term on the same body is, in the same arrays: a captured graph reads these.

@@ -144,8 +144,8 @@ def unsure(value: Value) -> bool:
 
 def vector_in(values: Values, name: str) -> Floats:
     """Components (3,) of a parameter that is a vector; zero where nothing is known."""
-    found = (values.get(f"{name}_{axis}") for axis in "xyz")
-    return np.array([0.0 if one is None else one.value for one in found])
+    components = (values.get(f"{name}_{axis}") for axis in "xyz")
+    return np.array([0.0 if one is None else one.value for one in components])
 
 
 def radius_in_words(values: Values) -> list[str]:
@@ -157,16 +157,16 @@ def radius_in_words(values: Values) -> list[str]:
 
 def clauses(parameters: Mapping[str, Says], values: Values) -> list[str]:
     """Numbers as their parameters say what they are; places and directions are said elsewhere."""
-    found = []
+    sentences = []
     if "share" in values:
         share = values["share"]
-        found.append(f"it is there to {measured(100.0 * share.value, 100.0 * share.sd)} %")
+        sentences.append(f"it is there to {measured(100.0 * share.value, 100.0 * share.sd)} %")
     for name, value in values.items():
         if name in parameters and parameters[name].kind in ("number", "numbers"):
             clause = label(parameters[name].doc)
             whose = "" if "'" in clause.split(" ")[0] else "its "
-            found.append(f"{whose}{clause} is {measured(value.value, value.sd, value.unit)}")
-    return found
+            sentences.append(f"{whose}{clause} is {measured(value.value, value.sd, value.unit)}")
+    return sentences
 
 
 def label(doc: str) -> str:

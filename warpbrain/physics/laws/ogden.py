@@ -220,9 +220,9 @@ class Ogden(Law):
         terms = max(len(law.parameters()) // 2 for law in laws)
         rows = []
         for law in laws:
-            own = len(law.parameters()) // 2
-            mu, alpha = law.parameters()[:own], law.parameters()[own:]
-            rows.append(mu + (0.0,) * (terms - own) + alpha + (2.0,) * (terms - own))
+            count = len(law.parameters()) // 2
+            mu, alpha = law.parameters()[:count], law.parameters()[count:]
+            rows.append(mu + (0.0,) * (terms - count) + alpha + (2.0,) * (terms - count))
         return rows
 
     def energy(self, stretches: Floats) -> Floats:

@@ -65,11 +65,11 @@ class Asymmetry(Mechanism):
         if "exponent" not in values:
             return []
         exponent = values["exponent"]
-        found = f"Ogden's exponent is {measured(exponent.value, exponent.sd)}"
+        clause = f"Ogden's exponent is {measured(exponent.value, exponent.sd)}"
         if exponent.sd > abs(exponent.value - NEO_HOOKEAN):
-            return [found]
+            return [clause]
         more, less = ("compression", "tension") if exponent.value < NEO_HOOKEAN else ("tension", "compression")
-        return [f"{found}: it resists {more} more, and {less} less, than the neo-Hookean law"]
+        return [f"{clause}: it resists {more} more, and {less} less, than the neo-Hookean law"]
 
     @classmethod
     def check_tests(cls, tests: Tests) -> None:

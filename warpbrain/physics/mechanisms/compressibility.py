@@ -43,9 +43,9 @@ class Compressibility(Mechanism):
     @classmethod
     def about_law(cls, poisson: float, sd: float) -> Proposal:
         """See `warpbrain.physics.mechanism.Mechanism`; of `-ln(1 - 2 nu)`, in which bulk moduli are even steps."""
-        own = -math.log1p(-2.0 * poisson)
+        coordinate = -math.log1p(-2.0 * poisson)
         return Proposal.of_one(
-            lambda c: cls(poisson=-0.5 * math.expm1(-c)), own, sd, "smooth", own, region="all tissue"
+            lambda c: cls(poisson=-0.5 * math.expm1(-c)), coordinate, sd, "smooth", coordinate, region="all tissue"
         )
 
     @classmethod

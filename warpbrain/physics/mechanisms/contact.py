@@ -152,10 +152,10 @@ class Contact(Mechanism):
         """Points [m] and outward triangles of the surface it touches."""
         if self.surface is not None:
             return self.surface.points, self.surface.outward
-        own = faces_of(mesh, mesh.node_sets[self.nodes])
-        if not len(own):
+        faces = faces_of(mesh, mesh.node_sets[self.nodes])
+        if not len(faces):
             raise ParameterError("nodes", f"node set '{self.nodes}' holds no face of the surface")
-        return mesh.points, own
+        return mesh.points, faces
 
     def held(self, mesh: TetMesh) -> tuple[Ints, Floats]:
         members = np.flatnonzero(mesh.node_sets[self.nodes])
@@ -180,17 +180,17 @@ class ContactTerm(KernelTerm):
         self.mechanism = contact
         precision, device = body.precision, body.device
         points, faces = contact.skull(body.mesh)
-        own = body.mesh.boundary
-        shared = np.isin(own, members)
-        touching = own[shared.any(axis=1)]
+        boundary = body.mesh.boundary
+        shared = np.isin(boundary, members)
+        touching = boundary[shared.any(axis=1)]
         # what the body's own triangles cannot follow need not be resolved
         spacing = min(_edge(points, faces), _edge(body.mesh.points, touching))
         # of its own surface only differences count: the smoother, the better
         given = contact.surface is not None
         self._field = DistanceField(points, faces, spacing, body.mesh.points[members], given, device, precision)
         # a node at the rim of the set touches with what is in the set; one without a face there with all it has
-        area = node_areas(body.mesh.points, own[shared.all(axis=1)])[members]
-        area = np.where(area > 0.0, area, node_areas(body.mesh.points, own)[members])
+        area = node_areas(body.mesh.points, boundary[shared.all(axis=1)])[members]
+        area = np.where(area > 0.0, area, node_areas(body.mesh.points, boundary)[members])
         self._size = float(np.sqrt(np.median(area)))
         self._numbers = wp.zeros(2, dtype=precision.scalar, device=device)
         self.take_moduli()
@@ -248,17 +248,17 @@ class ContactTerm(KernelTerm):
     def augment(self, u: wp.array) -> bool:
         if self.mechanism.state == "fixed":
             return self._hold(u)
-        gaps, found = self.gaps(u), self.pressures()
-        pressure = self.stiffness * gaps + found
+        gaps, before = self.gaps(u), self.pressures()
+        pressure = self.stiffness * gaps + before
         if self.mechanism.state == "lifting":
             pressure = np.maximum(pressure, 0.0)
         # no pressure brings a node nearer whose place is prescribed
-        pressure = np.where(self._movable, pressure, found)
+        pressure = np.where(self._movable, pressure, before)
         self._found.assign(pressure)
         rubbing = self.pressing()
         self._press(u, pressure)
         # what is left of the distance where the surface is touched
-        if np.abs(pressure - found).max() > _NEAR * self.stiffness:
+        if np.abs(pressure - before).max() > _NEAR * self.stiffness:
             return True
         pressing = np.maximum(pressure, 0.0)
         return self.mechanism.friction > 0.0 and bool(

@@ -324,8 +324,8 @@ class DrainageTerm(Term):
         Zero where there are no pores.
         """
         base = self.mechanism.pressure * float(self.scale.numpy()[0])
-        found = base + self._beyond.numpy().astype(np.float64)
-        return np.where(self._lumped.numpy() > 0.0, found, 0.0)
+        total = base + self._beyond.numpy().astype(np.float64)
+        return np.where(self._lumped.numpy() > 0.0, total, 0.0)
 
     def nodal_pressures(self) -> dict[str, Floats]:
         return {"fluid_pressure": self.pressures()}
@@ -411,7 +411,7 @@ class DrainageTerm(Term):
         beyond, taken = self._beyond.numpy().astype(np.float64), self._taken.numpy().astype(np.float64)
         base = self.mechanism.pressure * float(self.scale.numpy()[0])
         if self.coupled:
-            own = 0.5 * float(beyond @ self._solver.b.numpy().astype(np.float64))
+            stored = 0.5 * float(beyond @ self._solver.b.numpy().astype(np.float64))
         else:
-            own = -float(taken @ beyond[self.stencils].sum(axis=1))
-        return own - 4.0 * base * float(taken.sum())
+            stored = -float(taken @ beyond[self.stencils].sum(axis=1))
+        return stored - 4.0 * base * float(taken.sum())

@@ -78,10 +78,10 @@ class Falx(Mechanism):
     def faces(self, mesh: TetMesh) -> NDArray[np.int32]:
         """Triangles (k, 3) of the membrane."""
         faces = all_faces(mesh.tetrahedra)
-        own = faces[mesh.node_sets[self.nodes][faces].all(axis=1)]
-        if not len(own):
+        membrane = faces[mesh.node_sets[self.nodes][faces].all(axis=1)]
+        if not len(membrane):
             raise ParameterError("nodes", f"node set '{self.nodes}' holds no face of the mesh")
-        return own
+        return membrane
 
     def bind(self, body: Body) -> "MembraneTerm":
         return MembraneTerm(body, self)

@@ -167,13 +167,13 @@ class Fibres(Mechanism):
             "exponent": "the exponent with which they stiffen is",
             "dispersion": "their scatter, from 0 all parallel to 1/3 no direction, is",
         }
-        found = [
+        clauses = [
             f"{words} {measured(values[name].value, values[name].sd, values[name].unit)}"
             for name, words in known.items()
             if name in values
         ]
         line = along(vector_in(values, "direction"))
-        return [*found, *([f"they run {line}"] if line else [])]
+        return [*clauses, *([f"they run {line}"] if line else [])]
 
     def stored_energy(self, F: Floats) -> Floats:
         """See `warpbrain.physics.mechanism.Storing`; one direction of fibres."""

@@ -183,7 +183,7 @@ class Gravity(BodyForce, Mechanism):
         down = unit_vector("gravity_axis", situation.gravity_axis)
         height = float(np.ptp(points @ down))
         across = tangents(down)
-        found = []
+        proposals = []
         for level in np.linspace(-0.05, 0.9, _LEVELS) * height:
 
             def drained(c: Floats, middle: float = float(level)) -> Gravity:
@@ -201,18 +201,18 @@ class Gravity(BodyForce, Mechanism):
 
             sd = np.array([_SHARE, _POSE, _POSE])
             usual = np.array([1.0, 0.0, 0.0])
-            found.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(3)))
+            proposals.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(3)))
             sd, usual = np.append(sd, _FALL * height), np.append(usual, 0.0)
             over_time: dict[str, Any] = {"varying": (3,), "in_turns": True, "only_over_time": True}
-            found.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(4), **over_time))
-        return found
+            proposals.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(4), **over_time))
+        return proposals
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        found = []
+        clauses = []
         if "csf_level" in values:
             level = values["csf_level"]
-            found.append(
+            clauses.append(
                 f"the fluid's surface is {measured(level.value, level.sd, 'mm')} above the lowest point of the anatomy"
             )
         down = _down(values, gravity_axis)
@@ -220,10 +220,10 @@ class Gravity(BodyForce, Mechanism):
             share = values["share"]
             where = towards(math.copysign(1.0, share.value) * down)
             part = measured(100.0 * share.value, 100.0 * share.sd)
-            found.append(f"{part} % of that weight acts{f', {where}' if where else ''}")
+            clauses.append(f"{part} % of that weight acts{f', {where}' if where else ''}")
         elif down.any():
-            found.append(f"its weight acts {towards(down)}")
-        return [*found, *_tilt(values, gravity_axis, down)]
+            clauses.append(f"its weight acts {towards(down)}")
+        return [*clauses, *_tilt(values, gravity_axis, down)]
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
@@ -294,20 +294,20 @@ class Gravity(BodyForce, Mechanism):
 
 def _down(values: Values, axis: tuple[float, float, float] | None) -> Floats:
     """Where 'down' was found to be (3,): a component that is not known better than beforehand is where it was."""
-    found = vector_in(values, "direction")
+    direction = vector_in(values, "direction")
     if axis is None:
-        return found
+        return direction
     known = [f"direction_{letter}" in values for letter in "xyz"]
-    return np.where(known, found, unit_vector("gravity_axis", axis))
+    return np.where(known, direction, unit_vector("gravity_axis", axis))
 
 
-def _tilt(values: Values, axis: tuple[float, float, float] | None, found: Floats) -> list[str]:
+def _tilt(values: Values, axis: tuple[float, float, float] | None, direction: Floats) -> list[str]:
     components = [values[name] for letter in "xyz" if (name := f"direction_{letter}") in values]
     if axis is None or not components:
         return []
     down = unit_vector("gravity_axis", axis)
-    across = found - (found @ down) * down
-    degrees = math.degrees(math.atan2(float(np.linalg.norm(across)), float(found @ down)))
+    across = direction - (direction @ down) * down
+    degrees = math.degrees(math.atan2(float(np.linalg.norm(across)), float(direction @ down)))
     spread = math.degrees(math.hypot(*(one.sd for one in components)))
     where = f" {towards(across)}" if degrees > spread else ""
     return [f"'down' is tilted by {measured(degrees, spread)} degrees{where} from what was declared"]

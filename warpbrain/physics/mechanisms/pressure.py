@@ -86,14 +86,14 @@ class Pressure(Mechanism):
 
     def faces(self, mesh: TetMesh) -> Ints:
         """Triangles (k, 3) that carry the pressure, oriented outwards."""
-        own = faces_of(mesh, mesh.node_sets[self.nodes])
-        if not len(own):
+        loaded = faces_of(mesh, mesh.node_sets[self.nodes])
+        if not len(loaded):
             wall = self.nodes in mesh.element_sets
             cure = f" (the wall of '{self.nodes}' is part of it once that is taken out by a resection)" if wall else ""
             raise ParameterError(
                 "nodes", f"node set '{self.nodes}' holds no face of the surface, which a pressure needs{cure}"
             )
-        return own
+        return loaded
 
     def acts_on(self, mesh: TetMesh) -> Bools:
         return elements_with(mesh, self.faces(mesh))
@@ -116,15 +116,15 @@ class Pressure(Mechanism):
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
         if "value" not in values:
             return []
-        found = values["value"]
-        if unsure(found):
-            return [f"it is {measured(found.value, found.sd, 'Pa')} above that elsewhere, {HARDLY}"]
+        value = values["value"]
+        if unsure(value):
+            return [f"it is {measured(value.value, value.sd, 'Pa')} above that elsewhere, {HARDLY}"]
         word, does = (
             ("higher", "pushes the wall into the tissue")
-            if found.value >= 0.0
+            if value.value >= 0.0
             else ("lower", "pulls the wall out of the tissue, towards the fluid")
         )
-        return [f"it is {measured(abs(found.value), found.sd, 'Pa')} {word} there than elsewhere, and {does}"]
+        return [f"it is {measured(abs(value.value), value.sd, 'Pa')} {word} there than elsewhere, and {does}"]
 
     def bind(self, body: Body) -> "PressureTerm":
         return PressureTerm(body, self.faces(body.mesh), self.value, self.factor)
@@ -167,9 +167,9 @@ class PressureTerm(TriangleTerm):
         for component in components.tolist():
             sides = []
             for sign in (1.0, -1.0):
-                beside = u.copy()
-                beside.ravel()[component] += sign * step
-                sides.append(self._nodal_forces(beside).ravel()[components])
+                moved = u.copy()
+                moved.ravel()[component] += sign * step
+                sides.append(self._nodal_forces(moved).ravel()[components])
             columns.append((sides[0] - sides[1]) / (2.0 * step))
         skew = 0.5 * (np.column_stack(columns) - np.array(columns))
         rows, others = np.meshgrid(components, components, indexing="ij")
@@ -178,9 +178,9 @@ class PressureTerm(TriangleTerm):
     def _nodal_forces(self, u: Floats) -> Floats:
         """Internal forces (n, 3) [N] at a displacement."""
         self.evaluate_forces(self.array(u, self.body.precision.vec3))
-        found = np.zeros(u.shape)
-        np.add.at(found, self.stencils, self.forces.numpy())
-        return found
+        forces = np.zeros(u.shape)
+        np.add.at(forces, self.stencils, self.forces.numpy())
+        return forces
 
 
 @cache

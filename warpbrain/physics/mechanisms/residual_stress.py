@@ -109,8 +109,8 @@ class ResidualStress(Mechanism):
         tension, where = values["tension"], along(vector_in(values, "direction"))
         word = "tension" if tension.value >= 0.0 or unsure(tension) else "compression"
         size = abs(tension.value) if word == "compression" else tension.value
-        found = f"it is under a {word} of {measured(size, tension.sd, 'Pa')} {where}".rstrip()
-        return [f"{found}, {HARDLY}" if unsure(tension) else found]
+        clause = f"it is under a {word} of {measured(size, tension.sd, 'Pa')} {where}".rstrip()
+        return [f"{clause}, {HARDLY}" if unsure(tension) else clause]
 
     def bind(self, body: Body) -> ExtraEnergyTerm:
         elements = elements_of(body.mesh, self.elements)

@@ -108,9 +108,9 @@ class Traction(Load, Mechanism):
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         nodes, areas = _patch(mesh, tuple(map(float, self.centre)), float(self.radius))
-        found = np.zeros(mesh.points.shape)
-        found[nodes] = np.outer(areas, self.value)
-        return found
+        forces = np.zeros(mesh.points.shape)
+        forces[nodes] = np.outer(areas, self.value)
+        return forces
 
 
 @lru_cache(maxsize=_KEPT)
@@ -122,9 +122,9 @@ def _patch(mesh: TetMesh | QuadraticMesh, centre: tuple[float, ...], radius: flo
 
     def profile(points: Floats) -> Floats:
         away = np.minimum(np.linalg.norm(points - np.array(centre), axis=1) / radius, 1.0)
-        found = np.zeros(points.shape)
-        found[:, 0] = 0.5 * (1.0 + np.cos(np.pi * away))
-        return found
+        weights = np.zeros(points.shape)
+        weights[:, 0] = 0.5 * (1.0 + np.cos(np.pi * away))
+        return weights
 
     areas = surface_forces(mesh, profile, triangles)[:, 0]
     nodes = np.flatnonzero(areas)

@@ -89,8 +89,8 @@ class Viscoelasticity(Mechanism):
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.moduli) != len(self.times) or not self.times:
-            found = f"found {len(self.times)}, and {len(self.moduli)} of moduli"
-            raise ParameterError("times", f"{found}: expected one of each for every branch")
+            counts = f"found {len(self.times)}, and {len(self.moduli)} of moduli"
+            raise ParameterError("times", f"{counts}: expected one of each for every branch")
         for name in ("moduli", "times"):
             values = getattr(self, name)
             if not all(math.isfinite(value) and value > 0.0 for value in values):
@@ -126,16 +126,16 @@ class Viscoelasticity(Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        found = []
+        clauses = []
         if "moduli" in values:
             moduli = values["moduli"]
-            found.append(
+            clauses.append(
                 f"at first it is {measured(1.0 + moduli.value, moduli.sd)} times as stiff as in the end, whether it "
                 "relaxes in one time or in two; what relaxes before the first recording is hardly seen"
             )
         if "times" in values:
             of = "of " if unsure(values["times"]) else ""
-            found.append(f"if it has one, its relaxation time is {of}{_time_in_words(values['times'])}")
+            clauses.append(f"if it has one, its relaxation time is {of}{_time_in_words(values['times'])}")
         branches = [(values.get(f"moduli_{branch}"), values.get(f"times_{branch}")) for branch in (1, 2)]
         each = [
             f"{measured(modulus.value, modulus.sd)} within {_time_in_words(time)}"
@@ -143,8 +143,8 @@ class Viscoelasticity(Mechanism):
             if modulus is not None and time is not None
         ]
         if each:
-            found.append(f"if it has two, what relaxes, as a part of that in the end, is {', and '.join(each)}")
-        return found
+            clauses.append(f"if it has two, what relaxes, as a part of that in the end, is {', and '.join(each)}")
+        return clauses
 
     @classmethod
     def smallest_in_words(cls, smallest: Smallest) -> str:
