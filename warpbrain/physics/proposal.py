@@ -241,7 +241,7 @@ class Proposal:
         return cls(made, np.array([mean]), np.array([sd]), follows, np.array([start]), **where)  # type: ignore[arg-type]
 
     @classmethod
-    def switch(cls, mechanism: Mechanism, sd: float, follows: Follows = "switch", **where: object) -> Proposal:
+    def switch(cls, mechanism: Mechanism, sd: float, follows: Follows = "switch", **where: Any) -> Proposal:
         """What is there or not; its one coefficient, the share, says how exactly that is simulated."""
         return cls.of_one(lambda _share: mechanism, 1.0, sd, follows, **where)
 
