@@ -44,24 +44,6 @@ from warpbrain.physics.term import Following
 from warpbrain.physics.words import Smallest, Values, clauses, label, number
 
 
-@dataclass(frozen=True)
-class ClosedSurface:
-    """A closed surface of triangles."""
-
-    file: str  # where it came from, for people
-    points: Floats = field(repr=False, compare=False)  # (n, 3) [m]
-    faces: NDArray[np.int32] = field(repr=False, compare=False)  # (k, 3), oriented in one way, inwards or outwards
-
-    def __str__(self) -> str:
-        return self.file
-
-    @property
-    def outward(self) -> NDArray[np.int32]:
-        """The triangles, all turned if they enclose a negative volume."""
-        a, b, c = (self.points[self.faces[:, i]] - self.points.mean(axis=0) for i in range(3))
-        return self.faces if np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0 else self.faces[:, ::-1]
-
-
 __all__ = [
     "Emptying",
     "Facts",
@@ -83,6 +65,24 @@ __all__ = [
 #: an array of directions, a closed surface, a position, a vector that is no length, or numbers. Users may say a tissue
 #: for an element set, and files for directions and surfaces (`warpbrain.cases.parts.named`).
 KINDS = ("number", "text", "node set", "element set", "directions", "surface", "position", "vector", "numbers")
+
+
+@dataclass(frozen=True)
+class ClosedSurface:
+    """A closed surface of triangles."""
+
+    file: str  # where it came from, for people
+    points: Floats = field(repr=False, compare=False)  # (n, 3) [m]
+    faces: NDArray[np.int32] = field(repr=False, compare=False)  # (k, 3), oriented in one way, inwards or outwards
+
+    def __str__(self) -> str:
+        return self.file
+
+    @property
+    def outward(self) -> NDArray[np.int32]:
+        """The triangles, all turned if they enclose a negative volume."""
+        a, b, c = (self.points[self.faces[:, i]] - self.points.mean(axis=0) for i in range(3))
+        return self.faces if np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0 else self.faces[:, ::-1]
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ class Patch:
 
     name: str  # of the node set that they become
     surface: str  # of the one that they are a part of
-    members: Bools  # (n,), they
+    members: Bools  # (n,), which nodes they are
     held: Bools  # (n,), all nodes of that surface
     centre: Floats  # (3,) [m]
     radius: float  # [m]
