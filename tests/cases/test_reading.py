@@ -5,7 +5,7 @@ import re
 import meshio
 import numpy as np
 import pytest
-from folders import CASE, SIDE, block, changed, write_folder
+from folders import CASE, SIDE, block, changed, write_folder, write_recorded
 from wrong_cases import FORCE, GRAVITY, SECOND_LAW, WRONG
 
 from warpbrain.cases.boundary import Fixed, Forced
@@ -134,6 +134,16 @@ def test_a_ramp_is_read(tmp_path):
     case = read_case(write_folder(tmp_path, ("-0.05]", "-0.05]\nramp = [[0, 0], [0.05, 1.0]]")))
     assert case.boundaries[1].ramp == ((0.0, 0.0), (0.05, 1.0))
     assert model_of(case).loads[0].factor(0.025) == pytest.approx(0.5)
+
+
+def test_a_surface_may_name_its_nodes_by_a_file(tmp_path):
+    top = np.flatnonzero(block().node_sets["top"])
+    folder = write_recorded(tmp_path, files={"lid-nodes.csv": "\n".join(map(str, top)) + "\n"})
+    text = (folder / "case.toml").read_text()
+    head, recordings = text.split("[[recording]]", 1)
+    (folder / "case.toml").write_text(f"{head}[[recording]]" + recordings.replace('"top"', '"lid-nodes.csv"'))
+    case = read_case(folder)
+    np.testing.assert_array_equal(np.flatnonzero(case.mesh.node_sets[case.recordings[1].nodes]), top)
 
 
 def test_resected_tissue_is_gone_from_the_model(tmp_path):

@@ -8,18 +8,22 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from warpbrain import __version__
-from warpbrain.cli import cases, compare, completion, diagnose, doctor, ensemble, estimate, gp, run, view, warp
+from warpbrain.cli import cases, diagnose, ensemble, estimate, gp, machine, results, run, warp
 from warpbrain.terminal.command import OneLineParser, exit_status
 from warpbrain.terminal.completing import complete
 from warpbrain.terminal.record import Record
 
-#: Commands by what a user wants.
+#: Commands by what a user wants, each with what adds it to the parser.
 _GROUPS = {
-    "simulate": {"run": run, "ensemble": ensemble},
-    "learn from recordings": {"estimate": estimate, "diagnose": diagnose},
-    "look at results, carry them over to images": {"view": view, "compare": compare, "warp": warp},
-    "what goes in": {"cases": cases, "gp": gp},
-    "this machine": {"doctor": doctor, "completion": completion},
+    "simulate": {"run": run.add_parser, "ensemble": ensemble.add_parser},
+    "learn from recordings": {"estimate": estimate.add_parser, "diagnose": diagnose.add_parser},
+    "look at results, carry them over to images": {
+        "view": results.add_view,
+        "compare": results.add_compare,
+        "warp": warp.add_parser,
+    },
+    "what goes in": {"cases": cases.add_parser, "gp": gp.add_parser},
+    "this machine": {"doctor": machine.add_doctor, "completion": machine.add_completion},
 }
 
 
@@ -81,8 +85,8 @@ def _parser() -> _GroupedParser:
     )
     parser.groups = {title: list(commands) for title, commands in _GROUPS.items()}
     for commands in _GROUPS.values():
-        for command in commands.values():
-            command.add_parser(parser.commands)
+        for add_command in commands.values():
+            add_command(parser.commands)
     return parser
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.building.errors import BuildError
+from warpbrain.cases.building.lattice import cut
 from warpbrain.cases.building.mmg import Cells, remesh
 from warpbrain.mesh import boundary_faces, pinched_nodes, split_boundary
 from warpbrain.mesh.quality import components, dihedral_angles, measure_arrays
@@ -50,6 +52,47 @@ def opened_out(tetrahedra: Ints, inside: Bools) -> Bools:
             return inside
         inside = inside | np.isin(tetrahedra, touching).any(axis=1)
     raise BuildError("the surface of the brain touches itself, and filling there did not help")
+
+
+def cut_body(
+    points: Floats,
+    tetrahedra: Ints,
+    labels: Ints,
+    body: Callable[[Floats], Floats],
+    cavity: Callable[[Floats], Floats],
+    smallest: float,
+    notes: list[str],
+) -> tuple[Floats, Ints, Ints]:
+    """What of a lattice is inside a body and outside of its cavities, by fields that are positive in these: cut along
+    their surfaces, in one piece, and touching itself nowhere.
+
+    Cavities below a volume [mm3] are filled, as are pockets outside that the lattice pinched off; what a user should
+    know of it is noted.
+    """
+    points, tetrahedra, labels, inside = cut(points, tetrahedra, labels, body)
+    pockets = small_pieces(points, tetrahedra, ~inside, keep_largest=True)
+    if (filled := float(signed_volumes(points, tetrahedra[pockets]).sum())) > smallest / 2:
+        notes.append(f"clefts narrower than an element close: {filled / 1000:.3g} cm3 of outside become tissue")
+    inside = inside | pockets
+    inside = _in_one_piece(points, tetrahedra, inside, notes, "pieces that hang together by less than an element")
+    inside = opened_out(tetrahedra, inside)
+    tetrahedra, labels = tetrahedra[inside], labels[inside]
+
+    points, tetrahedra, labels, fluid = cut(points, tetrahedra, labels, cavity)
+    fluid &= ~small_pieces(points, tetrahedra, fluid, smallest=smallest)
+    tissue = _in_one_piece(points, tetrahedra, ~fluid, notes, "pieces of tissue that float in a cavity")
+    tissue = opened_out(tetrahedra, tissue)
+    return points, tetrahedra[tissue], labels[tissue]
+
+
+def _in_one_piece(points: Floats, tetrahedra: Ints, region: Bools, notes: list[str], what: str) -> Bools:
+    """The largest piece of a region; what is dropped is noted if it can be seen."""
+    dropped = small_pieces(points, tetrahedra, region, keep_largest=True)
+    lost = float(signed_volumes(points, tetrahedra[dropped]).sum())
+    share = lost / float(signed_volumes(points, tetrahedra[region]).sum())
+    if share > 1e-4:
+        notes.append(f"{what} are left out: {lost / 1000:.3g} cm3 ({100 * share:.2g} %)")
+    return region & ~dropped
 
 
 def first_pass(cells: Cells, edge: float = FIRST_EDGE) -> Cells:

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
-from warpbrain.cases.building.cleaning import crumbs_given_away, finished, opened_out, small_pieces
+from warpbrain.cases.building.cleaning import crumbs_given_away, cut_body, finished
 from warpbrain.cases.building.errors import BuildError
 from warpbrain.cases.building.label_fields import CAVITY, LabelFields, make_fields, make_regions
 from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
@@ -17,7 +17,6 @@ from warpbrain.cases.building.mmg import Cells, remesh
 from warpbrain.cases.building.tissue_names import Assignment
 from warpbrain.images.reading import Image
 from warpbrain.mesh.quality import EDGES
-from warpbrain.mesh.tet_mesh import signed_volumes
 
 # nodes of a mesh whose size is not given: about what the shipped cases have
 NODES = 5000
@@ -160,21 +159,8 @@ def _discretised(fields: LabelFields, assignment: Assignment, size: float, spaci
     points, tetrahedra = compact(points, tetrahedra[near[tetrahedra].any(axis=1)])
     labels = np.zeros(len(tetrahedra), dtype=np.int64)
 
-    points, tetrahedra, labels, body = cut(points, tetrahedra, labels, partial(sampled, fields.body))
-    pockets = small_pieces(points, tetrahedra, ~body, keep_largest=True)
-    if (filled := float(signed_volumes(points, tetrahedra[pockets]).sum())) > crumb / 2:
-        notes.append(f"clefts narrower than an element close: {filled / 1000:.3g} cm3 of outside become tissue")
-    body = body | pockets
-    body = _in_one_piece(points, tetrahedra, body, notes, "pieces that hang together by less than an element")
-    body = opened_out(tetrahedra, body)
-    tetrahedra, labels = tetrahedra[body], labels[body]
-
-    points, tetrahedra, labels, fluid = cut(points, tetrahedra, labels, partial(sampled, fields.cavity))
-    fluid &= ~small_pieces(points, tetrahedra, fluid, smallest=crumb)
-    tissue = _in_one_piece(points, tetrahedra, ~fluid, notes, "pieces of tissue that float in a cavity")
-    tissue = opened_out(tetrahedra, tissue)
-    tetrahedra, labels = tetrahedra[tissue], labels[tissue]
-
+    body, cavity = partial(sampled, fields.body), partial(sampled, fields.cavity)
+    points, tetrahedra, labels = cut_body(points, tetrahedra, labels, body, cavity, crumb, notes)
     for code in range(1, len(fields.tissues)):
         rest = np.max(fields.tissues[code:], axis=0)
         ahead = fields.tissues[code - 1] - rest
@@ -189,16 +175,6 @@ def _discretised(fields: LabelFields, assignment: Assignment, size: float, spaci
                 "labels to another tissue"
             )
     return Cells(*compact(points, tetrahedra), labels)
-
-
-def _in_one_piece(points: Floats, tetrahedra: Ints, region: Bools, notes: list[str], what: str) -> Bools:
-    """The largest piece of a region; what is dropped is noted if it can be seen."""
-    dropped = small_pieces(points, tetrahedra, region, keep_largest=True)
-    lost = float(signed_volumes(points, tetrahedra[dropped]).sum())
-    share = lost / float(signed_volumes(points, tetrahedra[region]).sum())
-    if share > 1e-4:
-        notes.append(f"{what} are left out: {lost / 1000:.3g} cm3 ({100 * share:.2g} %)")
-    return region & ~dropped
 
 
 def _made(cells: Cells, size: float, notes: list[str]) -> Cells:

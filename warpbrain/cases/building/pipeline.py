@@ -16,7 +16,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Singles
 from warpbrain.atomic import whole_file
-from warpbrain.cases.building.cleaning import finished, first_pass, opened_out, small_pieces
+from warpbrain.cases.building.cleaning import SMALLEST_PIECE, cut_body, finished, first_pass, small_pieces
 from warpbrain.cases.building.errors import BuildError, require_extra
 from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
 from warpbrain.cases.building.mmg import Cells, fit_size
@@ -129,18 +129,8 @@ def discretise(anatomy: Anatomy, recipe: CaseRecipe, multi: bool, spacing: float
     points, tetrahedra = compact(points, tetrahedra)
     labels = np.full(len(tetrahedra), GREY, dtype=np.int64)
 
-    points, tetrahedra, labels, brain = cut(points, tetrahedra, labels, sampled(anatomy.brain))
-    # pockets of air that the lattice pinched off are filled, crumbs of tissue are dropped
-    brain = brain | small_pieces(points, tetrahedra, ~brain, keep_largest=True)
-    brain &= ~small_pieces(points, tetrahedra, brain, keep_largest=True)
-    brain = opened_out(tetrahedra, brain)
-    tetrahedra, labels = tetrahedra[brain], labels[brain]
-
-    points, tetrahedra, labels, fluid = cut(points, tetrahedra, labels, sampled(anatomy.ventricle))
-    fluid &= ~small_pieces(points, tetrahedra, fluid)
-    tissue = opened_out(tetrahedra, ~fluid)
-    tetrahedra, labels = tetrahedra[tissue], labels[tissue]
-
+    surfaces = sampled(anatomy.brain), sampled(anatomy.ventricle)
+    points, tetrahedra, labels = cut_body(points, tetrahedra, labels, *surfaces, SMALLEST_PIECE, [])
     if multi:
         points, tetrahedra, labels, white = cut(points, tetrahedra, labels, sampled(anatomy.white))
         white = white & ~small_pieces(points, tetrahedra, white)

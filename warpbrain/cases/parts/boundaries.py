@@ -56,9 +56,9 @@ def _values(table: Reading) -> dict[str, Any] | None:
     if "surface" in values:
         path, frame = table.path("surface"), table.context.frame
         surface = None if path is None else read_closed_surface(path, values["surface"], frame, table.problems)
-        values["surface"] = surface
-        if values["surface"] is None:
+        if surface is None:
             return None
+        values["surface"] = surface
     return values | ({"ramp": ramp} if "ramp" in table.keys else {})
 
 

@@ -1,4 +1,5 @@
-"""`warpbrain doctor`: what a report of a defect needs, and whether this machine computes what it should."""
+"""`warpbrain doctor`: whether this machine computes what it should; `completion`: what its shell needs to complete
+words."""
 
 from __future__ import annotations
 
@@ -7,13 +8,14 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from warpbrain.errors import SolveError
+from warpbrain.terminal.completing import SHELLS, shell_code
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.terminal.record import Record
 
 
-def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
+def add_doctor(commands: argparse._SubParsersAction[Any]) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "doctor",
@@ -39,3 +41,16 @@ def _doctor(options: argparse.Namespace) -> None:
     failed = [test["device"] for test in found["self_test"] if test["problem"]]
     if failed:
         raise SolveError(f"doctor: the self-test failed on {', '.join(failed)}")
+
+
+def add_completion(commands: argparse._SubParsersAction[Any]) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "completion",
+        help="let the shell complete commands, options, cases and mechanisms",
+        description="Prints what the shell must be told once (needs pip install 'warpbrain[completion]'). bash: put "
+        'eval "$(warpbrain completion bash)" into ~/.bashrc; zsh likewise; fish: warpbrain completion fish > '
+        "~/.config/fish/completions/warpbrain.fish",
+    )
+    parser.add_argument("shell", choices=SHELLS)
+    parser.set_defaults(call=lambda options: print(shell_code(options.shell)))
