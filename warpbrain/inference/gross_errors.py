@@ -256,10 +256,9 @@ class _Search:
 
     def change(self, number: int, kind: int) -> None:
         """Give a point another inflation."""
-        before = int(self.kinds[number])
-        self.kinds[number] = kind
-        if before == 0:
-            self._inflate([number])
+        before, self.kinds[number] = int(self.kinds[number]), kind
+        if kind > before:
+            self._inflate([number], before)
         else:
             self.begin_with(self.kinds)
 
@@ -270,8 +269,8 @@ class _Search:
         self.weighted, self._precisions = weighted.copy(), [precision.copy() for precision in precisions]
         self._inflate(np.flatnonzero(kinds).tolist())
 
-    def _inflate(self, numbers: Sequence[int]) -> None:
-        """Add the rows of some points to `Z`, and what follows to the inverse and the log density."""
+    def _inflate(self, numbers: Sequence[int], before: int = 0) -> None:
+        """Add the rows of points, of a lesser inflation before, to `Z`, and what follows to inverse and log density."""
         if not numbers:
             return
         points, model = self._rows.points, self._rows.model
@@ -282,7 +281,9 @@ class _Search:
         for number in numbers:
             rows = points[number]
             part = slice(at, at := at + len(rows))
-            increase = (self._variances[self.kinds[number]] - 1.0) * model.noise_blocks(rows[None])[0]
+            increase = (self._variances[self.kinds[number]] - self._variances[before]) * model.noise_blocks(rows[None])[
+                0
+            ]
             inner[part, part] += np.linalg.inv(increase)
             log_determinant += float(np.linalg.slogdet(increase)[1])
         factor = np.linalg.cholesky(inner)

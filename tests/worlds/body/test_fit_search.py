@@ -74,7 +74,7 @@ def test_where_the_stiffness_field_stays_its_step_is_none(base, search):
 
 
 def test_a_fit_begins_at_that_of_a_subset(sets, base, search):
-    search.minimise(relinearise=False)
+    search.minimise()
     fit = search.result()
     weighed = sets.get(("gravity",))
     again = FitSearch(base, None, weighed.effects, fit.columns, fit.marginal)

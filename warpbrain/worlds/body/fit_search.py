@@ -166,8 +166,8 @@ class FitSearch:
             if not self._accept_if_better(between, *self._evaluate(between, self.state)):
                 return
 
-    def minimise(self, relinearise: bool) -> None:
-        """Go to the best point nearby by Gauss-Newton's method; `relinearise`: with columns made anew on the way.
+    def minimise(self) -> None:
+        """Go to the best point nearby by Gauss-Newton's method, with columns made anew on the way.
 
         Where something relaxes, columns of a state that does not help are replaced by differences of states: tissue
         that is several times as stiff at first is no small change of what it is in the end.
@@ -175,7 +175,7 @@ class FitSearch:
         self.converged, by_differences = False, False
         for iteration in range(_ITERATIONS):
             moved = np.abs(self.z - self._linearised_at)[self._layout.nonlinear].max(initial=0.0)
-            if relinearise and (self._outdated or (iteration > 0 and moved > _RELINEARISE)):
+            if self._outdated or (iteration > 0 and moved > _RELINEARISE):
                 self._relinearise()
                 if by_differences:
                     self.columns = self._difference_columns()
@@ -185,14 +185,14 @@ class FitSearch:
             if self.converged:
                 return
             if not self._line_search(step):
-                if relinearise and not current and np.abs(step).max() >= 2.0 * _SHORT:
+                if not current and np.abs(step).max() >= 2.0 * _SHORT:
                     # columns that were made elsewhere may point uphill
                     self._linearised_at = np.full(len(self.z), np.inf)
                     continue
                 # what is left is rounding, or no better point lies this way: the last good one stands
                 self.converged = bool(np.abs(step).max() < 2.0 * _SHORT)
                 relaxing = any(effect.proposed.history for effect in self.effects)
-                if self.converged or by_differences or not relinearise or not relaxing:
+                if self.converged or by_differences or not relaxing:
                     return
                 by_differences, self._linearised_at = True, np.full(len(self.z), np.inf)
             if self.converged:

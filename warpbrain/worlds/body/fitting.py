@@ -82,16 +82,16 @@ class Fitter:
         search.start(starts, nearby or self.base.state)
         if subset is None:
             search.backtrack_to_base()
-        search.minimise(relinearise=True)
+        search.minimise()
         for _ in range(_ROUNDS):
             if self.mesh_errors is None or not self._mesh_error_changed(search, screened, self.mesh_errors):
                 break
-            search.minimise(relinearise=True)
+            search.minimise()
         fit = search.result()
         for _ in range(_ROUNDS):
             if not search.update_noise(fit):
                 break
-            search.minimise(relinearise=True)
+            search.minimise()
             before, fit = fit, search.result()
             if abs(fit.log_evidence - before.log_evidence) < _SAME:
                 break
