@@ -80,8 +80,31 @@ class Ballot:
 
 def log_loss(scale: Scale, ballots: Sequence[Ballot]) -> float:
     """Mean of minus the logarithm of the probability of what is true."""
-    true = [scale.of_densities(*ballot.densities)[ballot.right].sum() for ballot in ballots]
-    return float(-np.log(np.maximum(true, 1e-300)).mean())
+    return _Together.of(ballots).log_loss(scale)
+
+
+@dataclass(frozen=True, eq=False)
+class _Together:
+    """Hypotheses (n,) of all cases, one after the other, and where those of each case begin."""
+
+    log_densities: Floats
+    traits: Floats
+    right: Bools
+    first: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, ballots: Sequence[Ballot]) -> _Together:
+        log_densities, of_traits = zip(*(ballot.densities for ballot in ballots), strict=True)
+        count = [len(ballot.right) for ballot in ballots]
+        right = np.concatenate([ballot.right for ballot in ballots])
+        return cls(np.concatenate(log_densities), np.concatenate(of_traits), right, np.cumsum([0, *count[:-1]]))
+
+    def log_loss(self, scale: Scale) -> float:
+        logits = (self.log_densities + self.traits @ scale.weights) / scale.temperature
+        count = np.diff(self.first, append=len(logits))
+        p = np.exp(logits - np.repeat(np.maximum.reduceat(logits, self.first), count))
+        true = np.add.reduceat(p * self.right, self.first) / np.add.reduceat(p, self.first)
+        return float(-np.log(np.maximum(true, 1e-300)).mean())
 
 
 def fit(ballots: Sequence[Ballot], weights: Sequence[float] = Scale().weights) -> Scale:
@@ -91,12 +114,12 @@ def fit(ballots: Sequence[Ballot], weights: Sequence[float] = Scale().weights) -
     """
     from scipy.optimize import minimize
 
-    given = np.array(weights)
+    given, together = np.array(weights), _Together.of(ballots)
 
     def cost(point: Floats) -> float:
         scale = Scale(float(np.exp(point[0])), tuple((given + point[1:]).tolist()))
         prior = (point[0] / _SPREAD) ** 2 + np.sum((point[1:] / _SPREAD_OF_WEIGHTS) ** 2)
-        return len(ballots) * log_loss(scale, ballots) + 0.5 * float(prior)
+        return len(ballots) * together.log_loss(scale) + 0.5 * float(prior)
 
     best = minimize(
         cost, np.zeros(1 + len(TRAITS)), method="L-BFGS-B", bounds=[(-3.0, 5.0), *[(-8.0, 8.0)] * len(TRAITS)]

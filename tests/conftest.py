@@ -107,6 +107,15 @@ def ctrl_c() -> Iterator[None]:
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.fixture(scope="module")
+def undrawn() -> Iterator[None]:
+    """Neither bodies nor curves are drawn, which takes most of the time of a small case (`not_drawn`)."""
+    from not_drawn import nothing_drawn
+
+    with nothing_drawn():
+        yield
+
+
 @pytest.fixture(scope="session")
 def small_diagnosis(tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
     """A block of gel that sinks, diagnosed once for all tests (`sinking_block`)."""

@@ -26,7 +26,7 @@ def nothing_drawn() -> Iterator[None]:
         yield
 
 
-def _white(_scene: object, _cameras: object, size: tuple[int, int]) -> dict[str, np.ndarray]:
+def white(_scene: object, _cameras: object, size: tuple[int, int]) -> dict[str, np.ndarray]:
     return {name: np.full((size[1], size[0], 3), 255, np.uint8) for name in NAMES}
 
 
@@ -40,7 +40,7 @@ def _empty(view: Any, name: str, _axis: int, _place: float) -> dict[str, object]
 
 
 _STAND_INS: tuple[tuple[str, Callable[..., object]], ...] = (
-    ("warpbrain.report.picture.render", _white),
+    ("warpbrain.report.picture.render", white),
     ("warpbrain.report.views.save", _saved),
     ("warpbrain.report.page.scene._cut", _empty),
 )

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
+from not_drawn import white
 
 from warpbrain.report import picture, views
-from warpbrain.report.rendering.scene import NAMES
 
 
 @pytest.fixture(autouse=True, scope="module")
 def blank():
     """White bodies: the renderer takes seconds, and `tests/report/test_picture.py` looks at what it makes."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            picture,
-            "render",
-            lambda _scene, _cameras, size: {name: np.full((size[1], size[0], 3), 255, np.uint8) for name in NAMES},
-        )
+        patch.setattr(picture, "render", white)
         yield
 
 

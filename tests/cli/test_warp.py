@@ -195,10 +195,16 @@ def test_an_nrrd_image_gives_the_same(folder, warped, tmp_path):
     np.testing.assert_array_equal(*(np.asarray(image.dataobj) for image in images))
 
 
-def test_points_need_no_image(folder, warped, tmp_path):
-    done = warpbrain("warp", warped / "result.vtu", "--out", tmp_path / "out", "--points", folder / "F.mrk.json")
+@pytest.fixture(scope="module")
+def points_alone(folder, warped, tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("points") / "out"
+    done = warpbrain("warp", warped / "result.vtu", "--out", out, "--points", folder / "F.mrk.json")
     assert done.status == 0, done.err
-    _, _, after = moved_of(tmp_path / "out")
+    return out
+
+
+def test_points_need_no_image(warped, points_alone):
+    _, _, after = moved_of(points_alone)
     _, _, expected = moved_of(warped)
     np.testing.assert_allclose(after[:2], expected[:2], atol=1e-4)
 
@@ -263,9 +269,8 @@ def test_what_is_outside_an_image_is_said(folder, warped, tmp_path):
     assert re.search(r"^note      T1\.nii\.gz: \d+ % of the body are outside of it$", done.out, re.MULTILINE)
 
 
-def test_what_was_warped_before_is_not_overwritten(folder, warped, tmp_path):
-    given = ("--out", tmp_path / "out", "--points", folder / "F.mrk.json")
-    assert warpbrain("warp", warped, *given).status == 0
+def test_what_was_warped_before_is_not_overwritten(folder, warped, points_alone):
+    given = ("--out", points_alone, "--points", folder / "F.mrk.json")
     done = warpbrain("warp", warped, *given)
     assert done.status == 2
     assert "transform-after-to-before.nii.gz, F-after.mrk.json already: --overwrite replaces them" in done.err

@@ -10,6 +10,7 @@ import deadly_parts
 import distributed
 import pytest
 from command import warpbrain
+from folders import write_folder
 from many_samples import computed, samples_of, shaken_block
 from material_point import LAWS
 
@@ -77,7 +78,7 @@ def test_what_workers_die_of_has_failed_and_the_rest_goes_on(monkeypatch):
     work = replace(job(2), samples=job(2).samples[:4])
     monkeypatch.setattr("warpbrain.ensemble.cluster.compute_part", deadly_parts.compute)
     monkeypatch.setattr("warpbrain.ensemble.cluster.parts_of", lambda job, *_: [job.part({0, 1}), job.part({2, 3})])
-    with Cluster("local:2", 1, "cpu", None, start_warp_quietly) as workers:
+    with Cluster("local:1", 1, "cpu", None, start_warp_quietly) as workers:
         found = {outcome.number: outcome for part in workers.outcomes(work) for outcome in part}
     assert sorted(found) == [0, 1, 2, 3]
     assert [number for number, outcome in found.items() if outcome.failed] == [deadly_parts.DEADLY]
@@ -89,19 +90,10 @@ def test_what_workers_die_of_has_failed_and_the_rest_goes_on(monkeypatch):
 
 
 def test_local_starts_its_own_cluster(tmp_path):
-    arguments = [
-        "ensemble",
-        "--case",
-        "0529",
-        "--tissue",
-        "single",
-        "--samples",
-        "4",
-        "--steps",
-        "2",
-        "--device",
-        "cpu",
-    ]
+    grey, white = (f'prior = "hyperelastic/{anatomy} matter"' for anatomy in ("grey", "white"))
+    priors = ("mu = 1000.0", f"mu = 1000.0\n{grey}"), ("mu = 3000.0", f"mu = 3000.0\n{white}")
+    case = write_folder(tmp_path / "case", *priors)
+    arguments = ["ensemble", "--case", case, "--samples", "4", "--steps", "2", "--device", "cpu"]
     one = warpbrain(*arguments, "--processes", "1", "--out", tmp_path / "one")
     many = warpbrain(*arguments, "--dask", "local:2", "--out", tmp_path / "many")
     assert (one.status, many.status) == (0, 0), one.err + many.err

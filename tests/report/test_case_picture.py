@@ -78,15 +78,20 @@ def _white(size):
     return np.full((size[1], size[0], 3), 255, dtype=np.uint8)
 
 
-@pytest.fixture
-def rendered(tmp_path, capfd):
-    """The same with the body from outside; skipped where nothing can be rendered, but not where tests must not be."""
+@pytest.fixture(scope="module")
+def renderer():
+    """Skipped where nothing can be rendered, but not where tests must not be."""
     try:
         case_body.render_body(case_of(tetrahedron(0.01)), np.zeros(1, dtype=bool))
     except RenderingError as error:
         if os.environ.get("CI"):
             raise
         pytest.skip(str(error))
+
+
+@pytest.fixture
+def rendered(renderer, tmp_path, capfd):
+    """The same with the body from outside."""
     return lambda case: draw(tmp_path / "a.png", case, capfd)
 
 

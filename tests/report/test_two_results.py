@@ -13,13 +13,15 @@ from warpbrain.report.saved_result import SavedResult, read_result
 from warpbrain.report.state_files import SavedState
 from warpbrain.report.two_results import describe_two, difference, two_lines
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def state(mesh, u, path="x"):
     return SavedState(path, mesh, np.asarray(u, dtype=float), None, None, None)
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
+def results(undrawn, tmp_path_factory):
     place = tmp_path_factory.mktemp("two")
     case = write_recorded(place / "case")
     for name, arguments in {"a": [], "again": [], "softer": ["--mu", "1=500"]}.items():

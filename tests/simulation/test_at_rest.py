@@ -14,6 +14,8 @@ from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.recordings.recording import ForceRecording, SurfaceRecording
 from warpbrain.simulation.observation import observe
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 TIMES = (10.0, 40.0, 80.0)
 
 

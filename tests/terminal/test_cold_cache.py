@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from folders import write_folder
 
-ROOT = Path(__file__).parents[2]
+#: Of the package and of `not_drawn`.
+PLACES = os.pathsep.join(map(str, (Path(__file__).parents[2], Path(__file__).parents[1])))
 #: Ends a process at its `count`-th operation of a kind on the cache, or, in the compiler itself, after 0.1 s more of
 #: computing: a busy machine does not change the moment. Kernels are compiled before anything is written to `--out`.
 RUN = """
@@ -26,8 +27,9 @@ def watch(name, arguments):
         signal.setitimer(signal.ITIMER_VIRTUAL, within) if within else os.kill(os.getpid(), signal.SIGKILL)
 
 sys.addaudithook(watch)
-from warpbrain.cli import main
-sys.exit(main(["run", "--device", "cpu", "--case", "case", "--out", sys.argv[4], "--quiet"]))
+from not_drawn import main, nothing_drawn
+with nothing_drawn():
+    sys.exit(main(["run", "--device", "cpu", "--case", "case", "--out", sys.argv[4], "--quiet"]))
 """
 
 
@@ -35,7 +37,7 @@ sys.exit(main(["run", "--device", "cpu", "--case", "case", "--out", sys.argv[4],
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_killed_while_kernels_are_compiled(tmp_path):
     write_folder(tmp_path / "case")
-    variables = {**os.environ, "PYTHONPATH": str(ROOT), "WARP_CACHE_PATH": str(tmp_path / "cache")}
+    variables = {**os.environ, "PYTHONPATH": PLACES, "WARP_CACHE_PATH": str(tmp_path / "cache")}
 
     def run(*arguments):
         command = [sys.executable, "-c", RUN, *arguments]

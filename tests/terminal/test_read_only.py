@@ -7,9 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from command import run
 from folders import write_folder
 
-ROOT = Path(__file__).parents[2]
+#: Of the package and of `not_drawn`.
+PLACES = os.pathsep.join(map(str, (Path(__file__).parents[2], Path(__file__).parents[1])))
 CURE = "kernels cannot be kept there ({}): set WARP_CACHE_PATH to a folder that can be written to\n"
 
 
@@ -23,8 +25,8 @@ def cache():
 
 
 def run_where(folder, read_only, **environment):
-    """`warpbrain run` in a process that sees a folder as read-only; its status and standard error."""
-    command = [sys.executable, "-m", "warpbrain", "run", "--device", "cpu", "--case", "case", "--out", "out", "--quiet"]
+    """`warpbrain run`, undrawn, in a process that sees a folder as read-only; its status and standard error."""
+    command = [sys.executable, "-m", "not_drawn", "run", "--device", "cpu", "--case", "case", "--out", "out", "--quiet"]
     if read_only is not None:
         script = f"mount --bind '{read_only}' '{read_only}' && mount -o remount,ro,bind '{read_only}' && exec \"$@\""
         unshare = ["unshare", *([] if os.geteuid() == 0 else ["-r"]), "-m", "sh", "-c"]
@@ -32,16 +34,17 @@ def run_where(folder, read_only, **environment):
             pytest.skip("this system lets nobody see a folder as read-only")
         command = [*unshare, script, "sh", *command]
     write_folder(folder / "case")
-    given = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
+    given = {**os.environ, "PYTHONPATH": PLACES, **environment}
     variables = {name: value for name, value in given.items() if value}
     ran = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, check=False)
     lines = [line for line in ran.stderr.splitlines(keepends=True) if not line.startswith("Warp CUDA warning")]
     return ran.returncode, "".join(lines)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_cache_that_has_all_kernels_is_enough(tmp_path, cache):
     # where this machine has not yet compiled them
-    assert run_where(tmp_path / "before", None)[0] == 0
+    assert run(write_folder(tmp_path / "case"), "--out", tmp_path / "before").status == 0
     assert run_where(tmp_path, cache, WARP_CACHE_PATH=str(cache.parent)) == (0, "")
     assert (tmp_path / "out" / "result.vtu").exists()
 
