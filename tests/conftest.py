@@ -11,6 +11,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     # processes of tests that run beside each other have one thread of BLAS each: before NumPy is loaded
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import hypothesis
 import pytest
 import warp as wp
 from verification_rows import Row, Rows
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from warpbrain.diagnosis.result import Diagnosis
 
 wp.config.log_level = wp.LOG_WARNING
+# on a busy machine any example may take longer than the 200 ms that Hypothesis allows
+hypothesis.settings.register_profile("no deadline", hypothesis.settings(), deadline=None)
+hypothesis.settings.load_profile("no deadline")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

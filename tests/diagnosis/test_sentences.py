@@ -71,7 +71,7 @@ def check(text):
 
 
 # to shrink a broken sentence takes minutes, and says no more than the sentence
-@settings(max_examples=25, deadline=None, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=25, phases=(Phase.explicit, Phase.generate))
 @given(st.data())
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_every_verdict_is_said(verdict, data):

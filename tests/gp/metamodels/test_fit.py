@@ -63,7 +63,6 @@ def test_neo_hookean_is_found_again(mu: float) -> None:
 
 
 @given(C1=moduli, C2=moduli)
-@settings(deadline=None)
 def test_mooney_rivlin_is_found_again(C1: float, C2: float) -> None:
     found = fit(METAMODELS["mooney-rivlin"], L, curve("mooney-rivlin", (C1, C2)))
     assert found.converged
@@ -73,7 +72,6 @@ def test_mooney_rivlin_is_found_again(C1: float, C2: float) -> None:
 
 
 @given(modulus=st.floats(1.0, 6.0).map(lambda power: 10.0**power), alpha=exponents)
-@settings(deadline=None)
 def test_ogden_is_found_again(modulus: float, alpha: float) -> None:
     values = (2.0 * modulus / alpha, alpha)
     found = fit(METAMODELS["ogden"], L, curve("ogden", values))
@@ -187,7 +185,7 @@ def test_cost_and_rms(name: str) -> None:
 
 
 @given(factor=st.floats(-2.0, 2.0).map(lambda power: 10.0**power), seed=st.integers(0, 7))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_another_unit_of_energy(factor: float, seed: int) -> None:
     """Energies and offset so many times larger: moduli so many times larger, exponents as they were."""
     for name, model in METAMODELS.items():
@@ -285,7 +283,7 @@ def test_a_curve_that_nothing_comes_near_to(name: str, level: float) -> None:
 
 
 @given(data=st.data(), size=st.sampled_from([1.0, 30.0, 1e3, 1e100, 1e308]), count=st.integers(2, 8))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_curve_raises(data: st.DataObject, size: float, count: int) -> None:
     l = data.draw(st.lists(st.floats(1e-3, 1e3), min_size=count, max_size=count))
     y = data.draw(st.lists(st.floats(-size, size), min_size=count, max_size=count))
