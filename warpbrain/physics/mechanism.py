@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import inspect
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -42,7 +43,6 @@ from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.term import Following
 from warpbrain.physics.words import Smallest, Values, clauses, label, number
-
 
 __all__ = [
     "Emptying",
@@ -184,6 +184,19 @@ class Mechanism(Ramped, abc.ABC):
     absence: ClassVar[str] = ""
     #: Key of the belief of how much of it every tissue has, whatever a case says (`about_law`); empty if of none.
     always: ClassVar[str] = ""
+
+    def __init_subclass__(cls, **known: Any) -> None:
+        """Let the docstring of a kind say its parameters, which its fields know."""
+        super().__init_subclass__(**known)
+        lines = [inspect.cleandoc(cls.__doc__ or ""), "", "Parameters", "----------"]
+        for name, kind in vars(cls).get("__annotations__", {}).items():
+            value = vars(cls).get(name)
+            if isinstance(value, dataclasses.Field) and "says" in value.metadata:
+                says: Says = value.metadata["says"]
+                unit = f" [{says.unit}]" if says.si == 1.0 else f" [SI; {says.unit} in a case]"
+                lines.append(f"{name} : {kind if isinstance(kind, str) else inspect.formatannotation(kind)}")
+                lines.append(f"    {says.doc}{unit if says.unit else ''}")
+        cls.__doc__ = "\n".join(lines)
 
     @classmethod
     def parameters(cls) -> dict[str, Says]:
