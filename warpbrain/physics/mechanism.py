@@ -106,6 +106,9 @@ class Says:
     size: float = 1.0
     method: bool = False  # it is a setting of the method, or weighed and known: never differentiated or estimated
     adds_up: bool = False  # of several numbers, whether their sum is a number of its own
+    #: How it is told once it was estimated, with ``{}`` for the number; or three: if it is positive, if it is negative,
+    #: with its size, and where its spread is larger than itself
+    told: tuple[str, ...] = ()
 
 
 def parameter(doc: str, *, default: Any = dataclasses.MISSING, **known: Any) -> Any:
