@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import inspect
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -42,7 +43,6 @@ from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.term import Following
 from warpbrain.physics.words import Smallest, Values, clauses, label, number
-
 
 __all__ = [
     "Emptying",
@@ -106,6 +106,9 @@ class Says:
     size: float = 1.0
     method: bool = False  # it is a setting of the method, or weighed and known: never differentiated or estimated
     adds_up: bool = False  # of several numbers, whether their sum is a number of its own
+    #: How it is told once it was estimated, with ``{}`` for the number; or three: if it is positive, if it is negative,
+    #: with its size, and where its spread is larger than itself
+    told: tuple[str, ...] = ()
 
 
 def parameter(doc: str, *, default: Any = dataclasses.MISSING, **known: Any) -> Any:
@@ -184,6 +187,19 @@ class Mechanism(Ramped, abc.ABC):
     absence: ClassVar[str] = ""
     #: Key of the belief of how much of it every tissue has, whatever a case says (`about_law`); empty if of none.
     always: ClassVar[str] = ""
+
+    def __init_subclass__(cls, **known: Any) -> None:
+        """Let the docstring of a kind say its parameters, which its fields know."""
+        super().__init_subclass__(**known)
+        lines = [inspect.cleandoc(cls.__doc__ or ""), "", "Parameters", "----------"]
+        for name, kind in vars(cls).get("__annotations__", {}).items():
+            value = vars(cls).get(name)
+            if isinstance(value, dataclasses.Field) and "says" in value.metadata:
+                says: Says = value.metadata["says"]
+                unit = f" [{says.unit}]" if says.si == 1.0 else f" [SI; {says.unit} in a case]"
+                lines.append(f"{name} : {kind if isinstance(kind, str) else inspect.formatannotation(kind)}")
+                lines.append(f"    {says.doc}{unit if says.unit else ''}")
+        cls.__doc__ = "\n".join(lines)
 
     @classmethod
     def parameters(cls) -> dict[str, Says]:

@@ -158,14 +158,22 @@ def radius_in_words(values: Values) -> list[str]:
 def clauses(parameters: Mapping[str, Says], values: Values) -> list[str]:
     """Numbers as their parameters say what they are; places and directions are said elsewhere."""
     sentences = []
-    if "share" in values:
+    if "share" in values and not any(says.told for says in parameters.values()):
         share = values["share"]
         sentences.append(f"it is there to {measured(100.0 * share.value, 100.0 * share.sd)} %")
     for name, value in values.items():
-        if name in parameters and parameters[name].kind in ("number", "numbers"):
-            clause = label(parameters[name].doc)
-            whose = "" if "'" in clause.split(" ")[0] else "its "
-            sentences.append(f"{whose}{clause} is {measured(value.value, value.sd, value.unit)}")
+        says = parameters.get(name)
+        if says is None or says.kind not in ("number", "numbers"):
+            continue
+        clause = label(says.doc)
+        whose = "" if "'" in clause.split(" ")[0] else "its "
+        positive, *others = says.told or (f"{whose}{clause} is {{}}",)
+        size = value.value
+        if others and unsure(value):
+            positive = f"{others[1]}, {HARDLY}"
+        elif others:
+            positive, size = positive if size >= 0.0 else others[0], abs(size)
+        sentences.append(positive.format(measured(size, value.sd, value.unit)))
     return sentences
 
 

@@ -23,7 +23,7 @@ from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.regions import element_directions, elements_of, unit_vector
 from warpbrain.physics.term import Body
-from warpbrain.physics.words import Values, along, measured, vector_in
+from warpbrain.physics.words import Values, along, vector_in
 
 
 @wp.func
@@ -109,14 +109,22 @@ class Fibres(Mechanism):
         expectation=LogNormal(300.0, 3.0),
         typical="anisotropy of -3 to 16 % in shear, 0.6 to 1.1 in tension",
         source="diagnosis design, M10; Gasser, Ogden and Holzapfel 2006",
+        told=("their stiffness is {}",),
     )
-    exponent: float = parameter("k2, how they stiffen.", default=1.0, above=0.0, expectation=LogNormal(1.0, 3.0))
+    exponent: float = parameter(
+        "k2, how they stiffen.",
+        default=1.0,
+        above=0.0,
+        expectation=LogNormal(1.0, 3.0),
+        told=("the exponent with which they stiffen is {}",),
+    )
     dispersion: float = parameter(
         "How they scatter: 0 all parallel, 1/3 no direction.",
         default=0.0,
         above=-1e-12,
         below=1.0 / 3.0 + 1e-12,
         expectation=Uniform(0.0, 1.0 / 3.0),
+        told=("their scatter, from 0 all parallel to 1/3 no direction, is {}",),
     )
     elements: str = parameter("Element set that has them.", default="", kind="element set")
     kind: ClassVar[str] = "fibres"
@@ -162,18 +170,8 @@ class Fibres(Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        known = {
-            "stiffness": "their stiffness is",
-            "exponent": "the exponent with which they stiffen is",
-            "dispersion": "their scatter, from 0 all parallel to 1/3 no direction, is",
-        }
-        clauses = [
-            f"{words} {measured(values[name].value, values[name].sd, values[name].unit)}"
-            for name, words in known.items()
-            if name in values
-        ]
         line = along(vector_in(values, "direction"))
-        return [*clauses, *([f"they run {line}"] if line else [])]
+        return [*super().size_in_words(values), *([f"they run {line}"] if line else [])]
 
     def stored_energy(self, F: Floats) -> Floats:
         """See `warpbrain.physics.mechanism.Storing`; one direction of fibres."""

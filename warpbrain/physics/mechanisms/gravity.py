@@ -60,23 +60,8 @@ _FALL = 0.2
 class Gravity(BodyForce, Mechanism):
     """Weight that acts on tissue above the level of the cerebrospinal fluid.
 
-    Parameters
-    ----------
-    direction : tuple of three floats
-        Where 'down' is (any length but zero), axes RAS.
-    density : float
-        Density [kg/m3] of what has its full weight, where there never was any fluid.
-    tissue_density : float
-        Density [kg/m3] of what is submerged, of which buoyancy takes most.
-    csf_level : float or None
-        Height of the fluid's surface [m] against `direction`, above `lowest`. None: there never was any fluid, and the
-        reference is free of gravity, as a gel phantom on the bench: the full weight acts.
-    surroundings : {"fluid", "air"}
-        ``"air"`` if `csf_level` is None.
-    lowest : float or None
-        Height [m] of the point that levels are counted from, ``-x . direction``; None: the lowest node of the mesh.
-    imaged_direction : tuple of three floats or None
-        Where 'down' was while the reference was imaged; None: the same as `direction`.
+    Without a level there never was any fluid, and the reference is free of gravity, as a gel phantom on the bench: the
+    full weight acts. Levels are counted from the height `lowest` [m], ``-x . direction``; None: of the lowest node.
     """
 
     direction: tuple[float, float, float] = parameter(

@@ -47,7 +47,6 @@ from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_with
 from warpbrain.physics.term import Body, TriangleTerm
-from warpbrain.physics.words import HARDLY, Values, measured, unsure
 
 Ints = NDArray[np.int32]
 
@@ -63,6 +62,11 @@ class Pressure(Mechanism):
         expectation=Normal(0.0, 200.0),
         typical="10 to 1000 Pa across the cerebral mantle",
         source="volunteers: 7 to 14 Pa; hydrocephalus: tens to hundreds of Pa (diagnosis design, M2)",
+        told=(
+            "it is {} higher there than elsewhere, and pushes the wall into the tissue",
+            "it is {} lower there than elsewhere, and pulls the wall out of the tissue, towards the fluid",
+            "it is {} above that elsewhere",
+        ),
     )
     kind: ClassVar[str] = "pressure"
     quadratic: ClassVar[bool] = True
@@ -111,20 +115,6 @@ class Pressure(Mechanism):
     @classmethod
     def _of_value(cls, nodes: str, value: float) -> "Pressure":
         return cls(nodes=nodes, value=value)
-
-    @classmethod
-    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        if "value" not in values:
-            return []
-        value = values["value"]
-        if unsure(value):
-            return [f"it is {measured(value.value, value.sd, 'Pa')} above that elsewhere, {HARDLY}"]
-        word, does = (
-            ("higher", "pushes the wall into the tissue")
-            if value.value >= 0.0
-            else ("lower", "pulls the wall out of the tissue, towards the fluid")
-        )
-        return [f"it is {measured(abs(value.value), value.sd, 'Pa')} {word} there than elsewhere, and {does}"]
 
     def bind(self, body: Body) -> "PressureTerm":
         return PressureTerm(body, self.faces(body.mesh), self.value, self.factor)

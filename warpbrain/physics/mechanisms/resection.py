@@ -18,13 +18,7 @@ from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 
 @dataclass(frozen=True, kw_only=True)
 class Resection(Mechanism):
-    """Removes the elements of a set before anything is computed; the cavity stays empty and its wall free.
-
-    Parameters
-    ----------
-    elements : str
-        Name of the element set that was resected.
-    """
+    """Removes the elements of a set before anything is computed; the cavity stays empty and its wall free."""
 
     elements: str = parameter("Element set that was taken out.", default="resection", kind="element set")
     kind: ClassVar[str] = "resection"
@@ -52,13 +46,7 @@ class Resection(Mechanism):
         return f"where nothing is left of what {other.kind} acts on"
 
     def remaining(self, mesh: TetMesh) -> tuple[TetMesh, NDArray[np.int32]]:
-        """The mesh that is left, and for each of its nodes the id in the whole mesh.
-
-        Raises
-        ------
-        InputError
-            If the mesh has no such set, or the set is empty or everything.
-        """
+        """See `Removing`; `InputError` if the mesh has no such set, or the set is empty or everything."""
         members = mesh.element_sets.get(self.elements)
         if members is None:
             known = ", ".join(sorted(mesh.element_sets)) or "none"

@@ -17,7 +17,6 @@ from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
-from warpbrain.physics.words import HARDLY, Values, measured, radius_in_words, unsure
 
 #: Where it is looked for: standard deviation of the change everywhere and in a ball, and radii of balls [m].
 _EVERYWHERE, _SOMEWHERE, _RADII = 0.03, 0.2, (0.012, 0.018, 0.027)
@@ -36,10 +35,17 @@ class Swelling(Mechanism):
         expectation=Normal(0.0, 3.0),
         typical="mannitol takes 5 % of the water of white matter; oedema adds up to 30 %",
         source="diagnosis design, M7",
+        told=(
+            "it swells by {} of its volume",
+            "it shrinks by {} of its volume",
+            "it grows by {} of its volume",
+        ),
     )
     elements: str = parameter("Element set that swells.", default="", kind="element set")
     centre: tuple[float, float, float] | None = parameter("Centre of a ball.", default=None, kind="position")
-    radius: float | None = parameter("Its radius.", default=None, unit="mm", si=1e-3, above=0.0)
+    radius: float | None = parameter(
+        "Its radius.", default=None, unit="mm", si=1e-3, above=0.0, told=("its radius is {}",)
+    )
     kind: ClassVar[str] = "swelling"
     of_specimens: ClassVar[bool] = True
     enters: ClassVar[Enters] = Enters("growth", "g")
@@ -68,18 +74,6 @@ class Swelling(Mechanism):
             varying=(0,),
         )
         return [everywhere, *balls]
-
-    @classmethod
-    def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
-        if "amount" not in values:
-            return radius_in_words(values)
-        amount = values["amount"]
-        if unsure(amount):
-            size = f"it grows by {measured(amount.value, amount.sd, '%')} of its volume, {HARDLY}"
-        else:
-            word = "swells" if amount.value >= 0.0 else "shrinks"
-            size = f"it {word} by {measured(abs(amount.value), amount.sd, '%')} of its volume"
-        return [size, *radius_in_words(values)]
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)
