@@ -263,7 +263,7 @@ def test_fields_keep_volumes(voxel, shape):
     for label, volume in found.items():
         assert volume == pytest.approx(volume_of(label), rel=0.01)
     assert min(fields.in_place.values()) > 0.9
-    np.testing.assert_allclose(fields.sample(fields.body, CENTRE[None]), 1 + fields.body.min(), atol=1e-5)
+    np.testing.assert_allclose(fields.grid.sampled(fields.body, CENTRE[None]), 1 + fields.body.min(), atol=1e-5)
 
 
 def test_crumbs_go_to_the_neighbour_they_touch_most():

@@ -70,7 +70,7 @@ class Entry:
 
 
 def catalogue() -> list[Entry]:
-    """Every shipped case, each once for every mesh, without reading these; `concealed.catalogue` writes its file."""
+    """Every shipped case, each once for every mesh, without reading these: its file is made where this package is."""
     return [Entry(**entry) for entry in json.loads(CATALOGUE.read_text(encoding="utf-8"))]
 
 
