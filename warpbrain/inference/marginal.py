@@ -99,11 +99,11 @@ class RowsAtScales:
     def __init__(
         self, model: GaussianModel, residual: Floats, points: Sequence[Ints], further: Floats | None = None
     ) -> None:
-        self._model, self._residual, self._points, self._further = model, residual, points, further
+        self._model, self._residual, self._points = model, residual, points
+        self._further = np.zeros((len(residual), 0)) if further is None else further
         self._values, self._log_prior = scales()
-        self._weighted = model.precision_at(residual)
-        self._weighted_further = None if further is None else model.precision_at(further)
-        self._at: dict[float, tuple[PointRows, FurtherColumns | None]] = {}
+        self._weighted = [model.precision_at(rows) for rows in (residual, self._further)]
+        self._at: dict[float, tuple[PointRows, FurtherColumns]] = {}
 
     def summed(self, length: float = 1.0, scale: float = 1.0, inflation: Floats | None = None) -> Summed:
         """The evidence where the further columns are so many times as long.
@@ -138,11 +138,9 @@ class RowsAtScales:
     def with_gross_errors(self, scale: float, length: float = 1.0, start: Floats | None = None) -> GrossErrors:
         """At one scale, with further columns so many times as long."""
         if scale not in self._at:
-            rows = PointRows(self._model.with_scale(scale), self._residual, self._points, self._weighted(scale))
-            further = None
-            if self._further is not None and self._weighted_further is not None:
-                further = FurtherColumns(rows, self._further, self._weighted_further(scale))
-            self._at[scale] = rows, further
+            weighted, of_further = (times(scale) for times in self._weighted)
+            rows = PointRows(self._model.with_scale(scale), self._residual, self._points, weighted)
+            self._at[scale] = rows, FurtherColumns(rows, self._further, of_further)
         rows, further = self._at[scale]
         return rows.with_gross_errors(outliers(), start, further, length)
 
