@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 from warp.sparse import BsrMatrix
 
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.multicore import Graph, give_way, launch, launch_together, team_kernels
 from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernels, sync_words
 from warpbrain.kernels.persistent import PersistentSolve, blocks_stay
@@ -74,30 +74,18 @@ class LinearResult:
         return self.curvature <= 0.0
 
 
-@dataclass(frozen=True)
-class LinearKernels:
-    """Kernels of the linear solver in one precision."""
-
-    multiply: Any
-    invert_diagonal: Any
-    apply_diagonal: Any
-    partial_curvature: Any
-    least_curvature: Any
-    test_convergence: Any
-
-
 #: Rows that one thread sums in the first stage of the curvature's reduction.
 _CHUNK = 64
 
 
 @cache
-def linear_kernels(precision: Precision) -> LinearKernels:
+def linear_kernels(precision: Precision) -> KernelSet:
     """Make (once) the kernels of the linear solver in a precision."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"linear_{precision.name}")
+    kernels = KernelSet(f"linear_{precision.name}")
     chunk = wp.constant(_CHUNK)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def multiply(
         start: int,
         offsets: wp.array[int],
@@ -119,12 +107,12 @@ def linear_kernels(precision: Precision) -> LinearKernels:
             s += beta * y[i]
         z[i] = s
 
-    @wp.kernel(module=module)
+    @kernels.add
     def invert_diagonal(start: int, diagonal: wp.array[int], values: wp.array[mat33], inverse: wp.array[mat33]):
         i = start + wp.tid()
         inverse[i] = wp.inverse(values[diagonal[i]])
 
-    @wp.kernel(module=module)
+    @kernels.add
     def apply_diagonal(
         start: int,
         inverse: wp.array[mat33],
@@ -140,7 +128,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
             s += beta * y[i]
         z[i] = s
 
-    @wp.kernel(module=module)
+    @kernels.add
     def partial_curvature(p: wp.array[vec3], Ap: wp.array[vec3], partial: wp.array2d[scalar]):
         t = wp.tid()
         pAp = scalar(0.0)
@@ -151,7 +139,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         partial[t, 0] = pAp
         partial[t, 1] = pp
 
-    @wp.kernel(module=module)
+    @kernels.add
     def least_curvature(partial: wp.array2d[scalar], least: wp.array[scalar]):
         pAp = scalar(0.0)
         pp = scalar(0.0)
@@ -162,7 +150,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         if pp > scalar(0.0):
             least[0] = wp.min(least[0], pAp / pp)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def test_convergence(
         max_iterations: int,
         residual_squared: wp.array[scalar],
@@ -180,9 +168,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         if not (residual_squared[0] > tolerance_squared[0]) or iterations[0] >= max_iterations:
             go_on[0] = 0
 
-    return LinearKernels(
-        multiply, invert_diagonal, apply_diagonal, partial_curvature, least_curvature, test_convergence
-    )
+    return kernels
 
 
 def solver_kernels(precision: Precision, device: wp.Device) -> list[Any]:

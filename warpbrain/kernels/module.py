@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import warp as wp
 
@@ -37,6 +37,29 @@ def compiled_module(name: str, unroll: int | None = None) -> Any:
     if unroll is not None:
         module.options["max_unroll"] = unroll
     return module
+
+
+class KernelSet:
+    """Kernels of one module, by their names: each is one that `add` decorates.
+
+    Parameters
+    ----------
+    name, unroll
+        See `compiled_module`.
+    """
+
+    def __init__(self, name: str, unroll: int | None = None) -> None:
+        self.module = compiled_module(name, unroll)
+
+    def add(self, function: Callable[..., None]) -> Any:
+        """Make a kernel of a function."""
+        kernel = wp.kernel(function, module=self.module)
+        setattr(self, function.__name__, kernel)
+        return kernel
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
 
 
 def begin_loading(kernels: Iterable[Any], device: wp.Device) -> Callable[[], None]:

@@ -21,7 +21,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.kernels.coupled import coupled_kernels
-from warpbrain.kernels.linear import ConjugateGradient, LinearResult
+from warpbrain.kernels.linear import ConjugateGradient, LinearResult, linear_kernels
 from warpbrain.kernels.minimal_residual import MinimalResidual, four_vector
 from warpbrain.kernels.multicore import launch
 from warpbrain.physics.term import Coupling, Term
@@ -154,7 +154,7 @@ class CoupledSolver:
             self._plain.prepare()
             return
         s, c = self._system, self.coupling
-        self._launch(self._kernels.invert_diagonal, s.diagonal, s.matrix.values, self._inverse)
+        self._launch(linear_kernels(s.precision).invert_diagonal, s.diagonal, s.matrix.values, self._inverse)
         self._launch(
             self._kernels.invert_coupled_diagonal, c.offsets, c.columns, c.compliance, c.own, s.free, s.coupling_root,
             self._inverse, self._diagonal,
