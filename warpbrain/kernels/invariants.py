@@ -19,7 +19,7 @@ import warp as wp
 
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
-from warpbrain.kernels.tetrahedron import ElementKernels, element_kernels
+from warpbrain.kernels.tetrahedron import ElementKernels, law_kernels
 
 
 @wp.func
@@ -45,7 +45,6 @@ def invariant_kernels(
     precision : Precision
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"{key}_{precision.name}")
     pointwise = compiled_module(f"{key}_{precision.name}_pointwise")
 
     @wp.func
@@ -171,7 +170,4 @@ def invariant_kernels(
             )
         blocks[e, j, k] = K
 
-    forces, forces_and_tangents, energy, stress = element_kernels(
-        stress_of, energy_of, tangents_of, precision, module, pointwise
-    )
-    return ElementKernels(forces, forces_and_tangents, energy, stress, moduli, tangents_of, stress_of, energy_of)
+    return law_kernels(key, stress_of, energy_of, tangents_of, moduli, precision)

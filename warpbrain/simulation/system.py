@@ -19,7 +19,7 @@ from warpbrain.kernels.linear import ConjugateGradient, Nodes, solver_kernels
 from warpbrain.kernels.module import begin_loading
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import PRECISIONS, Precision
-from warpbrain.kernels.quadratic import quadratic_kernels
+from warpbrain.kernels.ten_nodes import quadratic_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.quality import EDGES
