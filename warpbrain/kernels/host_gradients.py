@@ -6,11 +6,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.kernels.linear import LinearResult
-
-Floats = NDArray[np.float64]
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -18,12 +18,10 @@ from typing import Any, Protocol
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.kernels.host_gradients import host_gradients
 from warpbrain.kernels.linear import ConjugateGradient, LinearResult
-
-Floats = NDArray[np.float64]
 
 #: Eigenvalues that are smoothed: from this part of the largest one.
 _SMOOTHED_FROM = 0.125

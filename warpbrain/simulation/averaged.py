@@ -18,14 +18,12 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.kernels.averaged_gradient import averaged_kernels
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.physics.term import Body, Term
 from warpbrain.simulation.model import Material
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 #: `s`, and the largest volumetric modulus [shear moduli] in `Psi'`.
 PART, KEPT = 0.05, 5.0

@@ -20,13 +20,12 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Floats
 from warpbrain.physics.term import Term
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: What a vector of parameters means: a model that differs in numbers only; see `System.set_model`.
 ModelOf = Callable[[Floats], Model]

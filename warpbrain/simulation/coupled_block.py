@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.coupled import FIRST, ROUNDS, CoupledSolver
 from warpbrain.simulation.kept_factors import KeptFactors
@@ -23,8 +24,6 @@ from warpbrain.simulation.sparse_factors import SparseFactors
 
 if TYPE_CHECKING:
     from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 
 class CoupledBlock:

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.coupled import LinearSolver
@@ -25,8 +25,6 @@ from warpbrain.simulation.kept_factors import KeptFactors
 from warpbrain.simulation.multisecant import Multisecant
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: Out-of-balance force, relative, from which on steps say something of the steps to come.
 _NEAR = 0.1

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from warpbrain.kernels.host_gradients import host_gradients
 from warpbrain.kernels.linear import LinearResult
@@ -23,7 +22,6 @@ from warpbrain.simulation.kept_factors import KeptFactors
 if TYPE_CHECKING:
     from warpbrain.simulation.system import System
 
-Floats = NDArray[np.float64]
 
 #: Iterations after which factors are of no use, and with new ones the captured loop takes over.
 MOST = 60

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, nodes_of
@@ -19,9 +20,6 @@ from warpbrain.physics.mechanism import Removing
 from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.of_case import plain_model_of
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

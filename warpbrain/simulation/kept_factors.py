@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.simulation.sparse_factors import SparseFactors
-
-Floats = NDArray[np.float64]
 
 #: Iterations of a solve with factors that are near.
 _NEAR = 5

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh
@@ -27,8 +27,6 @@ from warpbrain.simulation.model import Model
 from warpbrain.simulation.observation import Observed, State, observe
 from warpbrain.simulation.result import Result
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: Out-of-balance force, relative: far below what meshes differ by.
 TOLERANCE = 1e-5

@@ -26,12 +26,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.nodal_volume import nodal_volume_kernels
 from warpbrain.physics.term import Body, Term
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 
 class NodalVolumeTerm(Term):

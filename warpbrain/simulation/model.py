@@ -10,16 +10,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
 from warpbrain.physics.composition import require_composable
 from warpbrain.physics.laws import Law
 from warpbrain.physics.load import BodyForce, Load
 from warpbrain.physics.mechanism import Emptying, Following, Mechanism
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-
 
 #: Kinds of elements; the default first.
 ELEMENTS = ("tet4", "tet4-averaged", "tet10", "tet10-mixed")

@@ -15,9 +15,8 @@ Broyden's second kind (Fang and Saad 2009, Numer. Linear Algebra Appl. 16, 197).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from warpbrain.arrays import Floats
 
 #: Steps that are kept, and singular values of `dR` below this part of the largest that are left out.
 _MOST, _LEAST = 12, 1e-6

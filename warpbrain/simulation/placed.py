@@ -14,11 +14,11 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh
 from warpbrain.simulation.pattern import build_pattern
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 

@@ -11,16 +11,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver, NewtonStep
 from warpbrain.simulation.held import require_held
 from warpbrain.simulation.kept_factors import KeptFactors
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: How often a step is halved before the run gives up.
 _HALVINGS = 6

@@ -12,12 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: Directions before it gives up.
 _MOST = 40

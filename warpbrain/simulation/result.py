@@ -7,14 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import require_kind
 from warpbrain.mesh import TetMesh
 from warpbrain.shown import Shown
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
 from warpbrain.kernels.block_linear import BlockConjugateGradient
 from warpbrain.kernels.linear import LinearResult
@@ -35,8 +36,6 @@ from warpbrain.simulation.equilibrium import Equilibrium
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.refinement import lengths, refine
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: What solves for several right-hand sides: at once, or in turn where terms have unknowns of their own.
 SeveralSolver = BlockConjugateGradient | InTurn

@@ -16,8 +16,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, SolveError
@@ -31,10 +31,6 @@ from warpbrain.simulation.history import History, history_of
 from warpbrain.simulation.locking import choose_elements
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 #: Imposed values from rest to the farther extreme of a test.
 STEPS = 8
@@ -82,7 +78,7 @@ class TestResult:
     response: Floats
     predicted: Floats
     residuals: Floats
-    newton: Integers
+    newton: Ints
     min_J: Floats
     unstable_iterations: int
     time: Floats | None = None

@@ -13,6 +13,7 @@ import warp as wp
 from numpy.typing import NDArray
 from warp.sparse import BsrMatrix, bsr_zeros
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.linear import ConjugateGradient, Nodes, solver_kernels
@@ -33,8 +34,6 @@ from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
 from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.placed import placed_mesh, placed_pattern
-
-Floats = NDArray[np.float64]
 
 
 def find_device(name: str | None) -> wp.Device:
