@@ -8,9 +8,8 @@ from shapes import cube
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation import kept_inverse as module
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.factored import FactoredSolver
+from warpbrain.simulation.factored import FactoredSolver, KeptFactors
 from warpbrain.simulation.keeping import kept_for, with_kept
-from warpbrain.simulation.kept_factors import KeptFactors
 from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System

@@ -15,9 +15,8 @@ from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean, Ogden
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import contact, mechanisms
-from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.model import Material, Model, with_mechanisms
 from warpbrain.simulation.sensitivity import SensitivitySolver, sensitivities
 from warpbrain.simulation.system import System
 

@@ -18,10 +18,9 @@ from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.traction import Traction
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
-from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
-from warpbrain.simulation.model import Damping, Material, Model
+from warpbrain.simulation.model import Damping, Material, Model, with_mechanisms
 from warpbrain.simulation.motion_sensitivity import MotionSensitivity, follow
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.sensitivity import sensitivities

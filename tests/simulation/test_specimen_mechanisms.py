@@ -23,7 +23,7 @@ from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.history import corners_of, history_of
 from warpbrain.simulation.model import Material
-from warpbrain.simulation.readiness import why_not
+from warpbrain.simulation.run import why_not
 from warpbrain.simulation.specimen import Rig, TestResult, simulate_test
 
 MU, LAM = 1000.0, 9000.0

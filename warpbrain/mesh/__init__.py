@@ -6,7 +6,6 @@ Importing this package costs NumPy and nothing else; SciPy and meshio are import
 from warpbrain.mesh.files import MeshInFile, read_mesh, read_mesh_file, write_mesh
 from warpbrain.mesh.half_space import integrals_above, integrals_of_shapes, integrals_on_plane, summed_at_nodes
 from warpbrain.mesh.integrals import surface_forces, volume_forces
-from warpbrain.mesh.ordering import ordered
 from warpbrain.mesh.patches import patch_around
 from warpbrain.mesh.quadratic import QuadraticMesh
 from warpbrain.mesh.quality import Quality, components, dihedral_angles, measure
@@ -25,7 +24,7 @@ from warpbrain.mesh.surface import (
     vertex_normals,
     wall_nodes,
 )
-from warpbrain.mesh.tet_mesh import MeshError, TetMesh
+from warpbrain.mesh.tet_mesh import MeshError, TetMesh, ordered
 
 __all__ = [
     "MeshError",

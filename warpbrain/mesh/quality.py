@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -121,3 +122,41 @@ def measure_arrays(points: Floats, tetrahedra: Ints, tissue: Ints) -> Quality:
         smallest_tissue_component_volume=float(np.bincount(pieces, weights=volumes).min()),
         smallest_tissue_component_tetrahedra=int(np.bincount(pieces).min()),
     )
+
+
+def extent(points: NDArray[np.floating[Any]]) -> float:
+    """Twice the distance of the farthest of points (n, 3) from their mean, in their unit.
+
+    Of a block it is the diagonal. A bounding box along the axes is up to 1.7 times as large for a body that was turned.
+    """
+    return 2.0 * float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
+
+
+def principal_axes(points: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """Unit vectors, rows of (3, 3), along which points (n, 3) spread the least, more and the most.
+
+    They turn with a body; of one that spreads alike along several axes these are any.
+    """
+    apart = points - points.mean(axis=0)
+    return np.asarray(np.linalg.eigh(apart.T @ apart)[1].T, dtype=np.float64)
+
+
+#: Nodes nearer to each other than this share of the body's size are at the same place.
+SAME_PLACE = 1e-9
+
+
+def coincident_nodes(points: ArrayLike) -> NDArray[np.int64]:
+    """Pairs (k, 2) of nodes of points (n, 3) at the same place: there the body is torn, though it looks whole."""
+    from scipy.spatial import cKDTree
+
+    xyz: Floats = np.asarray(points, dtype=np.float64)
+    pairs = cKDTree(xyz).query_pairs(SAME_PLACE * extent(xyz), output_type="ndarray")
+    return np.asarray(pairs[np.lexsort(pairs.T[::-1])], dtype=np.int64)
+
+
+def open_edges(faces: ArrayLike) -> NDArray[np.int64]:
+    """Edges (k, 2) that do not belong to exactly two of the triangles (b, 3): none on a closed surface."""
+    triangles = np.asarray(faces)
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    return np.asarray(unique[count != 2], dtype=np.int64)

@@ -43,7 +43,6 @@ from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Te
 from warpbrain.physics.term import Following
 from warpbrain.physics.words import Smallest, Values, clauses, label, number
 
-
 __all__ = [
     "Emptying",
     "Facts",

@@ -19,9 +19,9 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.coupled import LinearSolver
-from warpbrain.simulation.held import require_held
+from warpbrain.simulation.factored import KeptFactors
 from warpbrain.simulation.keeping import with_kept
-from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.model import require_held
 from warpbrain.simulation.multisecant import Multisecant
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System

@@ -17,8 +17,7 @@ from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, nodes_of
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Removing
-from warpbrain.simulation.assumed import with_mechanisms
-from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.model import Material, Model, with_mechanisms
 from warpbrain.simulation.of_case import plain_model_of
 
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
-from warpbrain.simulation.cupy_on import has_cupy
-from warpbrain.simulation.factored import FactoredSolver
-from warpbrain.simulation.kept_factors import KeptFactors
-from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse
+from warpbrain.simulation.factored import FactoredSolver, KeptFactors
+from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse, has_cupy
 
 if TYPE_CHECKING:
     from warpbrain.simulation.system import System

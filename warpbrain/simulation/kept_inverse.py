@@ -1,12 +1,15 @@
 """The inverse of one stiffness on a GPU, kept to precondition the systems of many states near to it.
 
-What `kept_factors` does on the CPU. A GPU has no use for sparse factors, whose rows wait for each other; but it reads a
+What `KeptFactors` does on the CPU. A GPU has no use for sparse factors, whose rows wait for each other; but it reads a
 dense matrix of 15,000 rows in a fifth of a millisecond, and three to six products with the inverse of a factor do what
 takes a captured loop hundreds of iterations. By CuPy, which is an extra, and as far as memory goes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,9 +18,51 @@ from numpy.typing import NDArray
 
 from warpbrain.kernels.host_gradients import host_gradients
 from warpbrain.kernels.linear import LinearResult
-from warpbrain.simulation.cupy_on import require_memory, stream_of
-from warpbrain.simulation.factored import MOST, FactoredSolver
-from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.factored import MOST, FactoredSolver, KeptFactors
+
+
+def has_cupy(device: Any) -> bool:
+    """Whether a Warp device is a GPU for which CuPy is installed, and finds the libraries that it calls."""
+    return bool(device.is_cuda) and _works()
+
+
+@cache
+def _works() -> bool:
+    try:
+        import cupy
+        import cupyx.scipy.linalg  # noqa: F401
+
+        cupy.linalg.cholesky(cupy.eye(2))
+    except Exception:
+        # whatever keeps an extra from working is no reason to stop: the same is done without it
+        return False
+    return True
+
+
+def require_memory(device: Any, needed: int) -> None:
+    """Raise `MemoryError` if a GPU has fewer bytes than these that are free, or that CuPy holds and does not use."""
+    import cupy
+
+    with cupy.cuda.Device(device.ordinal) as gpu:
+        pool = cupy.get_default_memory_pool()
+        free = gpu.mem_info[0] + pool.total_bytes() - pool.used_bytes()
+    if needed > free:
+        raise MemoryError(f"{needed / 1e9:.1f} GB of memory of {device.alias} are needed, {free / 1e9:.1f} GB are free")
+
+
+@contextmanager
+def stream_of(device: Any) -> Iterator[None]:
+    """While it lasts, CuPy works on a GPU in the order in which Warp does."""
+    import cupy
+    import warp as wp
+
+    # a stream of another GPU than the present one is refused
+    with (
+        cupy.cuda.Device(device.ordinal),
+        cupy.cuda.ExternalStream(wp.get_stream(device).cuda_stream, device.ordinal),
+    ):
+        yield
+
 
 #: Dense matrices in single precision for which there has to be memory.
 _MATRICES = 3

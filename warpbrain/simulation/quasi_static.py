@@ -15,8 +15,8 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver, NewtonStep
-from warpbrain.simulation.held import require_held
-from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.factored import KeptFactors
+from warpbrain.simulation.model import require_held
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 

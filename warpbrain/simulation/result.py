@@ -105,9 +105,7 @@ def _statistics(sizes: Floats) -> Statistics:
 
 def nodal_state_of(system: System, time: float = math.inf) -> NodalState:
     """The state of all nodes of a system at its present displacement; see `result_of`."""
-    system.evaluate_forces()
-    system.gather_forces()
-    internal = system.internal.numpy().astype(np.float64)
+    internal = system.internal_forces()
     reactions = system.model.reactions(internal, system.model.external_forces(time))
     return NodalState(system.node_mesh, system.u.numpy().astype(np.float64), reactions)
 

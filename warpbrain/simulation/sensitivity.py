@@ -180,9 +180,7 @@ class SensitivitySolver:
 
         def internal(offset: float, _: Model) -> Floats:
             system.u.assign(state + offset * moved)
-            system.evaluate_forces()
-            system.gather_forces()
-            return system.internal.numpy().astype(np.float64)
+            return system.internal_forces()
 
         return beside.derivative(k, internal)
 

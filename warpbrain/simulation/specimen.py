@@ -25,11 +25,10 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.recordings.comparison import Comparison, Error
 from warpbrain.recordings.recording import TestRecording
-from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.history import History, history_of
 from warpbrain.simulation.locking import choose_elements
-from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.model import Material, Model, with_mechanisms
 from warpbrain.simulation.system import System
 
 #: Imposed values from rest to the farther extreme of a test.

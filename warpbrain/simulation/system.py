@@ -419,14 +419,8 @@ class System:
     def evaluate_tangents(self) -> None:
         """Element forces and tangent blocks at `u`."""
         for g in self.groups:
-            self._launch(
-                g.kernels.forces_and_tangents,
-                len(g.elements),
-                *self._geometry(g),
-                self.u,
-                self.element_forces,
-                self.element_blocks,
-            )
+            outputs = (self.element_forces, self.element_blocks)
+            self._launch(g.kernels.forces_and_tangents, len(g.elements), *self._geometry(g), self.u, *outputs)
         for term in self.terms:
             term.evaluate_tangents(self.u)
 
@@ -438,6 +432,12 @@ class System:
     def gather_forces(self) -> None:
         """Internal forces from the element forces."""
         self._launch(self._kernels.gather_forces, self.size, *self.forces_on_nodes, self.internal)
+
+    def internal_forces(self) -> Floats:
+        """Internal forces (n, 3) [N] at `u`, evaluated anew."""
+        self.evaluate_forces()
+        self.gather_forces()
+        return self.internal.numpy().astype(np.float64)
 
     def size_of_forces(self) -> float:
         """Norm [N] of what rounding is relative to.
@@ -460,19 +460,9 @@ class System:
         if self._coupled:
             self.coupling_root.fill_(math.sqrt(k if coupling is None else coupling))
         self._launch(
-            self._kernels.gather_matrix,
-            len(self.pairs),
-            self.pairs,
-            self.pair_first,
-            self.contributions,
-            self.pair_positions,
-            self._flat_blocks,
-            self.mass,
-            self.free,
-            scalar(k),
-            scalar(m),
-            self.matrix.values,
-        )
+            self._kernels.gather_matrix, len(self.pairs), self.pairs, self.pair_first, self.contributions,
+            self.pair_positions, self._flat_blocks, self.mass, self.free, scalar(k), scalar(m), self.matrix.values,
+        )  # fmt: skip
 
     def stiffness(self) -> Any:
         """`K` [N/m] at `u` on every component, constrained ones included, as a SciPy BSR matrix (3 n, 3 n)."""
@@ -528,20 +518,7 @@ class System:
         What unknowns of a term's own do to it counts `coupling` times, `k` times if absent.
         """
         self._add_all_beyond_blocks(increment, -1.0, k, coupling, self._all_components, self.free)
-        self._launch(
-            self._kernels.constrained_load,
-            self.size,
-            self.matrix.offsets,
-            self.matrix.columns,
-            self.block_pairs,
-            self.pair_first,
-            self.contributions,
-            self._flat_blocks,
-            increment,
-            self.free,
-            self.precision.scalar(k),
-            self.load,
-        )
+        self._subtract_blocks_times(increment, k, self.free)
 
     def stiffness_times(self, increment: Floats, k: float = 1.0, coupling: float | None = None) -> Floats:
         """`k K increment` [N] on every component, constrained ones included, shape (n, 3).
@@ -550,22 +527,17 @@ class System:
         """
         self.increment.assign(increment)
         self.load.zero_()
-        self._launch(
-            self._kernels.constrained_load,
-            self.size,
-            self.matrix.offsets,
-            self.matrix.columns,
-            self.block_pairs,
-            self.pair_first,
-            self.contributions,
-            self._flat_blocks,
-            self.increment,
-            self._all_components,
-            self.precision.scalar(-k),
-            self.load,
-        )
+        self._subtract_blocks_times(self.increment, -k, self._all_components)
         self._add_all_beyond_blocks(self.increment, 1.0, k, coupling, self._all_components, self._all_components)
         return self.load.numpy().astype(np.float64)
+
+    def _subtract_blocks_times(self, increment: wp.array, k: float, rows: wp.array) -> None:
+        """`load -= k K increment`, of what of `K` is in blocks, on components that are 1 in `rows`."""
+        self._launch(
+            self._kernels.constrained_load, self.size, self.matrix.offsets, self.matrix.columns, self.block_pairs,
+            self.pair_first, self.contributions, self._flat_blocks, increment, rows, self.precision.scalar(k),
+            self.load,
+        )  # fmt: skip
 
     def linear_solver(
         self,

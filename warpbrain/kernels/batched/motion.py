@@ -7,8 +7,7 @@ from functools import cache
 
 import warp as wp
 
-from warpbrain.kernels.batched.layout import store_vector, vector_of
-from warpbrain.kernels.batched.product import row_product
+from warpbrain.kernels.batched.layout import row_product, store_vector, vector_of
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 

@@ -8,12 +8,12 @@ from warpbrain.kernels.batched.layout import (
     ROWS,
     SHARES,
     block_of,
+    row_product,
     store_symmetric,
     store_vector,
     symmetric_of,
     vector_of,
 )
-from warpbrain.kernels.batched.product import row_product
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
