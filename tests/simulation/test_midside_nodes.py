@@ -17,7 +17,7 @@ from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, solve_equilibrium
-from warpbrain.simulation.keeping import kept_for
+from warpbrain.simulation.kept_inverse import kept_for
 from warpbrain.simulation.model import QUADRATIC, Damping, Material, Model, Motion
 from warpbrain.simulation.relaxation import relax_to_rest
 from warpbrain.simulation.result import result_of

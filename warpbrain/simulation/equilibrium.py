@@ -20,7 +20,6 @@ from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.coupled import LinearSolver
 from warpbrain.simulation.factored import KeptFactors
-from warpbrain.simulation.keeping import with_kept
 from warpbrain.simulation.model import require_held
 from warpbrain.simulation.multisecant import Multisecant
 from warpbrain.simulation.phase_clock import PhaseClock
@@ -188,9 +187,8 @@ class EquilibriumSolver:
             preconditioner=self.options.preconditioner,
             watch_curvature=True,
             at_rest=True,
+            factors=factors,
         )
-        if factors is not None:
-            self._linear = with_kept(system, self._linear, factors, self.options.cg_tolerance)
         self._history: list[NewtonStep] = []
         self._free = 1.0 - system.model.constrained
         # residuals cannot fall below the rounding of the sums of element forces

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Floats
 from warpbrain.kernels.host_gradients import host_gradients
 from warpbrain.kernels.linear import LinearResult
-from warpbrain.simulation.coupled import FIRST, ROUNDS, CoupledSolver, LinearSolver
+from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
 from warpbrain.simulation.sparse_factors import SparseFactors
 
 if TYPE_CHECKING:
@@ -223,19 +223,19 @@ class CoupledBlock:
         # both kinds of residual as parts of what their own unknown makes of one unit of energy
         weight = 1.0 / np.sqrt(np.abs(np.concatenate([self._K.diagonal(), self._S.diagonal()])))
         b = np.concatenate([load, np.zeros(self._system.size)])
-        x, tighter, iterations = np.zeros_like(b), FIRST, 0
-        for _ in range(ROUNDS):
-            more, steps = _minimal_residual(
-                operator, preconditioner, b - operator(x), weight,
-                tighter * wanted * float(np.linalg.norm(weight * b)), most - iterations,
-            )  # fmt: skip
-            x, iterations = x + more, iterations + steps
+        x, length = np.zeros_like(b), float(np.linalg.norm(weight * b))
+
+        def go_on(tolerance: float, done: int) -> int:
+            nonlocal x
+            if done >= most:
+                return 0
+            left = b - operator(x)
+            more, taken = _minimal_residual(operator, preconditioner, left, weight, tolerance * length, most - done)
+            x = x + more
             self._system.solution.assign(x[:size].reshape(-1, 3))
-            result = self._captured.look(iterations, wanted)
-            if result.converged or steps == 0 or iterations >= most or not np.isfinite(result.residual):
-                break
-            tighter *= 0.3 * result.tolerance / result.residual
-        return result
+            return taken
+
+        return self._captured.in_rounds(go_on, wanted)
 
 
 def _minimal_residual(

@@ -164,3 +164,10 @@ def _dense(matrix: Any) -> Any:
     at = rows[:, None, None] + within[:, None], columns[:, None, None] + within
     found[at] = cupy.asarray(matrix.values)[: int(offsets[-1])]
     return found
+
+
+def kept_for(device: Any) -> KeptFactors | None:
+    """What is kept where states are solved on a Warp device; None on a GPU for which there is no CuPy."""
+    if device.is_cpu:
+        return KeptFactors()
+    return KeptInverse(device) if has_cupy(device) else None

@@ -21,6 +21,7 @@ CPU, 2026-11), longer than two parameters take so to 1e-10; it has no device, an
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,11 +32,47 @@ from warpbrain.errors import SolveError
 from warpbrain.kernels.block_linear import BlockConjugateGradient
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.beside import Beside, ModelOf
-from warpbrain.simulation.coupled import InTurn
 from warpbrain.simulation.equilibrium import Equilibrium
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.refinement import lengths, refine
 from warpbrain.simulation.system import System
+
+
+class InTurn:
+    """Solves the system's linear systems for several right-hand sides, one after the other.
+
+    Parameters
+    ----------
+    system : System
+    tolerance : float
+        Relative, of each.
+    max_iterations : int
+    """
+
+    def __init__(self, system: System, tolerance: float, max_iterations: int) -> None:
+        self._system, self._tolerance = system, tolerance
+        self._solver = system.linear_solver(tolerance=tolerance, max_iterations=max_iterations, watch_curvature=True)
+        self._results: list[LinearResult] = []
+
+    def prepare(self) -> None:
+        """Take notice of new values of the matrix, and of what terms keep of their own."""
+        self._solver.prepare()
+
+    def solve(self, right_hand_sides: Sequence[Floats], tolerance: float | None = None) -> Floats:
+        """Solve from zero for right-hand sides (n, 3), which are zero on constrained components: (count, n, 3)."""
+        found, self._results = [], []
+        for b in right_hand_sides:
+            self._system.load.assign(b)
+            self._system.solution.zero_()
+            self._solver.solve(tolerance)
+            self._results.append(self._solver.result())
+            found.append(self._system.solution.numpy().astype(np.float64))
+        return np.array(found)
+
+    def results(self) -> list[LinearResult]:
+        """How the last solve ended, for each right-hand side."""
+        return self._results
+
 
 #: What solves for several right-hand sides: at once, or in turn where terms have unknowns of their own.
 SeveralSolver = BlockConjugateGradient | InTurn

@@ -31,6 +31,8 @@ from warpbrain.physics.mechanism import Following, Growing, Weakening
 from warpbrain.physics.term import Term
 from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, averaged_terms, own_modulus
 from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
+from warpbrain.simulation.factored import FactoredSolver, KeptFactors
+from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse
 from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.placed import placed_mesh, placed_pattern
@@ -547,13 +549,30 @@ class System:
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
         at_rest: bool = False,
+        factors: KeptFactors | None = None,
     ) -> LinearSolver:
-        """A solver for ``matrix solution = load``: conjugate gradients (`warpbrain.kernels.linear`).
+        """A solver for ``matrix solution = load``; all are chosen here.
 
-        `at_rest` is for matrices without inertia, for which a coarse space is worth its making. Where a term has
-        unknowns of its own: `warpbrain.simulation.coupled`.
+        - Conjugate gradients in a captured loop (`warpbrain.kernels.linear`) for one system after the other.
+        - MINRES (`warpbrain.simulation.coupled`) where a term has unknowns of its own: the matrix is indefinite.
+        - With what is kept from state to state (`kept_for`), which needs all of the matrix, the gradients of
+          `warpbrain.simulation.factored`, or on a GPU in double precision of `warpbrain.simulation.kept_inverse`: a
+          factorisation of one state nearly solves those that are near.
+
+        Parameters
+        ----------
+        tolerance : float
+            Relative.
+        max_iterations : int
+        preconditioner : str
+            See `warpbrain.kernels.linear.PRECONDITIONERS`.
+        watch_curvature : bool
+            Tell an indefinite matrix.
+        at_rest : bool
+            The matrix is without inertia, so that a coarse space is worth its making.
+        factors : KeptFactors, optional
         """
-        conjugate_gradient = ConjugateGradient(
+        plain = ConjugateGradient(
             self.matrix,
             self.diagonal,
             self.load,
@@ -566,11 +585,18 @@ class System:
             beyond=None if self.assembled else self._add_beyond_blocks,
             nodes=Nodes(self.model.node_mesh.points, self.free) if at_rest else None,
         )
-        if not self._coupled:
-            return conjugate_gradient
-        # MINRES takes some times the iterations of CG
-        most = 4 * max_iterations
-        return CoupledSolver(self, self._coupled, conjugate_gradient, tolerance=tolerance, max_iterations=most)
+        captured: LinearSolver = plain
+        if self._coupled:
+            # MINRES takes some times the iterations of CG
+            most = 4 * max_iterations
+            captured = CoupledSolver(self, self._coupled, plain, tolerance=tolerance, max_iterations=most)
+        if factors is None or not self.assembled:
+            return captured
+        if not isinstance(factors, KeptInverse):
+            return FactoredSolver(self, captured, factors, tolerance)
+        if self._coupled or self.precision.name != "double":
+            return captured
+        return InvertedSolver(self, captured, factors, tolerance)
 
     def load_kernels(self) -> float:
         """Compile what a run needs, or find it in Warp's cache, at the present state; returns the seconds it took."""
