@@ -438,13 +438,8 @@ class ConjugateGradient:
         x, y, z = self._vectors(x), self._vectors(y), self._vectors(z)
         self._launch_product(x, y, z, alpha, beta)
         if self._watch and beta == 0.0:
-            wp.launch(
-                self._kernels.partial_curvature,
-                dim=self._partial.shape[0],
-                inputs=[x, z, self._partial],
-                device=self._device,
-            )
-            wp.launch(self._kernels.least_curvature, dim=1, inputs=[self._partial, self._least], device=self._device)
+            launch(self._kernels.partial_curvature, self._partial.shape[0], [x, z, self._partial], self._device)
+            launch(self._kernels.least_curvature, 1, [self._partial, self._least], self._device)
 
     def _launch_product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         """`z = alpha A x + beta y`."""
@@ -459,19 +454,9 @@ class ConjugateGradient:
 
     def _apply_diagonal(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         scalar = self._precision.scalar
-        launch(
-            self._kernels.apply_diagonal,
-            dim=self._size,
-            inputs=[
-                self._inverse,
-                self._vectors(x),
-                self._vectors(y),
-                self._vectors(z),
-                scalar(alpha),
-                scalar(beta),
-            ],
-            device=self._device,
-        )
+        vectors = map(self._vectors, (x, y, z))
+        inputs = [self._inverse, *vectors, scalar(alpha), scalar(beta)]
+        launch(self._kernels.apply_diagonal, self._size, inputs, self._device)
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
         """`z = A x`."""
@@ -486,12 +471,8 @@ class ConjugateGradient:
         if self._persistent is not None:
             return
         if self._kind == "block-jacobi":
-            launch(
-                self._kernels.invert_diagonal,
-                dim=self._size,
-                inputs=[self._diagonal, self._matrix.values, self._inverse],
-                device=self._device,
-            )
+            inputs = [self._diagonal, self._matrix.values, self._inverse]
+            launch(self._kernels.invert_diagonal, self._size, inputs, self._device)
             if self._on_cores is not None:
                 # who solves in another way, and only prepares, does without a coarse space
                 self._on_cores.is_stale = True

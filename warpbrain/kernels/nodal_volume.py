@@ -19,7 +19,7 @@ import warp as wp
 from warpbrain.kernels.invariants import cofactor
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
-from warpbrain.kernels.ten_nodes import FAR, NEAR, POINTS, UNROLL, gradient_at, shape_gradient
+from warpbrain.kernels.ten_nodes import FAR, NEAR, POINTS, UNROLL, add_forces, gradient_at, shape_gradient
 
 
 @wp.func
@@ -108,12 +108,7 @@ def nodal_volume_kernels(precision: Precision) -> KernelSet:
         G = inverse_edges[e]
         for point in range(POINTS):
             cof = cofactor(gradient_at(u, nodes, e, point, G))
-            cof = _pressure_at(p, patches, e, point, share * volume[e]) * cof
-            for b in range(10):
-                f = cof * shape_gradient(b, point, G)
-                if point > 0:
-                    f += out[e, b]
-                out[e, b] = f
+            add_forces(_pressure_at(p, patches, e, point, share * volume[e]) * cof, point, G, out, e)
 
     @kernels.add
     def tangents(

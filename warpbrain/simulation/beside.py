@@ -15,8 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -87,10 +85,13 @@ class Beside:
 
     def derivative(self, k: int, look: Looked) -> Floats:
         """The derivative by parameter k of what `look` finds; call it inside `away`."""
+        return self._weighted(k, lambda distance: look(*self._go(k, distance)))
+
+    def _weighted(self, k: int, value: Callable[[int], Floats]) -> Floats:
+        """Derivative by parameter k of what is known at each distance."""
         total: Floats | float = 0.0
         for distance, weight in _STENCIL.items():
-            offset, model = self._go(k, distance)
-            total = total + weight * look(offset, model)
+            total = total + weight * value(distance)
         return np.asarray(total) / self.steps[k]
 
     @property
@@ -147,7 +148,7 @@ class Beside:
         factors = self._of_models(k, lambda model: model.external_forces(time, self.model.unit_forces))
         nodes = self.model.quadratic or self.model.mesh
         rates = [
-            load.unit_forces_rate(nodes, partial(self._of_loads, k, number))
+            load.unit_forces_rate(nodes, lambda of, n=number: self._of_models(k, lambda model: of(model.loads[n])))
             for number, load in enumerate(self.model.loads)
         ]
         return factors + self.model.external_forces(time, rates)
@@ -157,13 +158,6 @@ class Beside:
         # differences from here, so that what does not change is zero and no rounding
         return self._of_models(k, lambda model: model.prescribed - self.model.prescribed)
 
-    def _of_loads(self, k: int, number: int, of: Callable[[Any], Floats]) -> Floats:
-        """Derivative by parameter k of what a function finds for a load, by its number."""
-        return self._of_models(k, lambda model: of(model.loads[number]))
-
     def _of_models(self, k: int, of: Callable[[Model], Floats]) -> Floats:
         """Derivative by parameter k of what a function finds for a model."""
-        total: Floats | float = 0.0
-        for distance, weight in _STENCIL.items():
-            total = total + weight * of(self._places[k][distance])
-        return np.asarray(total) / self.steps[k]
+        return self._weighted(k, lambda distance: of(self._places[k][distance]))

@@ -101,12 +101,7 @@ def follow_slowly(
         If no equilibrium is found: when, where and why.
     """
     series = np.asarray(times, dtype=np.float64)
-    if (
-        series.ndim != 1
-        or not len(series)
-        or not np.all(np.isfinite(series))
-        or np.any(np.diff(series, prepend=0) <= 0)
-    ):
+    if series.ndim != 1 or not len(series) or not (np.isfinite(series) & (np.diff(series, prepend=0) > 0)).all():
         raise InputError(f"times = {list(times)} s: expected positive numbers that increase")
     require_held(system.model)
     solver = EquilibriumSolver(system, options, on_step, clock, factors=factors)

@@ -315,28 +315,26 @@ class Rig:
 
     def _step(self, recording: TestRecording, value: float, start: Floats, h: float, time: float) -> Equilibrium:
         """The state a time step `h` after another, at a time."""
-        self._impose(recording, value)
-        try:
-            return self.solver.step(start, h, time)
-        except SolveError as error:
-            factor, unit = SHOWN[recording.quantities[0]]
-            raise SolveError(
-                f"test '{recording.name}' ({recording.mode}) at {time:.4g} s: {recording.quantities[0]} "
-                f"{factor * value:.4g} {unit}: {error}"
-            ) from None
+        return self._solved(recording, value, lambda: self.solver.step(start, h, time), at=f" at {time:.4g} s")
 
     def _equilibrium(
         self, recording: TestRecording, value: float, previous: float, start: Floats | None
     ) -> Equilibrium:
         """Equilibrium at an imposed value, from the state `start` at the value before it."""
+        came = f", coming from {SHOWN[recording.quantities[0]][0] * previous:.4g}"
+        return self._solved(recording, value, lambda: self.solver.solve(start=start), came=came)
+
+    def _solved(
+        self, recording: TestRecording, value: float, solve: Callable[[], Equilibrium], at: str = "", came: str = ""
+    ) -> Equilibrium:
         self._impose(recording, value)
         try:
-            return self.solver.solve(start=start)
+            return solve()
         except SolveError as error:
             factor, unit = SHOWN[recording.quantities[0]]
             raise SolveError(
-                f"test '{recording.name}' ({recording.mode}): {recording.quantities[0]} {factor * value:.4g} {unit}, "
-                f"coming from {factor * previous:.4g}: {error}"
+                f"test '{recording.name}' ({recording.mode}){at}: {recording.quantities[0]} {factor * value:.4g} "
+                f"{unit}{came}: {error}"
             ) from None
 
     def _platen(self, recording: TestRecording, value: float) -> Floats:

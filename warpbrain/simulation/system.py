@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -68,14 +69,6 @@ def begin_loading_kernels(device: wp.Device, precision: Precision) -> None:
 def _code(material: Material) -> tuple[type[Law], str, int]:
     """What must stay as it is when a material changes in a system: law, formulation and number of parameters."""
     return type(material.law), material.formulation, len(material.law.parameters())
-
-
-def _volumetric_modulus(material: Material) -> float:
-    return material.volumetric_modulus
-
-
-def _no_modulus(_material: Material) -> float:
-    return 0.0
 
 
 @dataclass(frozen=True)
@@ -244,9 +237,9 @@ class System:
     ) -> Floats:
         """Parameters by element; 1 where it is of no tissue of the group."""
         if modulus is None:
-            modulus = own_modulus if self._averages else _volumetric_modulus
+            modulus = own_modulus if self._averages else attrgetter("volumetric_modulus")
             # all of it acts on the volumes at corners
-            modulus = _no_modulus if self._mixes else modulus
+            modulus = (lambda _material: 0.0) if self._mixes else modulus
         rows = law_type.parameter_rows([material.law for material in materials.values()])
         # the last column, where something grows, is the growth stretch
         parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self._growing)))
