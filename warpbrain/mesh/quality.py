@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.surface import FACES, paired_faces
+from warpbrain.mesh.surface import FACES, connected, edges_of, paired_faces
 from warpbrain.mesh.tet_mesh import Floats, Ints, TetMesh, signed_volumes
 
 # the two faces that meet at each edge, by the corner each face is opposite to; edge ij lies on the faces opposite k, l
@@ -59,16 +59,12 @@ def components(tetrahedra: ArrayLike, tissue: ArrayLike | None = None) -> Ints:
     (m,) int32 array
         Piece numbers 0, 1, ... in order of each piece's first tetrahedron.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     tets = np.asarray(tetrahedra)
     pair = paired_faces(tets)[0] // len(FACES)
     if tissue is not None:
         labels = np.asarray(tissue)
         pair = pair[labels[pair[:, 0]] == labels[pair[:, 1]]]
-    graph = coo_array((np.ones(len(pair), dtype=bool), (pair[:, 0], pair[:, 1])), shape=(len(tets), len(tets)))
-    numbers: NDArray[np.int32] = connected_components(graph, directed=False)[1]
+    numbers = connected(pair, len(tets))
     first = np.unique(numbers, return_index=True)[1]
     rank = np.empty(len(first), dtype=np.int32)
     rank[np.argsort(first)] = np.arange(len(first), dtype=np.int32)
@@ -156,7 +152,5 @@ def coincident_nodes(points: ArrayLike) -> NDArray[np.int64]:
 
 def open_edges(faces: ArrayLike) -> NDArray[np.int64]:
     """Edges (k, 2) that do not belong to exactly two of the triangles (b, 3): none on a closed surface."""
-    triangles = np.asarray(faces)
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
+    unique, count = np.unique(edges_of(faces), axis=0, return_counts=True)
     return np.asarray(unique[count != 2], dtype=np.int64)

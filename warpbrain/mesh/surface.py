@@ -9,6 +9,22 @@ from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
 
 # corners of the four faces of a positive tetrahedron, each seen counter-clockwise from outside; face i is opposite i
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+#: Corners of the sides of a triangle, one way around.
+SIDES = np.array([[0, 1], [1, 2], [2, 0]])
+
+
+def connected(links: NDArray[np.integer], count: int) -> NDArray[np.int32]:
+    """Number (count,) of the connected part that each of some things is in, by pairs (k, 2) of things that touch."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(links), dtype=bool), (links[:, 0], links[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def edges_of(faces: ArrayLike) -> NDArray[np.int64]:
+    """Sides (3 b, 2) of triangles (b, 3), one triangle after the other, ends ascending."""
+    return np.sort(np.asarray(faces, dtype=np.int64)[:, SIDES].reshape(-1, 2), axis=1)
 
 
 def paired_faces(tetrahedra: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -151,36 +167,32 @@ def rim_edges(faces: ArrayLike) -> NDArray[np.int64]:
         touches itself.
     """
     triangles = np.asarray(faces, dtype=np.int64)
-    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    sides = triangles[:, SIDES].reshape(-1, 2)
     edges, number = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
     along = np.bincount(number.ravel(), weights=np.where(sides[:, 0] < sides[:, 1], 1.0, -1.0), minlength=len(edges))
     return np.asarray(edges[along != 0.0])
 
 
-def closed_surfaces(faces: ArrayLike) -> Ints:
+def closed_surfaces(faces: ArrayLike, joins: Bools | None = None) -> Ints:
     """Number of the edge-connected surface each triangle belongs to.
 
     Parameters
     ----------
     faces : (b, 3) array
         Node ids.
+    joins : (3 b,) bool array, optional
+        Which of their sides, see `edges_of`, connect; all by default.
 
     Returns
     -------
     (b,) int32 array
         Surface numbers 0, 1, ...
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    triangles = np.asarray(faces)
-    edges = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-    number = np.unique(edges, axis=0, return_inverse=True)[1].ravel()
-    owner = np.repeat(np.arange(len(triangles)), 3)
+    count = len(np.asarray(faces))
+    number = np.unique(edges_of(faces), axis=0, return_inverse=True)[1].ravel()
     # triangles and edges are the two sides of one graph, so an edge of any number of triangles is no special case
-    size = len(triangles) + int(number.max()) + 1
-    graph = coo_array((np.ones(len(owner), dtype=bool), (owner, len(triangles) + number)), shape=(size, size))
-    labels: Ints = connected_components(graph, directed=False)[1][: len(triangles)]
+    links = np.column_stack([np.repeat(np.arange(count), 3), count + number])
+    labels = connected(links if joins is None else links[joins], count + int(number.max()) + 1)[:count]
     return np.asarray(np.unique(labels, return_inverse=True)[1].ravel(), dtype=np.int32)
 
 
@@ -198,22 +210,17 @@ def pinched_nodes(faces: ArrayLike) -> Ints:
         Ids of nodes on an edge of more than two triangles, and of nodes whose triangles form more than one fan.
         Empty for smooth closed surfaces.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     triangles = np.asarray(faces)
-    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    sides = triangles[:, SIDES].reshape(-1, 2)
     # number of the triangle's own corner at either end of each side, sides turned so that equal ones look equal
-    own = (3 * np.arange(len(triangles))[:, None, None] + np.array([[0, 1], [1, 2], [2, 0]])).reshape(-1, 2)
+    own = (3 * np.arange(len(triangles))[:, None, None] + SIDES).reshape(-1, 2)
     turned = sides[:, 0] > sides[:, 1]
     sides[turned], own[turned] = sides[turned, ::-1], own[turned, ::-1]
     order = np.lexsort(sides.T)
     same = (sides[order][1:] == sides[order][:-1]).all(axis=1)
     first, second = own[order][:-1][same], own[order][1:][same]
     links = np.concatenate([np.stack([first[:, k], second[:, k]], axis=1) for k in (0, 1)])
-    size = triangles.size
-    graph = coo_array((np.ones(len(links), dtype=bool), (links[:, 0], links[:, 1])), shape=(size, size))
-    fan = connected_components(graph, directed=False)[1]
+    fan = connected(links, triangles.size)
     node_of_fan = np.unique(np.stack([triangles.ravel(), fan], axis=1), axis=0)[:, 0]
     nodes, fans = np.unique(node_of_fan, return_counts=True)
     edges, owners = np.unique(sides, axis=0, return_counts=True)
@@ -323,7 +330,7 @@ def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats,
     normals[:, 0] = _unit(face_vectors(points, faces))
     on_rim = np.zeros((len(faces), 7), dtype=bool)
 
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges = edges_of(faces)
     _, edge, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     edge = edge.reshape(-1, 3)
     sums = np.zeros((len(count), 3))

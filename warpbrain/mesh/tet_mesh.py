@@ -297,6 +297,11 @@ class TetMesh:
             mesh = mesh.with_node_sets({name: members[node_ids] for name, members in self.node_sets.items()})
         return mesh, node_ids, element_ids
 
+    def _named(self, nodes: Any, elements: Any) -> tuple[dict[str, Any], ...]:
+        """Sets and vectors of some nodes and elements, by their ids."""
+        given = ((self.node_sets, nodes), (self.element_sets, elements), (self.element_vectors, elements))
+        return tuple({name: values[ids] for name, values in named.items()} for named, ids in given)
+
     def _left(self, kept: Bools) -> tuple[TetMesh, Ints, Ints]:
         from warpbrain.mesh.surface import FACES, in_rows, interface_faces
 
@@ -313,9 +318,7 @@ class TetMesh:
             self.points[node_ids],
             new_id[tetrahedra],
             self.tissue[element_ids],
-            {name: members[node_ids] for name, members in self.node_sets.items()},
-            {name: members[element_ids] for name, members in self.element_sets.items()},
-            {name: vectors[element_ids] for name, vectors in self.element_vectors.items()},
+            *self._named(node_ids, element_ids),
             cut,
         )
         # of all who ask
@@ -411,7 +414,5 @@ def ordered(mesh: TetMesh) -> TetMesh:
         mesh.points[nodes],
         tetrahedra[elements],
         mesh.tissue[elements],
-        {name: members[nodes] for name, members in mesh.node_sets.items()},
-        {name: members[elements] for name, members in mesh.element_sets.items()},
-        {name: vectors[elements] for name, vectors in mesh.element_vectors.items()},
+        *mesh._named(nodes, elements),
     )

@@ -32,7 +32,23 @@ from warpbrain.kernels.nodal_volume import nodal_volume_kernels
 from warpbrain.physics.term import Body, Term
 
 
-class NodalVolumeTerm(Term):
+class _PatchTerm(Term):
+    """Of the material itself: it is there, however little of the load is."""
+
+    def set_scale(self, scale: float) -> None:
+        super().set_scale(1.0)
+
+    def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
+        launch(kernel, count, inputs, self.body.device)
+
+    def _ints(self, values: NDArray[Any]) -> wp.array:
+        return self.array(np.ascontiguousarray(values, dtype=np.int32), int)
+
+    def _zeros(self, shape: Any, dtype: Any) -> wp.array:
+        return wp.zeros(shape, dtype=dtype, device=self.body.device)
+
+
+class NodalVolumeTerm(_PatchTerm):
     """Forces and blocks of the pressure in each element, and the energy of all patches.
 
     Parameters
@@ -73,12 +89,6 @@ class NodalVolumeTerm(Term):
         self.curvature = self._zeros(self.count, p.scalar)
         self.of_elements = self._zeros((count, 40), p.vec3)
 
-    def _ints(self, values: NDArray[Any]) -> wp.array:
-        return self.array(np.ascontiguousarray(values, dtype=np.int32), int)
-
-    def _zeros(self, shape: Any, dtype: Any) -> wp.array:
-        return wp.zeros(shape, dtype=dtype, device=self.body.device)
-
     @property
     def patches(self) -> Ints:
         """The patch at each corner of each element (m, 4)."""
@@ -107,13 +117,6 @@ class NodalVolumeTerm(Term):
         # a captured graph reads these arrays
         self._volumes_on_device.assign(self._volumes)
         self._moduli_on_device.assign(self._moduli)
-
-    def set_scale(self, scale: float) -> None:
-        # a material is there, however little of the load is
-        super().set_scale(1.0)
-
-    def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
-        launch(kernel, count, inputs, self.body.device)
 
     def _evaluate(self, u: wp.array) -> tuple[Any, ...]:
         """Find the pressures at a displacement; returns what element kernels take."""
@@ -146,7 +149,7 @@ class NodalVolumeTerm(Term):
         return np.asarray(self._p.numpy().astype(np.float64)[self._patches].mean(axis=1))
 
 
-class PatchStiffnessTerm(Term):
+class PatchStiffnessTerm(_PatchTerm):
     """`sum_a c_a g_ab (x) g_ac`: how pressures follow the displacement. Its diagonal is in blocks, the rest is not.
 
     Parameters
@@ -160,7 +163,7 @@ class PatchStiffnessTerm(Term):
         assert body.quadratic is not None
         size = len(body.quadratic.points)
         super().__init__(body, np.arange(size)[:, None])
-        p, device = body.precision, body.device
+        p = body.precision
         self._volumes, self._kernels = volumes, nodal_volume_kernels(p)
         nodes = np.repeat(volumes.stencils.astype(np.int64)[:, None, :], 4, axis=1)
         keys = (volumes.patches[:, :, None] * size + nodes).ravel()
@@ -169,24 +172,14 @@ class PatchStiffnessTerm(Term):
         patches, nodes = np.divmod(keys[parts][starts], size)
         entries = np.argsort(nodes, kind="stable")
 
-        def ints(values: NDArray[Any]) -> wp.array:
-            return wp.array(values.astype(np.int32), dtype=int, device=device)
-
-        self._part_first, self._parts = ints(np.r_[starts, len(parts)]), ints(parts)
-        self._patch_first = ints(np.searchsorted(patches, np.arange(volumes.count + 1)))
-        self._node_first = ints(np.searchsorted(nodes[entries], np.arange(size + 1)))
-        self._nodes, self._entries, self._patches = ints(nodes), ints(entries), ints(patches[entries])
+        self._part_first, self._parts = self._ints(np.r_[starts, len(parts)]), self._ints(parts)
+        self._patch_first = self._ints(np.searchsorted(patches, np.arange(volumes.count + 1)))
+        self._node_first = self._ints(np.searchsorted(nodes[entries], np.arange(size + 1)))
+        self._nodes, self._entries, self._patches = self._ints(nodes), self._ints(entries), self._ints(patches[entries])
         # in the order of patches, and in that of nodes
-        self._g, self._by_node = (wp.zeros(len(starts), dtype=p.vec3, device=device) for _ in range(2))
-        self._change = wp.zeros(volumes.count, dtype=p.scalar, device=device)
-        self._one = wp.ones(1, dtype=p.scalar, device=device)
-
-    def set_scale(self, scale: float) -> None:
-        # a material is there, however little of the load is
-        super().set_scale(1.0)
-
-    def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
-        launch(kernel, count, inputs, self.body.device)
+        self._g, self._by_node = (self._zeros(len(starts), p.vec3) for _ in range(2))
+        self._change = self._zeros(volumes.count, p.scalar)
+        self._one = self.array(np.ones(1), p.scalar)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self.forces.zero_()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
+from warpbrain.mesh.surface import connected
 from warpbrain.physics.composition import require_composable
 from warpbrain.physics.laws import Law
 from warpbrain.physics.load import BodyForce, Load
@@ -370,12 +371,6 @@ def require_held(model: Model) -> None:
 @lru_cache(maxsize=4)
 def _connected_parts(mesh: TetMesh) -> tuple[int, NDArray[np.int32]]:
     """How many there are, and which of them each node (n,) belongs to; a mesh is asked for every state of it."""
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    count = len(mesh.points)
-    first = np.repeat(mesh.tetrahedra[:, 0], 3)
-    others = mesh.tetrahedra[:, 1:].ravel()
-    links = csr_matrix((np.ones(len(first), dtype=np.int8), (first, others)), shape=(count, count))
-    parts, part = connected_components(links, directed=False)
-    return int(parts), part
+    links = np.column_stack([np.repeat(mesh.tetrahedra[:, 0], 3), mesh.tetrahedra[:, 1:].ravel()])
+    part = connected(links, len(mesh.points))
+    return int(part.max()) + 1, part
