@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import model_of
+from bodies import model_of, sensitivities
 from shapes import box, distorted
 
 from warpbrain.errors import InputError
@@ -21,7 +21,6 @@ from warpbrain.simulation.kept_inverse import kept_for
 from warpbrain.simulation.model import QUADRATIC, Damping, Material, Model, Motion
 from warpbrain.simulation.relaxation import relax_to_rest
 from warpbrain.simulation.result import result_of
-from warpbrain.simulation.sensitivity import sensitivities
 from warpbrain.simulation.system import System
 
 SOFT = Material(NeoHookean(1000.0))

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bodies import sensitivities
 from numpy.typing import NDArray
 from shapes import cube
 from verification_rows import Row
@@ -23,7 +24,6 @@ from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibri
 from warpbrain.simulation.model import Damping, Material, Model, with_mechanisms
 from warpbrain.simulation.motion_sensitivity import MotionSensitivity, follow
 from warpbrain.simulation.quasi_static import follow_slowly
-from warpbrain.simulation.sensitivity import sensitivities
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]

@@ -32,7 +32,6 @@ from warpbrain.errors import SolveError
 from warpbrain.kernels.block_linear import BlockConjugateGradient
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.beside import Beside, ModelOf
-from warpbrain.simulation.equilibrium import Equilibrium
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.refinement import lengths, refine
 from warpbrain.simulation.system import System
@@ -264,18 +263,6 @@ def several_solver(system: System, count: int, tolerance: float, max_cg: int) ->
     return BlockConjugateGradient(
         system.matrix, system.diagonal, count, system.precision, tolerance=tolerance, max_iterations=max_cg
     )
-
-
-def sensitivities(
-    system: System,
-    equilibrium: Equilibrium,
-    models: ModelOf,
-    theta: ArrayLike,
-    scales: ArrayLike | None = None,
-    tolerance: float = 1e-10,
-) -> Sensitivities:
-    """Derivatives of an equilibrium by parameters; see `SensitivitySolver`."""
-    return SensitivitySolver(system, tolerance).solve(equilibrium.u, models, theta, scales)
 
 
 def _require_solved(linear: LinearResult, parameter: int) -> None:

@@ -370,18 +370,6 @@ class Rig:
         return total / self._area if recording.quantities[1] == "stress" else total
 
 
-def simulate_test(
-    case: Case,
-    recording: TestRecording,
-    device: str | None = None,
-    precision: str = "double",
-    options: EquilibriumOptions | None = None,
-    steps: int = STEPS,
-) -> TestResult:
-    """Simulate one test on the specimen of a case; see `Rig`, which runs several without starting anew for each."""
-    return Rig(case, device, precision, options).run(recording, steps)
-
-
 def compare_test(recording: TestRecording, result: TestResult) -> Comparison:
     """A test beside its simulation; the residuals have one column.
 
