@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.surface import FACES, connected, edges_of, paired_faces
+from warpbrain.mesh.surface import EDGES, FACES, connected, edges_of, paired_faces
 from warpbrain.mesh.tet_mesh import Floats, Ints, TetMesh, signed_volumes
 
-# the two faces that meet at each edge, by the corner each face is opposite to; edge ij lies on the faces opposite k, l
-EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+# the two faces that meet at each of `EDGES`, by the corner each face is opposite to
 _OPPOSITE = np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]])
 
 

@@ -1,14 +1,18 @@
-"""Surfaces of a tetrahedral mesh: its boundary, the closed surfaces that make it up, and interfaces between tissues."""
+"""Surfaces of tetrahedra, as arrays of node ids: boundary, closed surfaces that make it up, interfaces of tissues."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
 
 # corners of the four faces of a positive tetrahedron, each seen counter-clockwise from outside; face i is opposite i
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+#: Corners of the edges of a tetrahedron.
+EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 #: Corners of the sides of a triangle, one way around.
 SIDES = np.array([[0, 1], [1, 2], [2, 0]])
 
@@ -128,30 +132,6 @@ def in_rows(faces: ArrayLike, others: ArrayLike) -> Bools:
     return np.asarray(np.isin(number[: len(rows[0])], number[len(rows[0]) :]))
 
 
-def faces_of(mesh: TetMesh, members: Bools) -> Ints:
-    """Triangles of the boundary that a set of nodes holds.
-
-    A triangle of the surface beside a cut can have all its nodes on the cut's rim. It is no part of the wall: where all
-    members on the boundary are nodes of the cut, the set has triangles of the cut alone.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    members : (n,) bool array
-
-    Returns
-    -------
-    (k, 3) int32 array
-        Node ids, oriented outwards: triangles all of whose nodes are members.
-    """
-    faces = mesh.boundary
-    held = faces[members[faces].all(axis=1)]
-    beside = members & nodes_of(faces, len(members)) & ~nodes_of(mesh.cut, len(members))
-    if not len(mesh.cut) or beside.any():
-        return held
-    return np.asarray(held[in_rows(held, mesh.cut)])
-
-
 def rim_edges(faces: ArrayLike) -> NDArray[np.int64]:
     """Edges at which an oriented surface ends.
 
@@ -263,11 +243,6 @@ def nodes_of(faces: ArrayLike, count: int) -> Bools:
     return members
 
 
-def wall_nodes(mesh: TetMesh, elements: str) -> Bools:
-    """Nodes (n,) of the wall that taking out an element set leaves: of its faces with tetrahedra that stay."""
-    return nodes_of(interface_faces(mesh.tetrahedra, mesh.element_sets[elements]), len(mesh.points))
-
-
 def face_vectors(points: ArrayLike, faces: ArrayLike) -> Floats:
     """Area vectors (b, 3) of triangles (b, 3): along the normal, as long as the area is large."""
     corner = np.asarray(points, dtype=np.float64)[np.asarray(faces)]
@@ -277,15 +252,6 @@ def face_vectors(points: ArrayLike, faces: ArrayLike) -> Floats:
 def tangents(normals: ArrayLike) -> Floats:
     """Two unit vectors (..., 2, 3) at right angles to directions (..., 3), and to each other."""
     return np.asarray(np.linalg.svd(np.asarray(normals, dtype=np.float64)[..., None, :])[2][..., 1:, :])
-
-
-def vertex_normals(mesh: TetMesh) -> Floats:
-    """Outward unit normals (n, 3) at the nodes of the boundary, means over their faces; zero at all other nodes."""
-    faces = mesh.boundary
-    normals = np.zeros_like(mesh.points)
-    np.add.at(normals, faces.ravel(), np.repeat(face_vectors(mesh.points, faces), 3, axis=0))
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(normals / np.where(lengths > 0.0, lengths, 1.0))
 
 
 def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:

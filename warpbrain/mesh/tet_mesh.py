@@ -12,11 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.errors import InputError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
-
+from warpbrain.mesh.surface import FACES, Bools, Floats, Ints, boundary_faces, in_rows, interface_faces
 
 #: A coordinate [m] beyond this is no place.
 LARGEST = 1e12
@@ -183,8 +179,6 @@ class TetMesh:
     @cached_property
     def boundary(self) -> Ints:
         """Triangles (b, 3) of the boundary, oriented outwards; found once."""
-        from warpbrain.mesh.surface import boundary_faces
-
         return boundary_faces(self.tetrahedra)
 
     @cached_property
@@ -303,8 +297,6 @@ class TetMesh:
         return tuple({name: values[ids] for name, values in named.items()} for named, ids in given)
 
     def _left(self, kept: Bools) -> tuple[TetMesh, Ints, Ints]:
-        from warpbrain.mesh.surface import FACES, in_rows, interface_faces
-
         element_ids = np.flatnonzero(kept).astype(np.int32)
         tetrahedra = self.tetrahedra[element_ids]
         node_ids = np.unique(tetrahedra).astype(np.int32)

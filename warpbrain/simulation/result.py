@@ -65,7 +65,7 @@ class Result(Shown):
     nodal_pressures : mapping of str to (n,) array
         What mechanisms know at the nodes [Pa]: ``fluid_pressure`` of drainage.
     u_middles : (m, 6, 3) array or None
-        Displacement [m] of the midside nodes of quadratic elements, in the order of `warpbrain.mesh.quality.EDGES`.
+        Displacement [m] of the midside nodes of quadratic elements, in the order of `warpbrain.mesh.surface.EDGES`.
 
     Of quadratic elements displacements are those of the mesh's own nodes, strain and stress those in the middle of
     elements, and half of what holds a midside node is at either end of its edge.

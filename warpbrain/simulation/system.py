@@ -24,7 +24,7 @@ from warpbrain.kernels.precision import PRECISIONS, Precision
 from warpbrain.kernels.ten_nodes import quadratic_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.surface import EDGES
 from warpbrain.physics.continuous import differ_in_numbers_only
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.device import grown
