@@ -219,22 +219,6 @@ def _conditional_loop(test_convergence: Any, least: wp.array) -> Iterator[None]:
         warp_linear_internals._run_capturable_loop = original
 
 
-@dataclass(frozen=True)
-class Nodes:
-    """Where the rows of a matrix are, for the coarse space of `warpbrain.kernels.multicore_gradients`.
-
-    Attributes
-    ----------
-    points : (n, 3) array
-        [m]
-    free : wp.array of vec3, shape (n,)
-        1 for free components, 0 for constrained ones.
-    """
-
-    points: NDArray[np.float64]
-    free: wp.array
-
-
 #: Aggregates of the coarse space, and rows of a matrix from which on it pays: the inverse of its matrix takes as long
 #: as some iterations, of which it saves more than half.
 _AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 2000
@@ -243,7 +227,9 @@ _AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 2000
 class _OnCores:
     """Solves with one matrix's pattern on the cores of a CPU; see `warpbrain.kernels.multicore_gradients`."""
 
-    def __init__(self, size: int, precision: Precision, device: Any, nodes: Nodes | None) -> None:
+    def __init__(
+        self, size: int, precision: Precision, device: Any, nodes: tuple[NDArray[np.float64], wp.array] | None
+    ) -> None:
         self._kernel, self._coarse_matrix = gradients_kernels(precision)
         self._precision, self._device = precision, device
         self._scratch = [self._zeros(size, precision.vec3) for _ in range(3)]
@@ -258,8 +244,8 @@ class _OnCores:
         self._free = self._places = self._zeros(0, precision.vec3)
         if nodes is not None and size >= _WORTH_A_COARSE_SPACE:
             self._count = -(-chunks // self._aggregate)
-            self._free = nodes.free
-            self._places = wp.array(self._affine(nodes.points), dtype=precision.vec3, device=device)
+            points, self._free = nodes
+            self._places = wp.array(self._affine(points), dtype=precision.vec3, device=device)
         self._coarse = self._zeros((self._count, 16 * self._count), precision.mat33)
         self._inverse = self._zeros((12 * self._count, 12 * self._count), precision.scalar)
         self._left, self._found = (self._zeros(12 * self._count, precision.scalar) for _ in range(2))
@@ -339,9 +325,9 @@ class ConjugateGradient:
     beyond : callable, optional
         ``beyond(x, factor, y)`` adds to `y` a factor times the product of `x` with what belongs to `A` and is in no
         block, whose diagonal blocks are in the matrix (and are taken off again there).
-    nodes : Nodes, optional
-        Where the rows are: on the CPU block-Jacobi has a coarse space then, if the matrix is large. `solve` cannot be
-        captured in a graph then.
+    nodes : pair of (n, 3) array and wp.array of vec3, shape (n,), optional
+        Where the rows are [m], and 1 for free components, 0 for constrained ones: on the CPU block-Jacobi has a coarse
+        space then, if the matrix is large. `solve` cannot be captured in a graph then.
     """
 
     def __init__(
@@ -357,7 +343,7 @@ class ConjugateGradient:
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
         beyond: Callable[[wp.array, float, wp.array], None] | None = None,
-        nodes: Nodes | None = None,
+        nodes: tuple[NDArray[np.float64], wp.array] | None = None,
     ) -> None:
         if preconditioner not in PRECONDITIONERS:
             raise ValueError(f"preconditioner {preconditioner!r}: expected one of {', '.join(PRECONDITIONERS)}")

@@ -106,11 +106,9 @@ class CoupledSolver:
         return self._term.coupling
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
-        """See `LinearSolver`."""
         self._plain.multiply(x, z)
 
     def prepare(self) -> None:
-        """See `LinearSolver`."""
         if not self._term.coupled:
             self._plain.prepare()
             return
@@ -180,7 +178,6 @@ class CoupledSolver:
         return LinearResult(iterations, residual, wanted * float(np.linalg.norm(load)), curvature)
 
     def result(self) -> LinearResult:
-        """See `LinearSolver`."""
         if not self._term.coupled:
             return self._plain.result()
         # of a captured solve there is nothing but what it left

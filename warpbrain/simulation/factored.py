@@ -108,11 +108,9 @@ class FactoredSolver:
         self._result: LinearResult | None = None
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
-        """See `LinearSolver`."""
         self._captured.multiply(x, z)
 
     def prepare(self) -> None:
-        """See `LinearSolver`."""
         from scipy.sparse import bsr_matrix
 
         self._captured.prepare()
@@ -153,7 +151,6 @@ class FactoredSolver:
         return result
 
     def result(self) -> LinearResult:
-        """See `LinearSolver`."""
         return self._result or self._captured.result()
 
 

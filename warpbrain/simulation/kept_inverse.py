@@ -126,7 +126,6 @@ class InvertedSolver(FactoredSolver):
     """
 
     def prepare(self) -> None:
-        """See `LinearSolver`."""
         self._captured.prepare()
         self._K = self._system.matrix
 

@@ -67,11 +67,6 @@ class MeshError:
 Solve = Callable[[str, bool, Floats], State]
 
 
-def unlocked(elements: str) -> str:
-    """The kind of elements that stands for one that locks; itself, if it does not."""
-    return "tet4-averaged" if elements == "tet4" else elements
-
-
 def estimate(state: State, elements: str, solve: Solve, prolongation: Any = None) -> MeshError:
     """Estimate the error of a state.
 
@@ -89,7 +84,7 @@ def estimate(state: State, elements: str, solve: Solve, prolongation: Any = None
     SolveError
         If a state is not found on other elements.
     """
-    other = unlocked(elements)
+    other = "tet4-averaged" if elements == "tet4" else elements
     free = state if other == elements else solve(other, False, state.u)
     locking, reactions = free.u - state.u, free.reactions - state.reactions
     if prolongation is None:

@@ -17,7 +17,7 @@ from warpbrain.mesh.surface import connected
 from warpbrain.physics.composition import require_composable
 from warpbrain.physics.laws import Law
 from warpbrain.physics.load import BodyForce, Load
-from warpbrain.physics.mechanism import Emptying, Following, Mechanism, Removing, Substituting
+from warpbrain.physics.mechanism import Emptying, Following, Growing, Mechanism, Removing, Substituting, Weakening
 
 #: Kinds of elements; the default first.
 ELEMENTS = ("tet4", "tet4-averaged", "tet10", "tet10-mixed")
@@ -213,6 +213,16 @@ class Model:
     def emptying(self) -> list[Emptying]:
         """The mechanisms that take tissue out little by little."""
         return [mechanism for mechanism in self.mechanisms if isinstance(mechanism, Emptying)]
+
+    @cached_property
+    def growing(self) -> list[Growing]:
+        """The mechanisms by which tissue grows."""
+        return [mechanism for mechanism in self.mechanisms if isinstance(mechanism, Growing)]
+
+    @cached_property
+    def weakening(self) -> list[Weakening]:
+        """The mechanisms that make tissue softer."""
+        return [mechanism for mechanism in self.mechanisms if isinstance(mechanism, Weakening)]
 
     def remaining_part(self, scales: Sequence[float]) -> Floats:
         """Part (m,) of each tetrahedron that is left, with a scale from 0 to 1 for each of `emptying`."""

@@ -90,17 +90,17 @@ def displacement_statistics(mesh: TetMesh, u: Floats) -> Mapping[str, Statistics
     """Statistics of a displacement (n, 3) [m] by node set, and of all nodes under ``"all nodes"``."""
     sizes = np.linalg.norm(u, axis=1)
     groups = {"all nodes": np.ones(len(sizes), dtype=bool), **mesh.node_sets}
-    return {name: _statistics(sizes[members]) for name, members in groups.items() if members.any()}
-
-
-def _statistics(sizes: Floats) -> Statistics:
-    return Statistics(
-        nodes=len(sizes),
-        mean=float(sizes.mean()),
-        root_mean_square=float(np.sqrt(np.mean(sizes**2))),
-        percentile_95=float(np.percentile(sizes, 95.0)),
-        largest=float(sizes.max()),
-    )
+    return {
+        name: Statistics(
+            nodes=len(own),
+            mean=float(own.mean()),
+            root_mean_square=float(np.sqrt(np.mean(own**2))),
+            percentile_95=float(np.percentile(own, 95.0)),
+            largest=float(own.max()),
+        )
+        for name, members in groups.items()
+        if len(own := sizes[members])
+    }
 
 
 def nodal_state_of(system: System, time: float = math.inf) -> NodalState:

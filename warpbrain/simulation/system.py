@@ -17,7 +17,7 @@ from warp.sparse import BsrMatrix, bsr_zeros
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.kernels.assembly import assembly_kernels
-from warpbrain.kernels.linear import ConjugateGradient, Nodes, solver_kernels
+from warpbrain.kernels.linear import ConjugateGradient, solver_kernels
 from warpbrain.kernels.module import begin_loading
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import PRECISIONS, Precision
@@ -28,7 +28,7 @@ from warpbrain.mesh.surface import EDGES
 from warpbrain.physics.continuous import differ_in_numbers_only
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.device import grown
-from warpbrain.physics.mechanism import Following, Growing, Weakening
+from warpbrain.physics.mechanism import Following
 from warpbrain.physics.term import Term
 from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, averaged_terms, own_modulus
 from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
@@ -140,10 +140,8 @@ class System:
         self.terms = [*self._following]
         self._time_step = math.inf
         self._acting: tuple[float, float] = (1.0, math.inf)
-        self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
-        self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
         # of what alters elements, as they are now; None: not known yet
-        alters = self._growing or self._weakening or model.emptying or self._averages or self._mixes
+        alters = model.growing or model.weakening or model.emptying or self._averages or self._mixes
         self._scales: tuple[float, ...] | None = None if alters else ()
         self.groups = self._group_elements()
         self.terms += [term for group in self.groups for term in group.averaged]
@@ -193,7 +191,7 @@ class System:
         for (law_type, formulation), materials in self._grouped(self.model).items():
             members = np.flatnonzero(np.isin(self.model.mesh.tissue, list(materials)))
             device_law = law_type.device_law(formulation)
-            device_law = grown(device_law) if self._growing else device_law
+            device_law = grown(device_law) if self.model.growing else device_law
             linear = self.quadratic is None
             kernels = device_law.kernels(self.precision) if linear else quadratic_kernels(device_law, self.precision)
             averaged = (
@@ -242,11 +240,11 @@ class System:
             modulus = (lambda _material: 0.0) if self._mixes else modulus
         rows = law_type.parameter_rows([material.law for material in materials.values()])
         # the last column, where something grows, is the growth stretch
-        parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self._growing)))
+        parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self.model.growing)))
         for (label, material), row in zip(materials.items(), rows, strict=True):
             members = np.flatnonzero(self.model.mesh.tissue == label)
             parameters[members, : 1 + len(row)] = (modulus(material), *row)
-        if self._growing:
+        if self.model.growing:
             parameters[:, -1] = self.growth_stretches
         return parameters
 
@@ -294,7 +292,9 @@ class System:
         self.model = model
         others: dict[int, Term] = {}
         try:
-            changed = self._changed(before, model)
+            pairs = zip(before.mechanisms, model.mechanisms, strict=True)
+            following = [(was, now) for was, now in pairs if isinstance(now, Following)]
+            changed = {n: now for n, (was, now) in enumerate(following) if was is not now and was != now}
             made = {} if made is None else made
             for place, mechanism in changed.items():
                 if id(mechanism) not in made:
@@ -313,9 +313,7 @@ class System:
                 others[place].set_time_step(self._time_step)
                 term.adopt(others[place])
         if list(before.mechanisms) != list(model.mechanisms):
-            self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
-            self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
-            self._scales = None if self._growing or self._weakening or model.emptying else self._scales
+            self._scales = None if model.growing or model.weakening or model.emptying else self._scales
             self._act()
         self._write_materials()
 
@@ -344,13 +342,6 @@ class System:
         for was, now in zip(before.mechanisms, model.mechanisms, strict=True):
             if was != now and not differ_in_numbers_only(was, now):
                 raise InputError(f"mechanisms: {now}: expected other numbers of {was}")
-
-    @staticmethod
-    def _changed(before: Model, after: Model) -> dict[int, Following]:
-        """Mechanisms that are terms and have other parameters, by the number of the term."""
-        pairs = zip(before.mechanisms, after.mechanisms, strict=True)
-        following = [(was, now) for was, now in pairs if isinstance(now, Following)]
-        return {place: now for place, (was, now) in enumerate(following) if was is not now and was != now}
 
     def _write_materials(self) -> None:
         """Let laws and terms have the moduli, factors and growth that elements have now."""
@@ -576,7 +567,7 @@ class System:
             preconditioner=preconditioner,
             watch_curvature=watch_curvature,
             beyond=None if self.assembled else self._add_beyond_blocks,
-            nodes=Nodes(self.model.node_mesh.points, self.free) if at_rest else None,
+            nodes=(self.model.node_mesh.points, self.free) if at_rest else None,
         )
         captured: LinearSolver = plain
         if self._coupled:
@@ -640,25 +631,25 @@ class System:
         share, time = self._acting
         for term in self.terms:
             term.set_scale(share * term.factor(time))
-        growing, weakening, emptying = self._growing, self._weakening, self.model.emptying
-        scales = tuple(share * mechanism.factor(time) for mechanism in (*growing, *weakening))
-        scales += tuple(share * mechanism.factor(time) for mechanism in emptying)
+        model = self.model
+        growth, softening, emptying = (
+            [share * mechanism.factor(time) for mechanism in those]
+            for those in (model.growing, model.weakening, model.emptying)
+        )
+        scales = (*growth, *softening, *emptying)
         if scales == self._scales:
             return False
         self._scales = scales
-        mesh = self.model.mesh
-        self.stiffness_factors = np.ones(self.elements)
-        for softer, scale in zip(weakening, scales[len(growing) :], strict=False):
-            self.stiffness_factors *= softer.stiffness_factor(mesh, scale)
+        self.stiffness_factors, change = np.ones(self.elements), np.ones(self.elements)
+        for softer, scale in zip(model.weakening, softening, strict=True):
+            self.stiffness_factors *= softer.stiffness_factor(model.mesh, scale)
         if emptying:
-            left = scales[len(growing) + len(weakening) :]
-            self.remaining_parts = self.model.remaining_part(left)
-            self.mass.assign(self.model.node_masses * self.model.remaining_share(left))
+            self.remaining_parts = model.remaining_part(emptying)
+            self.mass.assign(model.node_masses * model.remaining_share(emptying))
         # a kernel multiplies all that an element does by its volume
         self.volume.assign((PART if self._averages else 1.0) * self.stiffness_factors * self._volumes)
-        change = np.ones(self.elements)
-        for larger, scale in zip(growing, scales, strict=False):
-            change *= 1.0 + larger.growth(mesh, scale)
+        for larger, scale in zip(model.growing, growth, strict=True):
+            change *= 1.0 + larger.growth(model.mesh, scale)
         self.growth_stretches = np.cbrt(change)
         return True
 
