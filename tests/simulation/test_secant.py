@@ -12,7 +12,7 @@ from warpbrain.physics.mechanisms.falx import Falx
 from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.model import Material, Model, with_mechanisms
-from warpbrain.simulation.secant import secant
+from warpbrain.simulation.sensitivity import secant
 from warpbrain.simulation.system import System
 
 

@@ -20,8 +20,7 @@ import numpy as np
 import warp as wp
 
 from warpbrain.arrays import Floats
-from warpbrain.kernels.host_gradients import host_gradients
-from warpbrain.kernels.linear import ConjugateGradient, LinearResult
+from warpbrain.kernels.linear import ConjugateGradient, LinearResult, host_gradients
 
 #: Eigenvalues that are smoothed: from this part of the largest one.
 _SMOOTHED_FROM = 0.125

@@ -24,8 +24,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats
-from warpbrain.kernels.host_gradients import host_gradients
-from warpbrain.kernels.linear import LinearResult
+from warpbrain.kernels.linear import LinearResult, host_gradients
 from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
 from warpbrain.simulation.sparse_factors import SparseFactors
 

@@ -16,8 +16,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.kernels.host_gradients import host_gradients
-from warpbrain.kernels.linear import LinearResult
+from warpbrain.kernels.linear import LinearResult, host_gradients
 from warpbrain.simulation.factored import MOST, FactoredSolver, KeptFactors
 
 
