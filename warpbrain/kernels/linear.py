@@ -16,8 +16,6 @@ of Python. Facts about Warp 1.19 that are dealt with here and nowhere else:
   over. CG therefore sees scalar views of our arrays.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
