@@ -112,21 +112,10 @@ def block_kernels(precision: Precision) -> KernelSet:
 
 
 class BlockConjugateGradient:
-    """Preconditioned CG for a symmetric matrix, whose pattern does not change, and several right-hand sides.
+    """Preconditioned CG for a symmetric matrix, whose pattern does not change, and `count` right-hand sides.
 
-    Parameters
-    ----------
-    matrix : warp.sparse.BsrMatrix
-        Symmetric, 3 x 3 blocks, every diagonal block present.
-    diagonal : wp.array of int, shape (n,)
-        Position of each diagonal block in ``matrix.values``.
-    count : int
-        Number of right-hand sides.
-    precision : Precision
-    tolerance : float
-        Relative, of each: it has converged when ``|b - A x| <= tolerance |b|``.
-    max_iterations : int
-        Rounded up to whole rounds.
+    `diagonal` (n,) says where each diagonal block is in ``matrix.values``. A right-hand side has converged when ``|b -
+    A x| <= tolerance |b|``; `max_iterations` is rounded up to whole rounds.
     """
 
     def __init__(
@@ -167,19 +156,7 @@ class BlockConjugateGradient:
     def solve(
         self, right_hand_sides: Sequence[NDArray[np.float64]], tolerance: float | None = None
     ) -> NDArray[np.float64]:
-        """Solve from zero.
-
-        Parameters
-        ----------
-        right_hand_sides : sequence of (n, 3) arrays
-            As many as the solver was made for.
-        tolerance : float, optional
-            In place of the solver's own.
-
-        Returns
-        -------
-        (count, n, 3) array
-        """
+        """Solve from zero, for as many (n, 3) arrays as the solver was made for: (count, n, 3)."""
         self._b.assign(np.stack(right_hand_sides, axis=1))
         self._x.zero_()
         self._least.fill_(float("inf"))

@@ -26,13 +26,7 @@ def extra_kernels(
 ) -> tuple[Any, Any, Any]:
     """Make (once) kernels for forces, forces with tangent blocks, and energies, one thread for an element of a list.
 
-    Parameters
-    ----------
-    key : str
-        Part of the name of the compiled module.
-    energy, stress, moduli : wp.func
-    precision : Precision
-    stencil : Stencil
+    `key` is part of the name of the compiled module; `energy`, `stress` and `moduli` are the term's, as above.
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     module = compiled_module(f"{key}_{precision.name}{stencil.suffix}", stencil.unroll)

@@ -32,17 +32,9 @@ def cofactor(F: Any):
 def invariant_kernels(
     key: str, energy_density: Any, derivatives: Any, second_invariant: bool, precision: Precision
 ) -> ElementKernels:
-    """Make (once) the element kernels of a law in invariants.
+    """Make (once) the element kernels of a law in invariants, whose name `key` is part of that of its compiled module.
 
-    Parameters
-    ----------
-    key : str
-        Name of the law, part of the name of its compiled module.
-    energy_density, derivatives : wp.func
-        The law, as above.
-    second_invariant : bool
-        False leaves every term of `I2` out of the compiled code (`I2` is then passed as zero).
-    precision : Precision
+    Without `second_invariant` every term of `I2` is left out of the compiled code (`I2` is then passed as zero).
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     pointwise = compiled_module(f"{key}_{precision.name}_pointwise")

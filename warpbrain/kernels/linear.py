@@ -546,21 +546,11 @@ def host_gradients(
     goal: float,
     most: int,
 ) -> LinearResult:
-    """Preconditioned conjugate gradients (Hestenes and Stiefel 1952) that watch the curvature.
+    """Preconditioned conjugate gradients on the host (Hestenes and Stiefel 1952) that watch the curvature.
 
-    They also end where the matrix or the preconditioner is not positive definite, or what they make is not finite: so
-    does a search that went too far.
-
-    Parameters
-    ----------
-    multiply, precondition : callable
-        What the matrix and the preconditioner make of a vector (n,).
-    x, r : (n,) arrays
-        A start and its residual; what is found and its residual after.
-    goal : float
-        Norm of the residual that is to be reached.
-    most : int
-        Iterations at most.
+    They go on until the norm of the residual is at most the `goal`, and leave what they find in `x` (n,) and its
+    residual in `r`. They also end where the matrix or the preconditioner is not positive definite, or what they make is
+    not finite: so does a search that went too far.
     """
     p = np.zeros_like(r)
     before, least = math.inf, math.inf

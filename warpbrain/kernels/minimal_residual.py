@@ -168,21 +168,8 @@ Function = Callable[[wp.array, wp.array], None]
 class MinimalResidual:
     """MINRES for one symmetric operator and one symmetric positive definite preconditioner.
 
-    Parameters
-    ----------
-    size : int
-    unknown : type
-        Warp's type of an element of `b` and `x`: the scalar of the precision, or its `four_vector`.
-    precision : Precision
-    device : wp.Device
-    operator, preconditioner : callable
-        ``(x, y)`` writes `A x`, or `M^-1 x`, to `y` by launches alone.
-    max_iterations : int
-
-    Attributes
-    ----------
-    b, x : wp.array, shape (size,)
-        Right-hand side; first guess and result.
+    An element of `b` (right-hand side) and `x` (first guess and result), both (size,), is an `unknown`: the scalar of
+    the precision, or its `four_vector`. `operator` and `preconditioner` write `A x` and `M^-1 x` by launches alone.
     """
 
     def __init__(

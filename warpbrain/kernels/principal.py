@@ -28,16 +28,7 @@ from warpbrain.kernels.tetrahedron import ElementKernels, law_kernels
 
 @cache
 def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision: Precision) -> ElementKernels:
-    """Make (once) the element kernels of a law in principal stretches.
-
-    Parameters
-    ----------
-    key : str
-        Name of the law, part of the name of its compiled module.
-    energy_density, derivatives : wp.func
-        The law, as above.
-    precision : Precision
-    """
+    """Make (once) the element kernels of a law in principal stretches; `key` is part of the compiled module's name."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     pointwise = compiled_module(f"{key}_{precision.name}_pointwise")
     small = wp.constant(scalar(precision.epsilon**2))

@@ -171,14 +171,7 @@ def element_kernels(
 ) -> tuple[Any, Any, Any]:
     """Make the kernels that every law has alike: forces, forces and tangents, and energy of `ElementKernels`.
 
-    Parameters
-    ----------
-    key : str
-        Name of the law.
-    stress_of, energy_of, tangents_of : wp.func
-        See `ElementKernels`.
-    precision : Precision
-    stencil : Stencil
+    `key` is the name of the law; `stress_of`, `energy_of` and `tangents_of` are as there.
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     module = compiled_module(f"{key}_{precision.name}{stencil.suffix}", stencil.unroll)

@@ -49,18 +49,9 @@ class LinearSolver(Protocol):
 
 
 class CoupledSolver:
-    """Solves the system's matrix together with what a term adds to it.
+    """Solves the system's matrix together with what a term with unknowns of its own adds to it: one of them.
 
-    Parameters
-    ----------
-    system : System
-    terms : sequence of Term
-        Those with unknowns of their own: one.
-    conjugate_gradient : ConjugateGradient
-        For times when these do not follow the displacement.
-    tolerance : float
-        Relative.
-    max_iterations : int
+    `conjugate_gradient` is for times when these do not follow the displacement; the tolerance is relative.
     """
 
     def __init__(
@@ -144,15 +135,10 @@ class CoupledSolver:
             self._result = self.in_rounds(steps, wanted)
 
     def in_rounds(self, steps: Callable[[float, int], int], wanted: float) -> LinearResult:
-        """Solve ever closer until what is left of the eliminated system is small.
+        """Solve ever closer until what is left of the eliminated system is at most `wanted` times the load.
 
-        Parameters
-        ----------
-        steps : callable
-            Goes on to a relative tolerance of the whole system, given the iterations that are done, and leaves what it
-            finds in the solution array; how many it took, 0 if it can do no more.
-        wanted : float
-            Residual of the eliminated system, relative to the load.
+        `steps` goes on to a relative tolerance of the whole system, given the iterations that are done, and leaves what
+        it finds in the solution array; it returns how many it took, 0 if it can do no more.
         """
         tighter, iterations = _FIRST, 0
         for _ in range(_ROUNDS):

@@ -85,18 +85,10 @@ MOST = 60
 
 
 class FactoredSolver:
-    """Solves a system's linear systems with factors that are kept from one to the next.
+    """Solves a system's linear systems on the CPU, to a relative tolerance, with factors that are kept from one to the
+    next.
 
-    Parameters
-    ----------
-    system : System
-        On the CPU.
-    captured : LinearSolver
-        Of that system: takes over where factors do not help.
-    factors : KeptFactors
-        Made, and made anew, as needed.
-    tolerance : float
-        Relative.
+    These are made, and made anew, as needed; `captured` takes over where they do not help.
     """
 
     def __init__(self, system: System, captured: LinearSolver, factors: KeptFactors, tolerance: float) -> None:
@@ -156,16 +148,8 @@ class FactoredSolver:
 class CoupledBlock:
     """The system's matrix with a term's own unknowns, on the host.
 
-    Parameters
-    ----------
-    system : System
-    captured : CoupledSolver
-        Of that system.
-    K : SciPy BSR matrix (3 n, 3 n)
-        What is in blocks [N/m], constrained rows and columns replaced by the identity.
-    free : (3 n,) bool array
-    before : CoupledBlock, optional
-        Of the matrix before: its factors of `S0` are taken if that is still the same.
+    `K` is what is in blocks [N/m], SciPy BSR (3 n, 3 n), constrained rows and columns replaced by the identity, and
+    `free` (3 n,) says which are not. Of the matrix `before` the factors of `S0` are taken if that is still the same.
     """
 
     def __init__(
@@ -193,18 +177,10 @@ class CoupledBlock:
             self._schur = SparseFactors(self._S)
 
     def solve(self, load: Floats, wanted: float, factors: KeptFactors, most: int) -> LinearResult:
-        """Leave the displacement under a load (3 n,) in the system's solution; how that ended.
+        """Leave the displacement under a load (3 n,) [N], zero on constrained components, in the system's solution.
 
-        Parameters
-        ----------
-        load : (3 n,) array
-            [N], zero on constrained components.
-        wanted : float
-            Residual of the system without pressures, relative to the load.
-        factors : KeptFactors
-            Of a `K` that is near.
-        most : int
-            Iterations.
+        Until the residual of the system without pressures is `wanted` times the load, or after `most` iterations, with
+        factors of a `K` that is near; returns how that ended.
         """
         size = len(load)
 

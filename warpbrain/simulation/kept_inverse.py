@@ -68,13 +68,7 @@ _MATRICES = 3
 
 
 class KeptInverse(KeptFactors):
-    """Of the stiffness of the last state that it was renewed at; of none at first.
-
-    Parameters
-    ----------
-    device : warp.Device
-        A GPU for which there is CuPy.
-    """
+    """Of the stiffness of the last state that it was renewed at, of none at first, on a GPU for which there is CuPy."""
 
     _worth = 60
 
@@ -112,17 +106,7 @@ class KeptInverse(KeptFactors):
 
 
 class InvertedSolver(FactoredSolver):
-    """Solves a system's linear systems on a GPU with a kept inverse.
-
-    Parameters
-    ----------
-    system : System
-        On a GPU, in double precision, without unknowns beside the displacement.
-    captured : LinearSolver
-    factors : KeptInverse
-    tolerance : float
-        Relative.
-    """
+    """Solves with a kept inverse, on a GPU, in double precision, without unknowns beside the displacement."""
 
     def prepare(self) -> None:
         self._captured.prepare()

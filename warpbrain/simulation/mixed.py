@@ -49,16 +49,11 @@ class _PatchTerm(Term):
 
 
 class NodalVolumeTerm(_PatchTerm):
-    """Forces and blocks of the pressure in each element, and the energy of all patches.
+    """Forces and blocks of the pressure in each element, and the energy of all patches, on a body of quadratic
+    elements.
 
-    Parameters
-    ----------
-    body : Body
-        Of quadratic elements.
-    logarithmic : (m,) bool array
-        Whether `U = (ln J)^2 / 2` in an element (laws of the coupled formulation), or `(J - 1)^2 / 2`.
-    kinds : (m,) int array
-        See `warpbrain.simulation.model.Model.element_kinds`.
+    `logarithmic` (m,) says whether `U = (ln J)^2 / 2` in an element (laws of the coupled formulation), or `(J - 1)^2 /
+    2`; `kinds` (m,) are `warpbrain.simulation.model.Model.element_kinds`.
     """
 
     def __init__(self, body: Body, logarithmic: NDArray[np.bool_], kinds: Ints) -> None:
@@ -95,16 +90,8 @@ class NodalVolumeTerm(_PatchTerm):
         return self._patches
 
     def set_elements(self, modulus: Floats, weight: Floats, growth: Floats) -> None:
-        """Take what the elements have.
-
-        Parameters
-        ----------
-        modulus : (m,) array
-            Volumetric modulus [Pa] of the law.
-        weight : (m,) array
-            Factor on the energy of each element.
-        growth : (m,) array
-            How many times its volume an element has grown.
+        """Take what the elements (m,) have: volumetric modulus [Pa] of the law, factor on the energy, and how many
+        times its volume each has grown.
         """
 
         def total(values: Floats) -> Floats:
@@ -152,10 +139,7 @@ class NodalVolumeTerm(_PatchTerm):
 class PatchStiffnessTerm(_PatchTerm):
     """`sum_a c_a g_ab (x) g_ac`: how pressures follow the displacement. Its diagonal is in blocks, the rest is not.
 
-    Parameters
-    ----------
-    volumes : NodalVolumeTerm
-        Of which the tangents are evaluated before those of this one.
+    Its tangents are evaluated after those of `volumes`.
     """
 
     def __init__(self, volumes: NodalVolumeTerm) -> None:

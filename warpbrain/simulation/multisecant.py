@@ -40,12 +40,7 @@ class Multisecant:
     def split(self, u: Floats, r: Floats) -> tuple[Floats, Floats]:
         """What of a step is known, and the force that is left for a linear solve.
 
-        Parameters
-        ----------
-        u : (n, 3) array
-            Displacement [m] after the last step.
-        r : (n, 3) array
-            Out-of-balance force [N] there.
+        Of the displacement (n, 3) [m] after the last step, and the out-of-balance force (n, 3) [N] there.
         """
         if self._at is not None:
             self._steps.append((u - self._at[0]).ravel())
@@ -69,19 +64,10 @@ _ITERATIONS, _FALLS = 12, 0.5
 def toward_equilibrium(
     system: System, external: Floats, start: Floats, inverse: Callable[[Floats], Floats], tolerance: float
 ) -> Floats:
-    """The displacement (n, 3) [m] with the smallest residual on the way from a start.
+    """The displacement (n, 3) [m] with the smallest residual on the way from a start, of a state nearby.
 
-    Parameters
-    ----------
-    system : System
-    external : (n, 3) array
-        Nodal forces [N].
-    start : (n, 3) array
-        Displacement [m] of a state nearby.
-    inverse : callable
-        From nodal forces (n, 3) [N] to the displacement (n, 3) [m] that they cause there; zero where nodes are held.
-    tolerance : float
-        Of the out-of-balance force, relative to all nodal forces.
+    Under nodal forces (n, 3) [N], until what is out of balance is `tolerance` times all of them. `inverse` goes from
+    nodal forces (n, 3) [N] to the displacement (n, 3) [m] that they cause in that state; zero where nodes are held.
     """
     model = system.model
     u, free = np.where(model.constrained, model.prescribed, start), ~model.constrained
