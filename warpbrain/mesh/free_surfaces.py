@@ -9,8 +9,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.surface import closed_surfaces, face_vectors, in_rows, interface_faces, nodes_of
-from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
+from warpbrain.mesh.surface import (
+    Bools,
+    Floats,
+    Ints,
+    closed_surfaces,
+    face_vectors,
+    in_rows,
+    interface_faces,
+    nodes_of,
+)
+from warpbrain.mesh.tet_mesh import TetMesh
 
 #: The outside of a body, the wall of a void within it, and what was inside until tetrahedra were taken out.
 Origin = Literal["outer", "inner", "cut"]

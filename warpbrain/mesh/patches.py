@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.surface import SIDES, closed_surfaces, face_vectors
-from warpbrain.mesh.tet_mesh import Floats
+from warpbrain.mesh.surface import SIDES, Floats, closed_surfaces, face_vectors
 
 #: Cosine of the angle between two triangles that face different ways: a right angle, but for rounding.
 _ASIDE = 1e-6

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.mesh.refinement import inherited, refined
-from warpbrain.mesh.surface import EDGES, nodes_of
-from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
+from warpbrain.mesh.surface import EDGES, Bools, Floats, Ints, nodes_of
+from warpbrain.mesh.tet_mesh import TetMesh
 
 #: Parts of a tetrahedron's mass for each corner and each midside node: the diagonal of the consistent mass matrix,
 #: `V/70` and `8 V/105`, scaled to the mass of the element (Hinton, Rock and Zienkiewicz 1976).

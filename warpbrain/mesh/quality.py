@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.surface import EDGES, FACES, connected, edges_of, paired_faces
-from warpbrain.mesh.tet_mesh import Floats, Ints, TetMesh, signed_volumes
+from warpbrain.mesh.surface import EDGES, FACES, Floats, Ints, connected, edges_of, paired_faces
+from warpbrain.mesh.tet_mesh import TetMesh, signed_volumes
 
 # the two faces that meet at each of `EDGES`, by the corner each face is opposite to
 _OPPOSITE = np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]])

@@ -291,10 +291,13 @@ class TetMesh:
             mesh = mesh.with_node_sets({name: members[node_ids] for name, members in self.node_sets.items()})
         return mesh, node_ids, element_ids
 
-    def _named(self, nodes: Any, elements: Any) -> tuple[dict[str, Any], ...]:
+    def _named(self, nodes: Any, elements: Any) -> tuple[dict[str, Bools], dict[str, Bools], dict[str, Floats]]:
         """Sets and vectors of some nodes and elements, by their ids."""
-        given = ((self.node_sets, nodes), (self.element_sets, elements), (self.element_vectors, elements))
-        return tuple({name: values[ids] for name, values in named.items()} for named, ids in given)
+        return (
+            {name: members[nodes] for name, members in self.node_sets.items()},
+            {name: members[elements] for name, members in self.element_sets.items()},
+            {name: vectors[elements] for name, vectors in self.element_vectors.items()},
+        )
 
     def _left(self, kept: Bools) -> tuple[TetMesh, Ints, Ints]:
         element_ids = np.flatnonzero(kept).astype(np.int32)

@@ -632,10 +632,8 @@ class System:
         for term in self.terms:
             term.set_scale(share * term.factor(time))
         model = self.model
-        growth, softening, emptying = (
-            [share * mechanism.factor(time) for mechanism in those]
-            for those in (model.growing, model.weakening, model.emptying)
-        )
+        acting: list[Sequence[Any]] = [model.growing, model.weakening, model.emptying]
+        growth, softening, emptying = ([share * mechanism.factor(time) for mechanism in those] for those in acting)
         scales = (*growth, *softening, *emptying)
         if scales == self._scales:
             return False
